@@ -1,11 +1,11 @@
 """Recordings that others published, from the file to the verdict, as a new user would.
 
-    python -m benchmarks recordings [--only=FOLDER]
+    python -m benchmarks recordings [--only=FOLDER] [--screens]
 
 Each is imported with nothing else; a question is answered with what its PROVENANCE.md
 says, and the options that took are counted. Then `fieldcal diagnose`. The right answer
 is what was found independently (the README.md beside them): effects that must be named,
-or that nothing is.
+or that nothing is. `--screens` prints what a terminal of 80 by 24 shows of each instead.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from benchmarks._words import ran
 from benchmarks.injected.recorded import REAL
 
 JOINED = "set-2__full-sphere__"
+
+SCREEN = 24, 80
+"""Rows and columns of the terminal that is looked at."""
 
 
 class Published(NamedTuple):
@@ -82,6 +85,7 @@ class Verdict(NamedTuple):
     verdict: str
     effects: tuple[str, ...]
     seconds: float
+    screen: str = ""
 
 
 def main() -> None:
@@ -90,11 +94,14 @@ def main() -> None:
         print(f"the recordings are not here: {REAL}")
         return
     only = [w.removeprefix("--only=") for w in sys.argv if w.startswith("--only=")]
-    print("| recording | options | rests | verdict | seconds | right answer |")
-    print("|---|---|---|---|---|---|")
+    screens = "--screens" in sys.argv
+    if not screens:
+        print("| recording | options | rests | verdict | seconds | right answer |")
+        print("|---|---|---|---|---|---|")
     for one in PUBLISHED:
         if not only or one.folder in only:
-            print(row(one, of(one)), flush=True)
+            found = of(one, screens)
+            print(found.screen if screens else row(one, found), flush=True)
 
 
 def row(one: Published, found: Verdict) -> str:
@@ -115,8 +122,8 @@ def row(one: Published, found: Verdict) -> str:
     )
 
 
-def of(one: Published) -> Verdict:
-    """Import a recording and diagnose it."""
+def of(one: Published, screen: bool = False) -> Verdict:
+    """Import a recording and diagnose it, on a screen as well if wanted."""
     paths = [str(REAL / one.folder / name) for name in one.files]
     call = ["import", *paths, *(["--join"] if len(paths) > 1 else [])]
     began, asked = process_time(), 0
@@ -140,4 +147,22 @@ def of(one: Published) -> Verdict:
             return Verdict(asked, marks, f"exit code {code}", (), seconds)
         said = json.loads(text)
         effects = tuple(effect["id"] for effect in said["effects"])
-        return Verdict(asked, marks, said["verdict"], effects, seconds)
+        seen = shown(folder) if screen else ""
+        return Verdict(asked, marks, said["verdict"], effects, seconds, seen)
+
+
+def shown(folder: Path) -> str:
+    """What `fieldcal diagnose` leaves on a terminal, as a user finds it."""
+    import pexpect
+    import pyte
+
+    rows, columns = SCREEN
+    terminal = pyte.Screen(columns, rows)
+    words = ["-m", "fieldcal", "diagnose", folder.name]
+    child = pexpect.spawn(
+        sys.executable, words, dimensions=SCREEN, cwd=str(folder.parent), timeout=None
+    )
+    output = child.read()
+    pyte.ByteStream(terminal).feed(output)
+    lines = "\n".join(line.rstrip() for line in terminal.display).rstrip()
+    return f"{'-' * columns}\n{lines}\n{'-' * columns}"

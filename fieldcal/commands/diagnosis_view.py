@@ -19,7 +19,7 @@ from fieldcal.diagnosis.wording.lines import format_probability
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
 
     from fieldcal.twin import Rerun
 
@@ -42,6 +42,9 @@ FOLLOWS = 22
 WIDEST = 4
 """Cells of the bar that shows how significant a mismatch is."""
 
+BELOW = 3
+"""Lines of a screen below a diagnosis: the file it is written to, and the prompt."""
+
 BRIEF = 5.0
 """Stretches shorter than this are told to a tenth of a second, s."""
 
@@ -52,50 +55,78 @@ def show(
     out: IO[str] | None = None,
     details: bool = False,
     width: int | None = None,
+    height: int | None = None,
 ) -> None:
     """Print verdict, what to do, effects and picture; all else if `details`.
 
-    `width` is that of the terminal unless it is said.
+    `width` and `height` are those of the terminal unless they are said; without
+    `details` no more effects are shown than fit on one screen, so that the verdict
+    stays on it. What is no terminal takes them all.
     """
     from fieldcal.commands.console import ShownConsole
 
     console = ShownConsole(file=out, width=width)
-    _verdict(console, diagnosis)
-    steps = diagnosis.next if details else diagnosis.next[:STEPS]
-    for step in steps or ("Nothing: the simulation has all that this can show.",):
-        _step(console, step)
-    if more := len(diagnosis.next) - len(steps):
-        _step(console, f"{more} more: --details")
-    if diagnosis.lines:
-        console.print(_lines(diagnosis))
-    _picture(console, diagnosis)
+    if height is None and console.is_terminal:
+        height = console.height
+    head = [_verdict(diagnosis), *_steps(diagnosis, details)]
+    picture = _picture(diagnosis)
+    rest = sum(_lines_of(console, part) for part in (*head, *picture))
+    room = None if details or height is None else height - BELOW - rest
+    for part in (*head, *_effects(console, diagnosis, room), *picture):
+        console.print(part)
     if details:
         _details(console, diagnosis)
     if again is not None:
         console.print(_replays(again))
 
 
-def _verdict(console: Console, diagnosis: Diagnosis) -> None:
+def _lines_of(console: Console, part: RenderableType) -> int:
+    return len(console.render_lines(part, pad=False))
+
+
+def _verdict(diagnosis: Diagnosis) -> RenderableType:
     from rich.text import Text
 
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
-    console.print(
-        head + Text(f"  probability {format_probability(diagnosis.probability)}")
-    )
+    return head + Text(f"  probability {format_probability(diagnosis.probability)}")
 
 
-def _step(console: Console, text: str) -> None:
+def _steps(diagnosis: Diagnosis, details: bool) -> list[RenderableType]:
+    """What to do, the first steps of it unless there are to be `details`."""
+    steps = diagnosis.next if details else diagnosis.next[:STEPS]
+    out = [_step(s) for s in steps]
+    if not steps:
+        out = [_step("Nothing: the simulation has all that this can show.")]
+    if more := len(diagnosis.next) - len(steps):
+        out.append(_step(f"{more} more: --details"))
+    return out
+
+
+def _step(text: str) -> RenderableType:
     """One thing to do; further lines of it stand under its words."""
     from rich.table import Table
     from rich.text import Text
 
     grid = Table.grid(padding=(0, 1))
     grid.add_row("→", Text(text))
-    console.print(grid)
+    return grid
 
 
-def _lines(diagnosis: Diagnosis) -> object:
+def _effects(
+    console: Console, diagnosis: Diagnosis, room: int | None
+) -> list[RenderableType]:
+    """The effects, as many as there are lines for, at least one; nothing of none."""
+    many = len(diagnosis.lines)
+    while many > 1 and room is not None:
+        if _lines_of(console, _lines(diagnosis, many)) <= room:
+            break
+        many -= 1
+    return [_lines(diagnosis, many)] if many else []
+
+
+def _lines(diagnosis: Diagnosis, many: int) -> RenderableType:
+    """The first effects, a row each, and how many more there are."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -104,28 +135,30 @@ def _lines(diagnosis: Diagnosis) -> object:
     for name, ratio in (("left out", 5), ("how big", 7)):
         table.add_column(name, ratio=ratio)
     table.add_column("how sure", no_wrap=True)
-    table.add_column("does to the calibration", ratio=7)
-    for line in diagnosis.lines:
+    table.add_column("does to calibration", ratio=7)
+    for line in diagnosis.lines[:many]:
         cells = (line.what, line.size, line.sure, line.does)
         table.add_row(*map(Text, cells))
+    if more := len(diagnosis.lines) - many:
+        table.add_row(f"{more} more", "--details")
     return table
 
 
-def _picture(console: Console, diagnosis: Diagnosis) -> None:
+def _picture(diagnosis: Diagnosis) -> list[RenderableType]:
     """What was predicted without having been seen, before and after, by channel."""
     from rich.table import Table
+    from rich.text import Text
 
     before, after = diagnosis.before.by_channel, diagnosis.after.by_channel
     names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
     if not names:
-        return
+        return []
     legend = f"held-out rms, {pretty(UNITS[0])} and {pretty(UNITS[1])}"
-    console.print(f"{legend}   ░ before  █ after", style="bold")
     grid = Table.grid(padding=(0, 2))
     triads = [[n for n in names if n[0] == triad] for triad in "ag"]
     for pair in zip_longest(*(t for t in triads if t)):
         grid.add_row(*(_bar(name, names, before, after) for name in pair))
-    console.print(grid)
+    return [Text(f"{legend}   ░ before  █ after", style="bold"), grid]
 
 
 def _bar(

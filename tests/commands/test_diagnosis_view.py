@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -83,9 +84,11 @@ CONSISTENT = Diagnosis(
 )  # fmt: skip
 
 
-def screen(found: Diagnosis, width: int, details: bool = False) -> str:
+def screen(
+    found: Diagnosis, width: int, details: bool = False, height: int | None = None
+) -> str:
     out = io.StringIO()
-    show(found, out=out, details=details, width=width)
+    show(found, out=out, details=details, width=width, height=height)
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines()) + "\n"
 
 
@@ -112,6 +115,28 @@ def test_verdict_first_then_what_to_do_and_one_screen(width: int) -> None:
     assert shown[1].startswith("→ Take the position α = -45°")
     assert max(map(len, shown)) <= width
     assert len(shown) <= (21 if width >= 80 else 30), "and a line for the prompt"
+
+
+OTHERS = ("settling", "warm_up", "bias_drift", "gyro_scale", "quadratic")
+OF_NINE = (
+    *EFFECTS,
+    *(FoundEffect(i, {"x": Quantity(0.1, 0.01, "1")}) for i in OTHERS),
+)
+MANY = replace(AMBIGUOUS, effects=OF_NINE, lines=lines(OF_NINE))
+
+
+@pytest.mark.parametrize("height", [20, 24, 50])
+def test_what_is_shown_fits_the_screen_and_the_rest_is_counted(height: int) -> None:
+    """The verdict is not pushed off the screen by effects, nor are any hidden."""
+    shown = screen(MANY, 80, height=height).splitlines()
+    assert shown[0] == "AMBIGUOUS  probability 0.93"
+    assert len(shown) <= height - 3, "the file written, and the prompt"
+    assert shown[-3].startswith("ax "), "the picture stays"
+    there = [line.what for line in MANY.lines if any(line.what[:8] in s for s in shown)]
+    missing = len(MANY.lines) - len(there)
+    assert missing == {20: 6, 24: 2, 50: 0}[height]
+    assert (f"{missing} more" in "\n".join(shown)) == bool(missing)
+    assert screen(MANY, 80) == screen(MANY, 80, height=50), "what is no terminal"
 
 
 def test_words_of_a_table_are_not_broken() -> None:

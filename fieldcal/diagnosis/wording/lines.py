@@ -12,6 +12,9 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line, Scatter
 
+UNITS = frozenset({"hz", "ppm", "seconds", "relative"})
+"""Names of parameters that tell nothing but their unit."""
+
 TREATED = {
     "mend": "nothing: put right",
     "mask": "nothing: left out",
@@ -47,6 +50,8 @@ def size(parameters: Mapping[str, Quantity]) -> str:
 
     >>> size({"k12": Quantity(0.008, 1e-4, "1"), "k13": Quantity(0.0, 1e-4, "1")})
     'k12 0.00800 ± 0.00010'
+    >>> size({"hz": Quantity(28.25, 0.01, "Hz")}), size({"at_s": Quantity(4, 1, "s")})
+    ('28.250 ± 0.010 Hz', 'at 4.0 ± 1.0 s')
     """
     if not parameters:
         return "not known"
@@ -54,7 +59,8 @@ def size(parameters: Mapping[str, Quantity]) -> str:
     name = max(told, key=lambda n: _clear(parameters[n]))
     clear = sum(_clear(q) > 3 for n, q in parameters.items() if n != name)
     more = f" (+{clear})" if clear else ""
-    return f"{name.removesuffix('_deg')} {pretty_quantity(parameters[name])}{more}"
+    called = "" if name in UNITS else name.removesuffix("_deg").removesuffix("_s")
+    return f"{called} {pretty_quantity(parameters[name])}{more}".lstrip()
 
 
 def pretty_quantity(quantity: Quantity) -> str:

@@ -5,7 +5,7 @@
 Each is imported with nothing else; a question is answered with what its PROVENANCE.md
 says, and the options that took are counted. Then `fieldcal diagnose`. The right answer
 is what was found independently (the README.md beside them): effects that must be named,
-or that nothing is. `--screens` prints what a terminal of 80 by 24 shows of each instead.
+or that nothing is. `--screens` prints what a terminal of 80 by 24 shows of each.
 """
 
 from __future__ import annotations

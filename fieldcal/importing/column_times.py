@@ -16,7 +16,7 @@ from fieldcal.importing.rate_size import rate_in
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.row_times import FRACTIONS, NEAR
 from fieldcal.importing.scales import FEWEST, USUAL_COUNTS, about
-from fieldcal.importing.time_units import SharedTimes, time_units
+from fieldcal.importing.time_units import SharedTimes, burst_units, time_units
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
@@ -24,10 +24,6 @@ SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 
 COARSEST = 1.001
 """Step of the coarsest clock, s."""
-
-HELD = 128
-"""Rows that come together at most, as a packet or the buffer of a sensor holds no more:
-4 kB of six channels and a temperature. More are a burst, with a pause behind it."""
 
 LATER = 0.999
 """Share of rows that are later than the row before, of a clock: one may be damaged."""
@@ -110,15 +106,17 @@ def is_clock_number(t: Array) -> bool:
 def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions | None:
     """Options by which rows that share times (n,) are spread; None if nobody can tell.
 
-    A second is the coarsest clock, and beyond it rows are bursts with pauses between.
+    A second is the coarsest clock, and beyond it rows are bursts with pauses between,
+    also in a unit in which the rows of one have the rate of a log.
     """
     t = t[np.isfinite(t)]
+    own = [] if shared.equal else burst_units(t)
+    if any(shared.step * TIME_UNITS[unit] > COARSEST for unit in own):
+        return None
     each = np.linspace(t[0], t[-1], len(t))  # as if every row had its own
     unit = wanted.time_unit or next(iter(time_units(each)), "s")
     seconds = shared.step * TIME_UNITS[unit]
     if not shared.even or seconds > COARSEST or shared.rows < len("12"):
-        return None
-    if not shared.equal and shared.rows > HELD:
         return None
     return replace(wanted, time_unit=unit, batch=RowBatch(seconds, shared.rows))
 

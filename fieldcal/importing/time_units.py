@@ -33,6 +33,10 @@ SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
 """Part of the rows that come with the row before, of a clock too coarse; the part of
 the mean step by which they follow; and of batches that have as many rows."""
 
+JITTER = 0.5
+"""Quartiles of the steps of a sensor's clock differ by a smaller part of the step;
+those of arrivals, of rows that wait for each other, by more."""
+
 UNIX = (1e9, 4e9)
 """Times of day since 1970, s: 2001 to 2096."""
 
@@ -178,6 +182,23 @@ def shared_times(t: Array) -> SharedTimes | None:
     even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
     equal = float((steps == 0).mean()) > SHARED
     return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
+
+
+def burst_units(t: Array) -> list[str]:
+    """Units in which rows of times (n,) between pauses were taken when these say.
+
+    They are even then, and make the rate of a log. Of rows that a port hands over at
+    once, each with the time at which it was read, they are neither.
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    own = steps[steps < TOGETHER * steps.mean()]
+    low, middle, high = np.quantile(own, (0.25, 0.5, 0.75))
+    if middle <= 0 or high - low > JITTER * middle:
+        return []
+    least, most = RATES_HZ
+    return [
+        u for u, n in TIME_SIZES.items() if u != "d" and least <= n / middle <= most
+    ]
 
 
 def _step(t: Array) -> float:

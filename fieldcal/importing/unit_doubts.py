@@ -121,7 +121,8 @@ class SaidUnits:
         """Ask about a unit of the file's; of the user's only say what is odd."""
         unit = self._unit(kind)
         if kind not in self._said.named:
-            return [f"{unit} as you say, but {shows}"]
+            zero = "; rests in several orientations show whether zero lies elsewhere"
+            return [f"{unit} as you say, but {shows}{zero if kind == 'a' else ''}"]
         answers = [other] if other else []
         answers += [f"{option} {one}" for one in fits if one != unit]
         answers.append(f"{option} {unit}, if it is so")

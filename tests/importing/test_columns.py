@@ -442,9 +442,12 @@ def test_columns_of_a_text_are_chosen_by_name(
     assert "there are clock, u1, u2" in capsys.readouterr().err
 
 
-def test_bursts_with_pauses_between_are_no_batches(tmp_path: Path) -> None:
+@pytest.mark.parametrize("pause", [20.0, 300.0])
+def test_bursts_with_pauses_between_are_no_batches(
+    tmp_path: Path, pause: float
+) -> None:
     rows = turned(9, 50.0)
-    t = rows[:, 0] + 20.0 * np.floor(rows[:, 0] / 2.0)
+    t = rows[:, 0] + pause * np.floor(rows[:, 0] / 2.0)
     path = write(
         tmp_path, np.column_stack([t, rows[:, 1:]]), heading="time,ax,ay,az,gx,gy,gz"
     )

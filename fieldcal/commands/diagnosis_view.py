@@ -15,7 +15,7 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.lines import format_probability
+from fieldcal.diagnosis.wording.lines import format_probability, of_verdict
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def _verdict(diagnosis: Diagnosis) -> RenderableType:
 
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
-    return head + Text(f"  probability {format_probability(diagnosis.probability)}")
+    sure = of_verdict(diagnosis.verdict, diagnosis.probability, len(diagnosis.lines))
+    return head + Text(f"  {sure}")
 
 
 def _steps(diagnosis: Diagnosis, details: bool) -> list[RenderableType]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.calibration.wording import TITLES, number, position_numbers, pretty
 from fieldcal.core.samples import CHANNELS, common_unit
-from fieldcal.diagnosis.wording.lines import format_probability
+from fieldcal.diagnosis.wording.lines import of_verdict
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
@@ -57,9 +57,10 @@ def verdict_box(
 ) -> WarningBox:
     """The verdict of a diagnosis, or as it is called else, with its probability."""
     verdict = str(found.get("verdict", "unknown"))
-    sure = format_probability(real(found.get("probability")))
+    named = len(objects_at(found, "lines"))
+    sure = of_verdict(verdict, real(found.get("probability")), named)
     name = (called or {}).get(verdict, verdict).replace("_", " ")
-    lead = f"{name.upper()}, probability {sure}"
+    lead = f"{name.upper()}, {sure}"
     return WarningBox(lead, TONES.get(verdict, "warn"))
 
 

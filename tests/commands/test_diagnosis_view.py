@@ -111,7 +111,7 @@ def test_the_screen_is_as_kept(
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_verdict_first_then_what_to_do_and_one_screen(width: int) -> None:
     shown = screen(AMBIGUOUS, width).splitlines()
-    assert shown[0] == "AMBIGUOUS  probability 0.93"
+    assert shown[0] == "AMBIGUOUS  probability 0.93 for all of it together"
     assert shown[1].startswith("→ Take the position α = -45°")
     assert max(map(len, shown)) <= width
     assert len(shown) <= (21 if width >= 80 else 30), "and a line for the prompt"
@@ -129,7 +129,7 @@ MANY = replace(AMBIGUOUS, effects=OF_NINE, lines=lines(OF_NINE))
 def test_what_is_shown_fits_the_screen_and_the_rest_is_counted(height: int) -> None:
     """The verdict is not pushed off the screen by effects, nor are any hidden."""
     shown = screen(MANY, 80, height=height).splitlines()
-    assert shown[0] == "AMBIGUOUS  probability 0.93"
+    assert shown[0] == "AMBIGUOUS  probability 0.93 for all of it together"
     assert len(shown) <= height - 3, "the file written, and the prompt"
     assert shown[-3].startswith("ax "), "the picture stays"
     there = [line.what for line in MANY.lines if any(line.what[:8] in s for s in shown)]

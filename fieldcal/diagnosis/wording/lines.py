@@ -15,6 +15,9 @@ from fieldcal.physics.effect import Chain, Line, Scatter
 UNITS = frozenset({"hz", "ppm", "seconds", "relative"})
 """Names of parameters that tell nothing but their unit."""
 
+SURE = 0.99
+"""Probability above which no digits are told."""
+
 TREATED = {
     "mend": "nothing: put right",
     "mask": "nothing: left out",
@@ -98,6 +101,17 @@ def _does(found: FoundEffect) -> str:
     return f"{title(name)} {by} ({sigmas:.0f} σ)"
 
 
+def of_verdict(verdict: str, probability: float, named: int) -> str:
+    """Probability of a verdict that names some effects, in words.
+
+    >>> of_verdict("left_out", 0.51, 3)
+    'probability 0.51 for all of it together'
+    """
+    together = named > 1 and verdict != "consistent" and probability <= SURE
+    told = f"probability {format_probability(probability)}"
+    return f"{told} for all of it together" if together else told
+
+
 def format_probability(probability: float) -> str:
     """A probability, without more digits than are worth saying.
 
@@ -106,4 +120,4 @@ def format_probability(probability: float) -> str:
     """
     if not math.isfinite(probability):
         return "not known"
-    return "above 0.99" if probability > 0.99 else f"{probability:.2f}"
+    return f"above {SURE}" if probability > SURE else f"{probability:.2f}"

@@ -34,6 +34,7 @@ from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import head, on_disk
 from fieldcal.importing.heading import Heading
 from fieldcal.importing.matlab_objects import holds_objects, object_tables
+from fieldcal.importing.paired_tables import Pairing, pairing
 from fieldcal.importing.said_rate import rate_of, scalars
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -66,6 +67,8 @@ class ArrayFile(ColumnRecording):
     """Numbers that stand alone in it, by name."""
     _objects: Mapping[str, ArrayTable] = {}
     """Tables of MATLAB in an HDF5 file, which another reader gives."""
+    _pairing: tuple[Pairing | None] | None = None
+    """How its arrays go together, so that it is found once."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
 
@@ -175,7 +178,20 @@ class ArrayFile(ColumnRecording):
 
     @contextmanager
     def _opened(self) -> Iterator[dict[str, ArrayTable]]:
-        """Every array of numbers in the file."""
+        """Every array of numbers in the file, those of one IMU side by side."""
+        with self._arrays() as tables:
+            if self._pairing is None:
+                self._pairing = (pairing(tables),)
+            (paired,) = self._pairing
+            if paired is None:
+                yield tables
+                return
+            self.says += [said for said in paired.says if said not in self.says]
+            yield paired.of(tables)
+
+    @contextmanager
+    def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
+        """Every array of numbers in the file, as it lies there."""
         if self._loaded is not None:
             yield self._loaded
             return

@@ -16,6 +16,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.heading import Column
+from fieldcal.importing.heading_words import meaning
 from fieldcal.importing.matlab_objects import DECODE
 
 WIDEST = 64
@@ -54,7 +55,7 @@ def columns_of(tables: Mapping[str, ArrayTable]) -> list[Column]:
     """Columns of the arrays; those of a table of three are axes."""
     found = []
     for name, table in tables.items():
-        bare, many = name.rpartition("/")[2], table.shape[1]
+        bare, many = _called(name), table.shape[1]
         if many == 1:
             found.append(Column(name, bare, table.unit))
         elif many <= WIDEST:
@@ -64,6 +65,15 @@ def columns_of(tables: Mapping[str, ArrayTable]) -> list[Column]:
                 for i, one in enumerate(names)
             ]
     return found
+
+
+def _called(name: str) -> str:
+    """What an array is called, with what it lies in where that says more: acc/data."""
+    within, _, bare = name.rpartition("/")
+    group = within.rpartition("/")[2]
+    with_group = f"{group}_{bare}"
+    known = [meaning(one) or meaning(f"{one}_x") for one in (bare, with_group)]
+    return with_group if group and known[0] is None and known[1] else bare
 
 
 def _names(bare: str, many: int, table: ArrayTable) -> list[str]:

@@ -32,7 +32,8 @@ class SteeringKeys:
     ----------
     stream : what is moved
     steps : of alpha and beta, deg
-    keyboard, screen : a terminal, and where the line about the device goes
+    keyboard, screen : a terminal, and where the line about the device goes, standard
+        error if it is not said
 
     """
 
@@ -41,10 +42,14 @@ class SteeringKeys:
         stream: DeviceStream,
         steps: tuple[float, float],
         keyboard: int = 0,
-        screen: IO[str] = sys.stderr,
+        screen: IO[str] | None = None,
     ) -> None:
         self._stream, self._steps = stream, steps
-        self._keyboard, self._screen = keyboard, screen
+        self._keyboard = keyboard
+        # where what is written is only shown, the line would not be written over
+        self._screen: IO[str] = getattr(
+            screen or sys.stderr, "rich_proxied_file", screen or sys.stderr
+        )
         self._shown_at = -np.inf
         self._before: list[Any] | None = None
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from fieldcal.core.shown import ShownStream
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.keys import SteeringKeys
 from fieldcal.sim_device.line_faults import LineFaults
@@ -63,6 +64,18 @@ def test_keys_turn_bump_and_quit(
     assert "quit" in shown
     assert "turning to α = 22.5°, β = -2.5°   nobody listens" in shown
     assert "25.0 s   turning to α = 0°, β = 0°" in shown
+
+
+def test_the_line_is_written_over_where_text_of_others_is_only_shown(
+    stream: DeviceStream, terminal: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the command runs: control characters of names are shown, not carried out."""
+    screen = io.StringIO()
+    monkeypatch.setattr("sys.stderr", ShownStream(screen))
+    with SteeringKeys(stream, (22.5, 2.5), terminal[1]) as keys:
+        keys.serve()
+    assert "\r     0.0 s   at α = 0°" in screen.getvalue()
+    assert "\\x" not in screen.getvalue()
 
 
 def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:

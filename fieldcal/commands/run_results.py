@@ -49,10 +49,16 @@ def concluded(
 def first_result(
     found: Calibration, folder: Path, bounds: GradeLimits, history: History
 ) -> Calibration:
-    """Result of the device that was led through the procedure."""
-    from fieldcal.session.folder import Session
+    """Result of the device that was led through the procedure.
 
-    return concluded(Session.open(folder), bounds, history, found.method)
+    Whatever set its method solves: with the positions of a remedy there are more.
+    """
+    from fieldcal.session.folder import Session
+    from fieldcal.session.marks import ADDED
+
+    session = Session.open(folder)
+    more = any(mark.get("event") == ADDED for mark in session.marks())
+    return concluded(session, bounds, history, "auto" if more else found.method)
 
 
 def further_results(

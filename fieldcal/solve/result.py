@@ -146,8 +146,8 @@ def _info(
         out["doubtful_position"] = doubt.to_json()
     if np.isfinite(found.acc.left_out):
         out["left_out_rms"] = found.acc.left_out
-    if method == "two_position" and asked.level_deg:
-        out["level_sigma_deg"] = asked.level_deg
+    if found.given.wanted.level_deg:
+        out["level_sigma_deg"] = found.given.wanted.level_deg
     if observations.has_gyr:
         gyr = found.gyr
         out["gyroscopes"] = {

@@ -12,8 +12,10 @@ import pytest
 
 from fieldcal import procedures
 from fieldcal.calibration import Calibration, limits
+from fieldcal.commands.run_results import first_result
 from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
+from fieldcal.history.store import History
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures import adaptive
@@ -25,6 +27,7 @@ from fieldcal.run.wait_reason import WaitReason
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.vocabulary import effect
@@ -108,9 +111,13 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Bench:
+    return of_device(tmp_path / "s", TILT)
+
+
+def of_device(folder: Path, *effects: SimulatedEffect) -> Bench:
     noise = replace(Profile().noise, gyr=(1e-4,) * 3)
-    profile = replace(Profile(), sampling=Sampling(50.0), effects=(TILT,), noise=noise)
-    return Bench(tmp_path / "s", Hand(InProcess(VirtualDevice(profile, seed=5))))
+    profile = replace(Profile(), sampling=Sampling(50.0), effects=effects, noise=noise)
+    return Bench(folder, Hand(InProcess(VirtualDevice(profile, seed=5))))
 
 
 ADAPTIVE = {"procedure": "adaptive"}
@@ -158,6 +165,19 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
     assert len(said) == max(bench.numbers) - 2
     assert all("one position more" in t and "then GO is expected" in t for t in said)
+
+
+def test_two_positions_and_those_of_a_remedy_are_solved_together(
+    tmp_path: Path,
+) -> None:
+    """Two positions have a method of their own, which three are too many for."""
+    bench = of_device(tmp_path / "s")
+    site = {"latitude_deg": 45.0, "angle_setting_deg": 0.01, "level_deg": 0.01}
+    found = bench.run({"procedure": "two_position"}, until_go=True, site=site)
+    assert found.method == "two_position" and max(bench.numbers) >= 2
+    history = History(tmp_path / "history.sqlite")
+    whole = first_result(found, bench.folder, BOUNDS, history)
+    assert whole.method == "joint" and whole.info["decision"]["go"]
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,8 @@ def test_conditions_are_those_that_were_given() -> None:
     assert "level_sigma_deg" not in plain
     two = solve(observed(TWO, gyr=False), level_sigma_deg=0.3).info
     assert two["level_sigma_deg"] == 0.3
+    more = solve(observed(), level_sigma_deg=0.3).info
+    assert more["level_sigma_deg"] == 0.3, "what is stated counts whatever the method"
 
 
 def test_a_window_that_is_off_for_certain_has_no_weight_and_is_named() -> None:

@@ -22,6 +22,7 @@ from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
+from fieldcal.acceptance.square import relies_on_square_axes
 from fieldcal.acceptance.turned import turns_disagree
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
@@ -96,6 +97,7 @@ def decide(
         *_odd_positions(found, verification.ok is True),
         *_turns(found, limits),
         *_angles(found, about, limits, circumstances),
+        *relies_on_square_axes(found, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
         *_level(found, about),

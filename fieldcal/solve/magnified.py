@@ -46,9 +46,7 @@ class Magnified:
 
     @property
     def sentence(self) -> str:
-        """What it costs and what to do; nothing where positions magnify nothing."""
-        if self.times <= 1:
-            return ""
+        """What it costs and what to do."""
         moved = f"{self.moved / 1000:.2g} {self.unit}".removesuffix(" 1")
         return (
             "cross-coupling is taken as zero, and these positions magnify its effect"
@@ -57,11 +55,19 @@ class Magnified:
             " cross-coupling (--cross) from nine positions or more"
         )
 
+    def to_json(self) -> dict[str, str | float]:
+        """Key `cross_coupling_left_out` of a result."""
+        return {
+            "parameter": self.name, "moved_by_one": self.moved, "unit": self.unit,
+            "times": self.times,
+        }  # fmt: skip
+
 
 def magnified(found: Estimated) -> Magnified | None:
     """The largest effect of cross-coupling on the parameters of a set, by (1).
 
-    None where the set estimates it or determines nothing of the accelerometers.
+    None where the set estimates it, determines nothing of the accelerometers, or the
+    positions magnify nothing.
     """
     given = found.given
     if given.left_out is None:
@@ -74,7 +80,8 @@ def magnified(found: Estimated) -> Magnified | None:
             moved = float(added[given.names.index(name)])
             times = moved / (1.0 if parameter.is_scale else G0)
             every.append(Magnified(name, GROUPS[parameter.group][2], moved, times))
-    return max(every, key=lambda m: m.times, default=None)
+    worst = max(every, key=lambda m: m.times, default=None)
+    return worst if worst and worst.times > 1 else None
 
 
 def _added(found: Estimated, group: Group) -> Array:

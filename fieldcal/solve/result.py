@@ -46,11 +46,12 @@ def calibration(
 
     """
     names, sigma = found.names, np.sqrt(np.diag(found.covariance))
+    worst = magnified(found)
     sentences = [
         words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
         told.sentence if told else "",
         *left_open(method, observations, found),
-        worst.sentence if (worst := magnified(found)) else "",
+        worst.sentence if worst else "",
         *notes,
         *not_levelled(method, asked, observations),
     ]
@@ -66,6 +67,8 @@ def calibration(
     sentences += doubts(method, observations, found)
     fit = found.acc if any(map(_is_acc, names)) else found.gyr
     info = _info(method, observations, asked, found)
+    info |= {"borrowed": told.to_json()} if told else {}
+    info |= {"cross_coupling_left_out": worst.to_json()} if worst else {}
     return Calibration(
         method=method,
         names=names,
@@ -77,7 +80,7 @@ def calibration(
         rms=found.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
         good=not odd and not fit.contradicts,
-        info=info | ({"borrowed": told.to_json()} if told else {}),
+        info=info,
     )
 
 

@@ -59,6 +59,9 @@ _PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
 _PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
 """Labels with a space before their value, where a line holds nothing else."""
 
+_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}\D*)")
+"""A label with its value alone in a line, as programs print a temperature."""
+
 _SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
@@ -105,6 +108,7 @@ def labelled_values(line: str) -> list[Labelled]:
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
+    line = _of_temperature(line)
     arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
@@ -129,6 +133,19 @@ def labelled_values(line: str) -> list[Labelled]:
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
     return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+
+
+def _of_temperature(line: str) -> str:
+    """A line that holds a temperature alone, with what stands behind a label.
+
+    >>> _of_temperature("  Temperature 23.40 deg C"), _of_temperature("Sample 12")
+    ('Temperature: 23.40 deg C', 'Sample 12')
+    """
+    alone = _ALONE.fullmatch(line)
+    said = meaning(alone[1]) if alone else None
+    if alone is None or said is None or said.kind != "temperature":
+        return line
+    return f"{alone[1]}: {alone[2]}"
 
 
 class TitledValues:

@@ -1,5 +1,6 @@
 """Texts as monitors, spreadsheets and loggers write them become plain columns."""
 
+import re
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -140,6 +141,8 @@ def test_values_with_labels_need_no_columns(tmp_path: Path, row: str) -> None:
     np.testing.assert_array_equal(got.acc[:, 0], AX)
     np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
     np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+    warm = re.search(r"25\.\d+", row)
+    np.testing.assert_array_equal(got.temperature, float(warm[0]) if warm else np.nan)
 
 
 def test_a_monitor_that_says_when_a_row_came(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def _lines(found: Sequence[Json]) -> list[Block]:
     """Each effect in one line, as the terminal shows it."""
     keys = ("what", "size", "sure", "does")
     rows = [[str(line.get(key, "")) for key in keys] for line in found]
-    columns = ("left out", "how big", "how sure", "does to the calibration")
+    columns = ("left out", "how big", "how sure", "does to calibration")
     return [table("What is left out", columns, rows)] if rows else []
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -109,8 +110,11 @@ def round_to_tenth(angle: float) -> float:
     return round(float(angle), 1) + 0.0
 
 
+@lru_cache(maxsize=64)
 def _force(position: Position, gravity: float) -> Array:
+    """Specific force of a position, (3,) m/s^2: asked for with every block."""
     f: Array = forces([position], gravity)[0]
+    f.flags.writeable = False
     return f
 
 
@@ -143,6 +147,26 @@ def _nearest_slip(
     others: Mapping[str, Position],
 ) -> tuple[str, float]:
     """The slip that would put the device nearest to where it is, and how near, rad."""
+    before = held.position if held else None
+    said, there = _slips(wanted, before, tuple(others.items()), gravity)
+    if not said:
+        return "", np.inf
+    misses = np.linalg.norm(_without_offset(f, gravity, held) - there, axis=1) / gravity
+    best = int(np.argmin(misses))
+    return said[best], float(misses[best])
+
+
+@lru_cache(maxsize=16)
+def _slips(
+    wanted: Position,
+    before: Position | None,
+    others: tuple[tuple[str, Position], ...],
+    gravity: float,
+) -> tuple[tuple[str, ...], Array]:
+    """What an operator may have done instead, and the force there, (n, 3) m/s^2.
+
+    It is the same for every block as long as one position is asked for.
+    """
     a, b, c = wanted.all_degrees or (0.0, 0.0, 0.0)
     turned = [
         ((-a, b), "α is turned the wrong way"),
@@ -154,22 +178,18 @@ def _nearest_slip(
         ((a, 0.0), "β is not turned yet"),
         ((0.0, b), "α is not turned yet"),
     ]
-    slips = [(p, said) for said, p in others.items() if p.oriented]
+    slips = [(p, said) for said, p in others if p.oriented]
     if wanted.oriented:
         own = [(Position.deg(*at, gamma=c), said) for at, said in turned]
         if c:
             own.append((Position.deg(a, b, gamma=-c), "γ is turned the wrong way"))
             own.append((Position.deg(a, b), "γ is not turned yet"))
         slips = [*own, *slips]
-    if held and held.position.oriented:
-        slips.insert(0, (held.position, "it has not been turned yet"))
-    if not slips:
-        return "", np.inf
+    if before and before.oriented:
+        slips.insert(0, (before, "it has not been turned yet"))
     there = forces([p for p, _ in slips], gravity)
-    away = _without_offset(f, gravity, held) - there
-    misses = np.linalg.norm(away, axis=1) / gravity
-    best = int(np.argmin(misses))
-    return slips[best][1], float(misses[best])
+    there.flags.writeable = False
+    return tuple(said for _, said in slips), there
 
 
 def _explain(

@@ -123,6 +123,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "--motion, --patch, --limit and --junit need --against: name a simulator"
         )
+    if args.twin and not args.twin.parent.is_dir():
+        raise InputError(
+            f"{args.twin} cannot be written: there is no folder {args.twin.parent};"
+            " create it, or name another file"
+        )
     return _diagnosed(args)
 
 

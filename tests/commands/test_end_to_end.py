@@ -24,12 +24,6 @@ from fieldcal.solve import Observations
 TILTED = "--virtual=--base-tilt=1,-1"
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*RUN, *arguments], capture_output=True, text=True, check=False
-    )
-
-
 def test_five_positions_find_what_the_virtual_device_conceals(
     recalibrated: Recalibrated,
 ) -> None:
@@ -71,14 +65,18 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
             np.testing.assert_allclose(one, two, rtol=close, atol=1e-12)
 
 
-def test_a_level_base_is_enough_for_two_positions(tmp_path: Path) -> None:
-    done = run(
-        *("two_position", "--headless", f"--virtual={shlex.join(steady(tmp_path))}"),
-        *("--no-report", "-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"),
-        *("--speed", "60", "--json"),
+def test_a_level_base_is_enough_for_two_positions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = main(
+        ["run", "two_position", "--headless"]
+        + [f"--virtual={shlex.join(steady(tmp_path))}", "--no-report", "--json"]
+        + ["-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"]
+        + ["--speed", "60"]
     )
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    result = json.loads(out)
     assert result["method"] == "two_position"
     found = result["parameters"]["acc_bias"]
     off = np.subtract(found["value"], result["virtual"]["acc_bias"])
@@ -90,16 +88,17 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
 ) -> None:
     """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
     virtual = shlex.join(["--base-tilt=0.5,-0.3", *steady(tmp_path)])
-    done = run(
-        *("two_position", "--headless", f"--virtual={virtual}", "--json"),
-        *("--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"),
-        *("--speed", "60"),
+    code = main(
+        ["run", "two_position", "--headless", f"--virtual={virtual}", "--json"]
+        + ["--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"]
+        + ["--speed", "60"]
     )
-    assert done.returncode == 1, done.stderr
-    told = [json.loads(line) for line in done.stderr.splitlines()]
+    out, err = capsys.readouterr()
+    assert code == 1, err
+    told = [json.loads(line) for line in err.splitlines()]
     first = next(i for i, line in enumerate(told) if line["event"] == "place")
     assert any("how level the base is" in line.get("text", "") for line in told[:first])
-    result = json.loads(done.stdout)
+    result = json.loads(out)
     truth = result["virtual"]["acc_bias"]
     assert "how level the base is" in result["decision"]["reasons"][0]
     off = np.subtract(result["parameters"]["acc_bias"]["value"], truth)

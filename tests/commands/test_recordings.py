@@ -142,7 +142,7 @@ def test_five_mpu9150_agree_with_the_peer_s_published_table(
         ("p09", "joint", "angle_offset"),
         pytest.param("p01", "joint", None, marks=pytest.mark.thorough),
         pytest.param("p03", "joint", "angle_offset", marks=pytest.mark.thorough),
-        ("p04", "joint", "base_tilt"),
+        pytest.param("p04", "joint", "base_tilt", marks=pytest.mark.thorough),
     ],
 )
 def test_practice_sessions_are_solved_within_the_stated_uncertainty(

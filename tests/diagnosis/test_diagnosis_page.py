@@ -27,8 +27,18 @@ def found_in(folder: Path, *effects: str, seed: int = 1, **more: object) -> Diag
     return diagnose(session.block, session.about)
 
 
-def test_the_league_says_why_each_lost(tmp_path: Path) -> None:
-    found = found_in(tmp_path, "base_tilt:about_x_deg=1,about_z_deg=-0.7")
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    """A tilted base, and three seconds in which a gyroscope says the same."""
+    return found_in(
+        tmp_path_factory.mktemp("tilted"),
+        "base_tilt:about_x_deg=1,about_z_deg=-0.7",
+        "stuck:channel=gy,from_s=40,to_s=43",
+    )
+
+
+def test_the_league_says_why_each_lost(tilted: Diagnosis) -> None:
+    found = tilted
     tried = {c.id: c for c in found.candidates}
     assert {"base_tilt", "angle_offset", "cross_coupling", "bias_drift"} <= set(tried)
     assert [c.id for c in found.candidates if c.chosen] == ["base_tilt"]
@@ -85,10 +95,8 @@ def test_residuals_over_what_they_follow(
         assert abs(np.corrcoef(curve.x, curve.before)[0, 1]) > 0.9
 
 
-def test_what_to_do_next(tmp_path: Path) -> None:
-    found = found_in(
-        tmp_path, "base_tilt:about_x_deg=1", "stuck:channel=gy,from_s=40,to_s=43"
-    )
+def test_what_to_do_next(tilted: Diagnosis) -> None:
+    found = tilted
     cures = [text.partition(":")[0] for text in found.next]
     assert cures[:2] == ["stuck at position 2", "base_tilt"]
     assert any('effects = ["base_tilt"]' in text for text in found.next)

@@ -52,7 +52,7 @@ def _up(rng: np.random.Generator, side: Array) -> Rotation:
     return Rotation.from_matrix(axes[:, [1, 2, 0]].T)
 
 
-SEEDS = [0, 5, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 6, 7))]
+SEEDS = [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 5, 6, 7))]
 
 
 @pytest.mark.parametrize("seed", SEEDS)

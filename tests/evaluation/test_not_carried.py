@@ -228,7 +228,7 @@ def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
 ) -> None:
     """A scale factor of all axes alike, which gravity elsewhere would be as well."""
     profile = replace(CALM, truth=replace(CALM.truth, acc_scale=(1.0016,) * 3))
-    held = places(WIDE)
+    held = places(WIDE[:8], 12.0)
     free = [{k: v for k, v in p.items() if "deg" not in k} for p in held]
     block, verdicts = recorded(profile, held), {}
     for name, site in (("said", SITE), ("unsaid", {})):

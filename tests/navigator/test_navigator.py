@@ -87,9 +87,10 @@ def test_noise_grows_as_that_of_many_runs() -> None:
 
 
 @pytest.mark.statistical
-def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize("runs", [5, pytest.param(12, marks=pytest.mark.thorough)])
+def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path, runs: int) -> None:
     every, rng = [], np.random.default_rng(3)
-    for seed in range(8):
+    for seed in range(runs):
         tilt = rng.normal(0, [0.02, 0.5, 0.02])
         found, sensors = solved(tmp_path / str(seed), seed=seed, tilt_deg=tilt)
         assert len(found.names) == 9

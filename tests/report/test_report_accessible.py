@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from bench import five_positions
 from observed import SHARED
 
 from fieldcal.cli import main
@@ -49,10 +48,19 @@ class Page(HTMLParser):
         ]
 
 
-def own(folder: Path) -> Path:
-    session = five_positions(folder / "own")
-    assert main(["solve", str(session)]) == 0
-    return session
+@pytest.fixture(
+    scope="module",
+    params=["own", pytest.param("practice", marks=pytest.mark.thorough)],
+)
+def page(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Page:
+    """The report of a run of ours, or of a session that was diagnosed too."""
+    if request.param == "own":
+        session = request.getfixturevalue("recalibrated").folder
+    else:
+        session = practice(tmp_path_factory.mktemp("page"))
+    return Page((session / "report.html").read_text("utf-8"))
 
 
 def practice(folder: Path) -> Path:
@@ -65,18 +73,8 @@ def practice(folder: Path) -> Path:
         (session / name).write_bytes((source / name).read_bytes())
     main(["solve", str(session)])
     main(["diagnose", str(session)])
-    return session
-
-
-@pytest.fixture(
-    scope="module", params=[own, pytest.param(practice, marks=pytest.mark.thorough)]
-)
-def page(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Page:
-    session = request.param(tmp_path_factory.mktemp("page"))
     assert main(["report", str(session)]) == 0
-    return Page((session / "report.html").read_text("utf-8"))
+    return session
 
 
 def test_the_page_can_be_read_without_seeing_it(page: Page) -> None:

@@ -19,7 +19,7 @@ JUMP = 1.7e9
 RATE = 50.0
 
 
-def recorded(folder: Path, jump: float, windows: bool = True) -> np.ndarray:
+def recorded(folder: Path, jump: float, windows: int = 7) -> np.ndarray:
     """A session as another program wrote it, its clock set in the middle."""
     rows = turned(3, RATE)
     n, t = len(rows), rows[:, 0]
@@ -28,7 +28,7 @@ def recorded(folder: Path, jump: float, windows: bool = True) -> np.ndarray:
         file.add(Block.of(t + later, rows[:, 1:4], rows[:, 4:], np.full(n, 25.0)))
         file.close()
     text = "format = 1\n"
-    for k in range(7 if windows else 0):
+    for k in range(7 - windows, 7):
         start = 4.5 * k + 0.3
         a, b = (x + (jump if x >= t[n // 2] else 0.0) for x in (start, start + 2.4))
         text += f"[[position]]\nstart_s = {a!r}\nend_s = {b!r}\n"
@@ -45,9 +45,9 @@ def test_times_and_windows_go_on(tmp_path: Path) -> None:
     assert "to 2023-11-14" in session.warnings[-1]
 
 
-@pytest.mark.parametrize(("jump", "windows"), [(86400.0, True), (JUMP, False)])
+@pytest.mark.parametrize(("jump", "windows"), [(86400.0, 4), (JUMP, 0)])
 def test_memory_is_that_of_the_rows_whatever_the_clock_says(
-    tmp_path: Path, jump: float, windows: bool, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, jump: float, windows: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recorded(tmp_path, jump, windows)
     tracemalloc.start()

@@ -1,9 +1,12 @@
 """Gyroscopes from turns: rotations built another way, many seeds, real devices."""
 
 import doctest
+import io
 import json
 import shutil
-from dataclasses import replace
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -237,7 +240,7 @@ def test_the_turns_of_the_paper_s_own_procedure(
         z = Rotation.from_rotvec([b0, 0, 0]).inv().apply([0, 0, a1 - a0])
         steps.append((np.asarray(z), np.array([b1 - b0, 0, 0])))
     block, windows = record(5, steps, Rotation.identity(), still=30)
-    found = calibrated(tmp_path, block, windows, angles)
+    found = calibrated(tmp_path, block, windows, angles, whole_way=False)
     assert "gyr_scale.z" in found.names and found.uncertainty("gyr_scale.z") < 0.01
     assert "gyr_scale.y" not in found.names
     assert any("gyr_scale.y" in w and "add turns" in w for w in found.warnings)
@@ -345,42 +348,64 @@ def test_where_the_published_table_differs_ours_predicts_the_turns_better() -> N
 # --- the command line ---
 
 
-def solved(tmp_path: Path, name: str, *options: str) -> tuple[int, Calibration, Path]:
-    source = SHARED / "practice" / name
-    if not source.is_dir():
-        pytest.skip(f"practice sessions are not here: {source}")
-    folder = tmp_path / name
-    shutil.copytree(source, folder)
-    code = main(["solve", str(folder), *options])
-    document = json.loads((folder / "result.json").read_text())
-    return code, Calibration.from_json(document), folder
+@dataclass(frozen=True)
+class Practised:
+    """A practice session that was solved, and what was printed."""
+
+    folder: Path
+    code: int
+    result: Calibration
+    said: str
 
 
-def test_solve_takes_the_turns_of_a_session_along(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, result, _ = solved(tmp_path, "p01")
-    assert code == 0
+Practise = Callable[..., Practised]
+
+
+@pytest.fixture(scope="module")
+def practised(tmp_path_factory: pytest.TempPathFactory) -> Practise:
+    """Solve a practice session in its own folder; each once for all tests."""
+
+    @cache
+    def made(name: str, *options: str) -> Practised:
+        source = SHARED / "practice" / name
+        if not source.is_dir():
+            pytest.skip(f"practice sessions are not here: {source}")
+        folder = tmp_path_factory.mktemp("practice") / name
+        shutil.copytree(source, folder)
+        said = io.StringIO()
+        with redirect_stdout(said):
+            code = main(["solve", str(folder), *options])
+        document = json.loads((folder / "result.json").read_text())
+        return Practised(folder, code, Calibration.from_json(document), said.getvalue())
+
+    return made
+
+
+def test_solve_takes_the_turns_of_a_session_along(practised: Practise) -> None:
+    one = practised("p01")
+    result = one.result
+    assert one.code == 0
     # the practice device's gyroscopes have scale factor 1 and no cross-coupling
     matrix, sigma = result.gyroscopes()[1], result.vector("gyr_scale")[1]
     assert abs(matrix[2, 2] - 1) < 3 * sigma[2] and sigma[2] < 2e-3
     for part in result.components("gyro_cross_coupling"):
         name = f"gyro_cross_coupling.{part}"
         assert abs(result.value(name)) < 3.5 * result.uncertainty(name)
-    assert "gyro scale factor z" in capsys.readouterr().out
+    assert "gyro scale factor z" in one.said
     assert not any("too weak" in w for w in result.warnings)
 
 
-def test_solve_leaves_the_turns_out_when_told_to(tmp_path: Path) -> None:
-    _, result, _ = solved(tmp_path, "p10", "--turns", "no")
+def test_solve_leaves_the_turns_out_when_told_to(practised: Practise) -> None:
+    result = practised("p10", "--turns", "no").result
     assert "gyr_scale" not in result.groups
     assert any("gyr_scale is not determined" in w for w in result.warnings)
 
 
-def test_compare_and_apply(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, _, first = solved(tmp_path, "p09")
-    _, result, second = solved(tmp_path, "p10")
-    capsys.readouterr()
+def test_compare_and_apply(
+    practised: Practise, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, later = practised("p01").folder, practised("p10")
+    result, second = later.result, later.folder
     assert main(["compare", str(first), str(second / "result.json"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     # the same device on two days: nothing has changed
@@ -403,7 +428,7 @@ def test_compare_and_apply(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_compare_and_apply_say_what_is_wrong(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    practised: Practise, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["compare", str(tmp_path), str(tmp_path)]) == 2
     assert "run fieldcal solve first" in capsys.readouterr().err
@@ -414,7 +439,7 @@ def test_compare_and_apply_say_what_is_wrong(
     broken.write_text("{}")
     assert main(["compare", str(broken), str(broken)]) == 2
     assert "format is missing" in capsys.readouterr().err
-    _, _, folder = solved(tmp_path, "p10")
+    folder = practised("p10").folder
     capsys.readouterr()
     assert main(["apply", str(folder), str(tmp_path / "x.xls")]) == 2
     assert ".parquet" in capsys.readouterr().err

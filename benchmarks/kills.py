@@ -92,7 +92,7 @@ class Bench:
 
     def start(self, session: Path) -> subprocess.Popen[str]:
         """Begin a run, or go on with it if it was begun."""
-        call = [sys.executable, "-m", "fieldcal", "run", "--headless"]
+        call = [sys.executable, "-m", "fieldcal", "run", "--headless", "--no-report"]
         if (session / "session.toml").exists():
             call += ["--resume", str(session)]
         else:

@@ -140,7 +140,9 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
         devices, urls = started(stack, tmp_path)
         urls[1] += "&reconnect=0"
         devices[1].ask(fault={"silence_s": 1e6})
-        code, result, said = led(devices, urls, "-o", str(tmp_path / "s"))
+        code, result, said = led(
+            devices, urls, "--no-report", "-o", str(tmp_path / "s")
+        )
     assert code == 3
     assert said.startswith("fieldcal run: device-2: ")
     assert said.endswith("; the other devices have their results")

@@ -39,7 +39,7 @@ class Console:
         self.device, self.folder = device, folder
         url = f"serial:{device.port}?format=witmotion"
         call = ["-m", "fieldcal", "run", "five_position", "--device", url]
-        call += ["--angles", "0.001"]
+        call += ["--angles", "0.001", "--no-report"]
         call += ["--seconds", "14", "--latitude", "50.45", "--height", "170"]
         call += ["-o", str(folder), *more]
         self.child = pexpect.spawn(
@@ -201,7 +201,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     assert "--resume" in console.seen[-1]
     marks = [m["event"] for m in read_marks(folder / "marks.jsonl")]
     assert marks.count("repeated") == 2 and marks.count("skipped") == 1
-    call = ["-m", "fieldcal", "run", "--resume", str(folder), "--plain"]
+    call = ["-m", "fieldcal", "run", "--resume", str(folder), "--plain", "--no-report"]
     child = pexpect.spawn(sys.executable, call, encoding="utf-8")
     for number, angles in ((3, (22.5, 2.5)), (4, (45.0, 2.5)), (5, (45.0, 5.0))):
         child.expect(f"position {number}: turn to")

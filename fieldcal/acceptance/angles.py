@@ -1,16 +1,16 @@
-"""Whether anything would contradict wrong angles.
+"""Whether wrong angles would be noticed.
 
-A calibration by angles that somebody set is as good as these. A mistake that shows by l
-and moves a parameter by d, of its largest size (`solve.reliability`), is harmful where
-it is large enough to move the parameter by five of its uncertainties, s, and too small
-to be seen. If every size u up to the largest, 1, is as likely as another, that is so in
+A calibration is only as good as the angles that were set. `solve.reliability` states
+for each kind of mistake, at its largest size, by how much it shows in the fit, l (the
+root of the non-centrality of chi-squared), and by how much it moves a parameter, d. A
+mistake is harmful if it moves the parameter by more than five standard uncertainties s
+and still shows by less than L. If all sizes from 0 to the largest are equally likely,
 
     part = max(0, min(1, L / l) - 5 s / d)                                         (1)
 
-of all cases, L being what shows. Further witnesses add to l: a position that was not
-fitted, and earlier calibrations of the device. Whoever says how well the angles are
-set, or names the certificate of the fixture, is taken at that word, and the decision
-says that it relies on it.
+of the mistakes are harmful. A position that was not fitted and earlier calibrations of
+the device increase l. If the accuracy of the angles is stated, or a certificate of the
+fixture is named, it is believed, and the decision says that it relies on it.
 """
 
 from __future__ import annotations
@@ -29,19 +29,18 @@ from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
 
 SHOWN = 5.0
-"""L of (1): with ten degrees of freedom, chi-squared of 25 above its mean is rarer than
+"""L of (1). With ten degrees of freedom, chi-squared of 25 above its mean is rarer than
 1e-4, which is NO-GO."""
 
 REMEDY = (
-    "say how well they are set (--angles, or [site] angle_setting_deg in session.toml),"
-    " or let something that needs no angle bear witness: three or more other faces"
-    " (each a [[position]] without angles, gravity is known), or a position to verify"
-    " in which all axes feel gravity (--verify, [verification] alpha_deg = -135,"
-    " beta_deg = 45)"
+    "state how well the angles are set (--angles, or [site] angle_setting_deg in"
+    " session.toml), or record a check that needs no angles: three or more other faces"
+    " (each a [[position]] without angles), or a verification position in which all"
+    " axes measure gravity (--verify, [verification] alpha_deg = -135, beta_deg = 45)"
 )
 
 UNSEEN = 0.1
-"""Part of the mistakes of a kind that may be harmful and unseen."""
+"""Largest part (1) of the mistakes of one kind that is accepted."""
 
 VIRTUAL = "virtual"
 """The mover whose angles are no one's statement: it is told them by us."""
@@ -54,7 +53,7 @@ def unwitnessed(
     verification: Verification | None,
     family: Sequence[Calibration] | None,
 ) -> str:
-    """Sentence where wrong angles would go unseen; else empty."""
+    """Sentence if wrong angles would not be noticed; else empty."""
     if about.angles_from or _told(about):
         return ""
     worst, part, most, sigmas = None, UNSEEN, "", 0.0
@@ -81,8 +80,8 @@ def unwitnessed(
     if worst is None:
         return ""
     return (
-        f"nothing would contradict wrong angles: {worst.says} could move {most} by up"
-        f" to {sigmas:.0f} σ and not be seen"
+        f"wrong angles would not be noticed: {worst.says} could move {most} by up to"
+        f" {sigmas:.0f} σ"
     )
 
 

@@ -121,8 +121,8 @@ def _lacking(found: Calibration, session: Session, still: Rests) -> str:
     verb = "is" if len(lost) == 1 else "are"
     them = "it" if out == 1 else "them"
     return (
-        f"{which} left out, and without {them} {join(lost)} {verb} not determined:"
-        f" take {them} again"
+        f"{which} left out; without {them} {join(lost)} {verb} not determined: record"
+        f" {them} again"
     )
 
 
@@ -140,7 +140,7 @@ def store_in_history(history: History, session: Session, found: Calibration) -> 
     try:
         history.add(at, session.folder, found)
     except FieldcalError as error:
-        return f"not kept in the history: {error}"
+        return f"the calibration is not stored in the history: {error}"
     return ""
 
 
@@ -215,7 +215,7 @@ def _doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
         elif mark.get("event") == "insisted":
             insisted[number] = str(mark.get("text", ""))
     return [
-        f"position {number + 1} was taken on the operator's word, although {text}"
+        f"position {number + 1} was accepted by the operator although {text}"
         for number, text in sorted(insisted.items())
     ]
 
@@ -229,15 +229,16 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
             taken.append(int(mark["position"]))
         elif mark.get("event") == "rejoined" and taken:
             said.append(
-                f"the device's clock began anew behind position {taken[-1] + 1}: if it"
-                " lost power there, its bias at the next start may be another"
+                f"the device's clock restarted after position {taken[-1] + 1}: if the"
+                " device lost power, its bias may have changed; record all positions"
+                " without a restart"
             )
     counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
     if counted:
         times = "once" if counted == 1 else f"{counted} times"
         said.append(
-            f"the device started anew {times} meanwhile: its bias at the next start may"
-            " be another"
+            f"the device restarted {times} during the run, and its bias may differ from"
+            " start to start: record all positions without a restart"
         )
     return said
 

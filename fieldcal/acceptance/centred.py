@@ -1,4 +1,4 @@
-"""Outputs that somebody has centred: they hold neither bias nor the Earth's rate.
+"""Outputs without bias, since the device or a program has subtracted their mean.
 
 Means of n windows of an output with an offset of exactly zero, each with the error that
 white noise gives it, have
@@ -10,26 +10,27 @@ so close to zero, with an error s of each axis over all windows, with a chance o
 
     P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
 
-A device that takes its gyroscopes' bias out while it rests leaves nothing that stands
-out of (1), and the product of (1) and (2) tells it from chance. It takes some seconds
-to settle after a turn, so the second half of each window counts, and it takes slow
-noise out with the bias, so sigma is that of the noise at all frequencies: the median of
-its periodogram over ln 2.
+If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant, and
+the product of (1) and (2) is the probability that this is chance. The removal settles
+in some seconds after a turn, so the second half of each window is used. It also removes
+slow noise, so sigma is that of the noise at all frequencies: the median of the
+periodogram over ln 2.
 
-A program that takes the mean out of a whole recording, whose mean m of N samples has
-noise s, leaves
+If a program subtracts the mean of a whole recording of N samples with noise s, a mean
+as small as the one that is left, m, has by chance the probability
 
     P = erf(|m| sqrt(N) / (s sqrt(2)))                                             (3)
 
-The offset that was taken out is then nowhere in the recording. Values that were rounded
-to steps q behind that leave more: of windows of n samples, parts f of all,
+The recording does not contain what was subtracted. If values are rounded to steps q
+afterwards, the mean is larger: with windows that are parts f of all samples,
 
     m = q d +- s,   s^2 = noise^2 / N + q^2 / 12 sum f^2                           (4)
 
-where d is 0 of values that were rounded to the nearest, -1/2 of those rounded down, and
-of those cut toward zero -1/2 times the mean of their signs; in windows cut to zero q is
-twice as large. For each of the three, (1) and (2) of all axes tell it from chance, s_b
-being that of accelerometers; the three chances are added. Device axes, SI.
+with d = 0 if values are rounded to the nearest step, -1/2 if they are rounded down, and
+-1/2 times the mean of their signs if they are rounded toward zero; in windows that are
+rounded to zero q is twice as large. For each of the three, the probability follows from
+(1) and (2) over all axes, with s_b of accelerometers; the three are added. Device axes,
+SI.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average
 
 LEAST = 2
-"""Windows below which three axes say too little, (1)."""
+"""Fewest windows for (1)."""
 
 SPECTRUM = 16
-"""Samples below which there is no spectrum to speak of."""
+"""Fewest samples for a periodogram."""
 
 
 def biases_taken_out(
@@ -58,7 +59,7 @@ def biases_taken_out(
     repeat: tuple[float, float],
     least: float,
 ) -> list[str]:
-    """Sentences about biases that are not in the recording any more.
+    """Sentences about biases that the recording no longer contains.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def biases_taken_out(
     block : the whole recording
     repeat : from run to run of an accelerometer's and of a gyroscope's bias, 1 sigma,
         m/s^2 and rad/s
-    least : probability below which it is no chance
+    least : probability below which chance is excluded
 
     """
     said = []
@@ -74,9 +75,9 @@ def biases_taken_out(
     if chance < least:
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
-            f" bias nor the Earth's rate in them {what}: the device takes its bias out"
-            " while it rests, so the recording does not hold it; switch that off (gyro"
-            " bias estimation, auto calibration, zero velocity update), and record"
+            f" bias nor the Earth's rate in them {what}: the device removes its bias"
+            " at rest, so the recording does not contain it; switch this off (gyro"
+            " bias estimation, auto calibration, zero velocity update) and record"
             " again"
         )
     odd = [name for name, p in centred(block) if p < least]
@@ -84,9 +85,9 @@ def biases_taken_out(
         odd = list(CHANNELS[ACC])
     if odd:
         said.append(
-            f"the mean of the whole recording is zero in {', '.join(odd)}, closer than"
-            " noise allows: whoever wrote it took the mean out, and the bias with it;"
-            " record or export what the device sends"
+            f"the mean over the whole recording is closer to zero in {', '.join(odd)}"
+            " than noise allows: the program that wrote it subtracted the mean, and the"
+            " bias with it; record or export the raw output of the device"
         )
     return said
 
@@ -94,9 +95,9 @@ def biases_taken_out(
 def tracked(
     windows: Sequence[Average], block: Block, repeat: float, least: float
 ) -> tuple[float, str]:
-    """Probability of gyroscopes' means so close to zero, (1) (2), and what was seen.
+    """Probability of gyroscopes' means so close to zero, (1) (2), and chi2 in words.
 
-    1 where they stand out of their noise, or too few were measured.
+    1 if they are significantly different from zero, or too few were measured.
     """
     halves = [_settled(block, w) for w in windows]
     means = np.array([mean for mean, _ in halves]).reshape(-1, 3)
@@ -150,9 +151,9 @@ def centred(block: Block) -> list[tuple[str, float]]:
 def centred_and_rounded(
     windows: Sequence[Average], block: Block, repeat: float, least: float
 ) -> float:
-    """Probability of accelerometers' means so close to those that rounding leaves, (4).
+    """Probability that the means come so close to those that rounding leaves, (4).
 
-    1 where values lie on no grid, or where they are elsewhere.
+    1 if values are not rounded to a grid, or differ significantly from these means.
     """
     step = grids_of(block)[:3]
     held = [block.between(w.start, w.end).acc for w in windows]

@@ -21,9 +21,11 @@ def check_change(
 ) -> list[Check]:
     """Compare each group with what the history lets expect, by its worst parameter."""
     if family is None:
-        return [Check("change", None, "no serial number, so no history to compare")]
+        says = "no comparison with earlier calibrations: no serial number (--serial)"
+        return [Check("change", None, says)]
     if not family:
-        return [Check("change", None, "first calibration of this device")]
+        says = "no comparison: this is the first calibration of this device"
+        return [Check("change", None, says)]
     known = [n for n in found.names if limits.repeat(group_of(n)) is not None]
     checks = []
     for group in dict.fromkeys(group_of(n) for n in known):

@@ -1,4 +1,4 @@
-"""What the samples were taken under: temperature and link."""
+"""Conditions of the recording: temperature and losses of the link."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ def check_temperature(
     low, high = float(known.min()), float(known.max())
     least, most = limits.temperature_min_c, limits.temperature_max_c
     ok = least <= low and high <= most
-    says = f"{low:.1f} to {high:.1f} °C, allowed {least:g} to {most:g} °C"
+    says = (
+        f"the temperature was {low:.1f} to {high:.1f} °C, allowed {least:g} to"
+        f" {most:g} °C"
+    )
     span, wide = high - low, limits.temperature_span_k
     steady = span <= wide
     changed = (
         f"the temperature changed by {span:.1f} K from window to window, allowed"
-        f" {wide:g} K{'' if steady else ': let it warm up, then run again'}"
+        f" {wide:g} K{'' if steady else ': let the device warm up, then record again'}"
     )
     far = low if low < least else high
     bound = least if low < least else most
@@ -50,7 +53,7 @@ def check_link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Chec
         ok = share <= limit
         says = (
             f"{count} of {samples + count} {name} ({share:.2%}), allowed {limit:.2%}"
-            f"{'' if ok else ': check cable and baud rate'}"
+            f"{'' if ok else ': check the cable and the baud rate'}"
         )
         checks.append(Check(f"link: {name}", ok, says, share, limit, "1"))
     return checks

@@ -37,7 +37,7 @@ from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.windows import Average
 
 ANGLES = "angles"
-"""Name of the check that something would contradict wrong angles."""
+"""Name of the check that wrong angles would be noticed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ def with_decision(found: Calibration, made: Decision) -> Calibration:
 
 def _fit(found: Calibration, limits: GradeLimits) -> Check:
     if not found.good:
-        return Check("fit", False, "the estimate itself is bad: " + _first(found))
+        return Check("fit", False, "the estimate is bad: " + _first(found))
     if found.dof <= 0 or not np.isfinite(found.chi2):
         return Check("fit", None, "no degree of freedom is left to check the fit")
     chance = chi2_tail(found.chi2, found.dof)
@@ -169,7 +169,7 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
     word = "agree" if agree else "do not agree"
     says = (
         f"the positions {word} with each other: χ² = {found.chi2:.1f} with"
-        f" {found.dof} degrees of freedom, probability {chance:.2g}, at least"
+        f" {found.dof} degrees of freedom, probability {chance:.2g}, required"
         f" {limits.fit_chance:.2g}"
     )
     if not agree and (small := harmless(found, limits)):
@@ -199,10 +199,10 @@ def _angles(
     limits: GradeLimits,
     circumstances: Circumstances,
 ) -> list[Check]:
-    """Whether anything would contradict angles that are not as stated."""
+    """Whether wrong angles would be noticed."""
     given = (circumstances.verification, circumstances.family)
     if about.angles_from:
-        says = f"the angles are vouched for by {one_line(about.angles_from)}"
+        says = f"the angles are certified by {one_line(about.angles_from)}"
         return [Check(ANGLES, True, says)]
     unseen = unwitnessed(found, about, limits, *given)
     if not unseen:
@@ -210,7 +210,7 @@ def _angles(
     if not stated(found, about, limits):
         return [Check(ANGLES, False, f"{unseen}; {REMEDY}")]
     said = found.info.get("angle_sigma_deg") or 0.0
-    relied = f"this relies on angles set to ± {said:.2g}°, as stated: {unseen}"
+    relied = f"the result relies on angles set to ± {said:.2g}°, as stated: {unseen}"
     return [Check(ANGLES, None, relied)]
 
 
@@ -233,23 +233,25 @@ def _level(found: Calibration, about: Description) -> list[Check]:
     level = found.info.get("level_sigma_deg")
     if level is None:
         return [Check("level", False, level_missing(about))]
-    says = f"the base is level to ± {level:.2g}°, as stated; each ± includes it"
+    says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
 
 
 def _verification(verification: Verification | None, limits: GradeLimits) -> Check:
     if verification is None:
-        return Check("verification", None, "no position was taken to verify (--verify)")
+        says = "no verification position was recorded (--verify)"
+        return Check("verification", None, says)
     far = verification.largest > limits.verification_residual
     odd = verification.chance < limits.verification_chance
+    sigma = float(np.linalg.norm(verification.sigma))
     says = (
-        f"at {verification.position.name}, not fitted, the accelerometers are off by"
-        f" {verification.largest:.2g} ± {np.linalg.norm(verification.sigma):.2g} m/s²,"
+        f"at {verification.position.name}, which was not fitted, the accelerometers"
+        f" differ from the prediction by {verification.largest:.2g} ± {sigma:.2g} m/s²,"
         f" allowed {limits.verification_residual:.2g} m/s²"
     )
     if odd:
         says += (
-            "; the calibration does not explain that (probability"
+            "; the ± of the calibration does not explain this difference (probability"
             f" {verification.chance:.1g})"
         )
     limit = limits.verification_residual

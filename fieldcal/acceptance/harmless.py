@@ -1,13 +1,13 @@
-"""A misfit counts by what it does to the parameters and to the navigator.
+"""A misfit that is too small to matter for navigation.
 
-A quiet device shows by chi-squared what nobody would notice: windows that scatter by r
-beside a noise that is far below. The estimate has r in its uncertainties already, and
-beside a bias that the grade allows to be known to s,
+Chi-squared of a quiet device is significant already if its windows scatter by an r that
+nobody would notice. The uncertainties of the estimate include r. With s the uncertainty
+of a bias that the grade allows,
 
-    sqrt(s^2 + r^2) < 1.005 s   where   r <= s / 10                                (1)
+    sqrt(s^2 + r^2) < 1.005 s   if   r <= s / 10                                   (1)
 
-so it moves nothing that a navigator could tell. That holds of scatter alone: where one
-window may be off by itself, chi-squared stands.
+so such a scatter does not matter. This is true of scatter only: if a single window may
+be wrong, chi-squared decides.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.model import thresholds
 
 SHARE = 0.1
-"""Of what the grade allows, (1)."""
+"""Largest r over s, (1)."""
 
 
 def harmless(found: Calibration, limits: GradeLimits) -> str:
-    """Why a misfit is none for the navigator; empty if it may be one."""
+    """Why a misfit does not matter, as part of a sentence; empty if it may matter."""
     scatter = found.info.get("extra_scatter")
     doubt = max(found.info.get("bad_position", ()), default=0.0)
     most = SHARE * limits.acc_bias_sigma
     if scatter is None or not 0 < scatter <= most or doubt >= thresholds.SUSPECT:
         return ""
     return (
-        f"that is a scatter of {scatter:.2g} m/s², which the uncertainties have in them"
-        f" and no navigator notices below {most:.2g} m/s²"
+        f"that is a scatter of {scatter:.2g} m/s², which the uncertainties include;"
+        f" below {most:.2g} m/s² it does not matter for navigation"
     )

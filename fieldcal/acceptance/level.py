@@ -1,8 +1,9 @@
-"""How level the base is: some sets of positions cannot determine it.
+"""Whether the tilt of the base is known; some sets of positions do not determine it.
 
-A base tilted by t about a level axis moves a bias by up to g t, 0.17 m/s^2 for one
-degree. Five positions find the tilt. Two cannot tell it from a bias: there it is known
-within what was said of it, which then is part of every uncertainty, or not at all.
+A base that is tilted by t about a level axis changes a bias by up to g t, 0.17 m/s^2
+for one degree. Five positions determine the tilt. Two cannot distinguish it from a
+bias: there it is known to what was stated, which is part of every uncertainty, or it is
+not known.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ def level_missing(about: Description) -> str:
     """Sentence for a base whose level was not stated, with the remedy."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
-        "these positions cannot see how level the base is, and 1° moves a bias by"
-        f" {bias:.2f} m/s²: say how level it is (--level 0.01, in degrees, 1σ; also to"
-        " fieldcal solve, afterwards), or take five positions"
+        "these positions do not show how level the base is, and a tilt of 1° changes a"
+        f" bias by {bias:.2f} m/s²: state how level it is (--level 0.01, in degrees,"
+        " 1σ; fieldcal solve accepts it afterwards), or take five positions"
     )
 
 
 def level_unknown(about: Description) -> str:
-    """What to say before a run that will be NO-GO for it; empty where it is known."""
+    """Warning before a run that will be NO-GO for it; empty if the tilt is known."""
     known = sum(position.oriented for position in about.positions)
     return level_missing(about) if known <= BLIND and about.level_deg is None else ""

@@ -1,13 +1,14 @@
-"""What would make a NO-GO a GO, as cheaply as the ladder of the session allows.
+"""What would turn NO-GO into GO, as cheaply as the ladder of the session allows.
 
-Of an uncertainty that is too large: positions held besides. What n positions tell is
+If an uncertainty is too large: further positions. The covariance from n positions is
 
     C = (sum J_p^T R_p^-1 J_p)^-1,  R_p = s^2 I + a^2 (t_1 t_1^T + t_2 t_2^T)        (1)
 
-with J_p how the means there move with the parameters, s the error of a mean, a how well
-angles are set and t_1, t_2 how the force moves with them. What a calibration has beyond
-that (a drift, a walk) it keeps: each sigma falls in the proportion that (1) says. Of a
-position that disagrees with the others: the same once more.
+with J_p the derivative of the mean at position p by the parameters, s the error of a
+mean, a the error of an angle, and t_1, t_2 the derivatives of the force by the two
+angles. Other errors of the calibration (a drift, a walk) stay in it: each sigma falls
+in the proportion given by (1). If a position disagrees with the others: the same
+position once more.
 """
 
 from __future__ import annotations
@@ -30,16 +31,16 @@ from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 
 MOST = 3
-"""Positions that are asked for besides, at most: more is another run."""
+"""Largest number of further positions; if more are needed, repeat the run."""
 
 SURE = 0.9
-"""Part of a limit that is aimed at: what is expected is not what comes."""
+"""Part of a limit that is aimed at, since the result differs from the expectation."""
 
 LONGEST = 600.0
 """Longest time that is asked for at one position, s."""
 
 STEP = 1e-4
-"""Change of an angle by which (1) has its t, rad."""
+"""Step of the numerical derivatives t in (1), rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ def _longer(
     if more > LONGEST or last is None:
         return None
     number = len(about.positions)
-    says = f"{more:.0f} s more at position {number}, as it stands: then GO is expected"
+    says = f"hold position {number} for {more:.0f} s more: then GO is expected"
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
 
 

@@ -1,10 +1,10 @@
-"""Where a recalibration was made: gravity is what scale factors are measured by.
+"""Whether gravity at the site is known: scale factors refer to it.
 
-From the equator to a pole it grows by half a percent, more than most scale factors are
-off. Nobody's latitude can be taken from the samples, since a scale factor of all three
-axes does the same. So gravity that somebody states is held against that of the place:
-mountains and trenches make it differ by 0.004 m/s^2 at most (Torge and Mueller,
-Geodesy, 4th edition, free-air anomalies), and a height that nobody states is somewhere
+From the equator to a pole gravity grows by half a percent, more than most scale factors
+are off. The samples do not show the latitude, since a common scale factor of all three
+axes has the same effect. A stated gravity is therefore compared with the normal gravity
+of the site. Mountains and trenches change it by 0.004 m/s^2 at most (Torge and Mueller,
+Geodesy, 4th edition, free-air anomalies), and a height that is not stated is taken as
 between the sea and the highest villages.
 """
 
@@ -26,8 +26,8 @@ def gravity_unknown(about: Description) -> str:
         return ""
     least, most = gravity(0.0), gravity(90.0)
     return (
-        "nobody said where this is, and gravity, by which scale factors are measured,"
-        f" is {least:.3f} m/s² at the equator and {most:.3f} m/s² at the poles: say it"
+        "the site is not stated, and gravity, to which scale factors refer, is"
+        f" {least:.3f} m/s² at the equator and {most:.3f} m/s² at the poles: state it"
         " (--latitude and --height, or --gravity; afterwards in [site] of session.toml:"
         " latitude_deg and height_m)"
     )
@@ -37,8 +37,8 @@ def place_wanted(about: Description) -> str:
     """Remedy where the place would say gravity better; empty where it is said."""
     site = about.raw.get("site", {})
     if "latitude_deg" not in site:
-        return "; nothing checks the gravity that is stated: say the place (--latitude)"
-    return "" if "height_m" in site else "; say the height of the place (--height)"
+        return "; the stated gravity is not checked: state the site (--latitude)"
+    return "" if "height_m" in site else "; state the height of the site (--height)"
 
 
 def gravity_contradicted(about: Description) -> str:
@@ -58,7 +58,7 @@ def gravity_contradicted(about: Description) -> str:
         return ""
     usual = f"{least:.4f}" if least == most else f"{least:.4f} to {most:.4f}"
     return (
-        f"[site] gravity = {about.gravity:.5g} m/s² cannot be: {where} it is {usual}"
-        f" m/s², give or take {ANOMALY:g}; mend gravity, or latitude_deg and height_m,"
-        " and solve again"
+        f"[site] gravity = {about.gravity:.5g} m/s² is impossible: {where} it is"
+        f" {usual} m/s², and differs from that by {ANOMALY:g} m/s² at most; correct"
+        " gravity, or latitude_deg and height_m, and solve again"
     )

@@ -1,7 +1,7 @@
-"""What the temperature of now costs who keeps the calibration of then.
+"""Error of an earlier calibration at the present temperature.
 
-Earlier calibrations of the device tell what its parameters do over temperature; with
-fewer than the model needs it is said that nobody knows.
+Earlier calibrations of the device show how its parameters depend on temperature. If
+there are fewer than the model needs, this is said.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from fieldcal.thermal import ThermalPoint, point, thermal_model
 from fieldcal.thermal.wording import costs, document
 
 NEAR_K = 2.0
-"""Two temperatures are one that are no further apart: a room's from day to day."""
+"""Difference up to which temperatures count as equal, K: a room's from day to day."""
 
 
 def since_last(
     found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
 ) -> dict[str, Any] | None:
-    """Return what the change of temperature since the last calibration makes.
+    """Effect of the change of temperature since the last calibration.
 
     Parameters
     ----------
@@ -58,17 +58,17 @@ def since_last(
         model = thermal_model([*points, now], limits)
     except InputError:
         says = (
-            f"{about}: what that costs is known from three calibrations over 10 K on"
-            " (fieldcal temperature)"
+            f"{about}: the effect of this change is not known; three calibrations over"
+            " at least 10 K show it (fieldcal temperature)"
         )
         return {**out, "parameters": None, "says": [says]}
     changes = model.change(now.temperature, then.temperature)
     told, rest = costs(changes)
-    says = f"{about}: who kept that one would be off by {'; '.join(told)}"
+    says = f"{about}: the earlier calibration would be off by {'; '.join(told)}"
     if not told:
-        says = f"{about}: no parameter shows a change by it"
+        says = f"{about}: no parameter changes measurably with it"
     elif rest:
-        says += f"; nothing shown by {', '.join(map(title, rest))}"
+        says += f"; no change is seen in {', '.join(map(title, rest))}"
     return {**out, "parameters": document(changes), "says": [says]}
 
 

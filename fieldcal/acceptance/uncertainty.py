@@ -15,7 +15,7 @@ from fieldcal.session.description import Description
 from fieldcal.windows.mean import Average
 
 UNCERTAINTY = " uncertainty"
-"""Behind the name of a group, of the check that its parameters are well known."""
+"""End of a check's name, after the group whose uncertainty it compares."""
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 """Groups whose uncertainty must be known and small; a sensor not read is excused."""
@@ -29,7 +29,7 @@ def check_uncertainty(
 ) -> list[Check]:
     """Whether each group that has a limit is known well enough.
 
-    A sensor that the windows have, and of which nothing was determined, is not.
+    It is not if a sensor was recorded and none of its parameters was determined.
     """
     checks = []
     read = {sensor_of(group_of(name)) for name in found.names} | _measured(windows)
@@ -90,6 +90,6 @@ def _by_angles(found: Calibration, limits: GradeLimits) -> str:
     if found.method == "scalar" or angles < limits.angle_setting_deg:
         return ""
     return (
-        f"; angles count as set to ± {angles:.2g}°: if they are set better say so"
-        " (--angles), else turn further"
+        f"; the angles are taken as set to ± {angles:.2g}°: if they are set better,"
+        " state it (--angles); if not, use larger angles"
     )

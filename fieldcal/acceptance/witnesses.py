@@ -1,12 +1,13 @@
-"""Whether anybody bears witness to a result for which positions were left out.
+"""Whether a result can be trusted for which positions were left out.
 
-The position that disagrees with all others may be the only honest one: a gauge that is
-long spoils all but the level position alike. What is left can only be trusted where a
-lie would need most of it, so that half of it alone determines everything,
+The position that disagrees with all others may be the only right one: a gauge that is
+too long spoils all positions but the level one. The remaining positions are trusted if
+half of them would determine all parameters,
 
     kept >= 2 needed,   needed = ceil(parameters / numbers in a window)            (1)
 
-or where a position that was not fitted agrees.
+so that most of them would have to be wrong, or if a position that was not fitted
+agrees.
 """
 
 from __future__ import annotations
@@ -28,17 +29,20 @@ def has_witnesses(found: Calibration) -> bool:
 
 
 def witnesses(found: Calibration) -> str:
-    """Say so in a sentence, with the remedy where it is not so."""
+    """How many positions were left out and used, with the remedy if too few are."""
     out = left_out(found)
+    verb = "were" if out > 1 else "was"
     says = (
-        f"{out} position{'s' if out > 1 else ''} disagreed and had no weight;"
-        f" {_kept(found)} others were used, and {_needed(found)} determine everything"
+        f"{out} position{'s' if out > 1 else ''} disagreed and {verb} not used;"
+        f" {_kept(found)} others were used, and {_needed(found)} of them would"
+        " determine all parameters"
     )
     if has_witnesses(found):
         return says
     return (
-        f"{says}: with fewer than {2 * _needed(found)} it may be the others that are"
-        " wrong; take positions again, add positions, or let one verify (--verify)"
+        f"{says}: with fewer than {2 * _needed(found)} the others may be the wrong"
+        " ones; repeat positions, add positions, or record a verification position"
+        " (--verify)"
     )
 
 

@@ -1,6 +1,6 @@
-"""What the user must know of a calibration: what is open, unchecked or too scattered.
+"""Warnings about a calibration: what is undetermined, unchecked, or scatters much.
 
-A sentence each, with what to do about it.
+Each is one sentence that also says what to do.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
 def left_open(
     method: Method, observations: Observations, found: Estimated
 ) -> list[str]:
-    """Parameters that the rows leave open, and which positions would give them."""
+    """Parameters that are not determined, and positions that would determine them."""
     sentences = []
     acc = [n for n in found.missing if group_of(n) in OF_ACC]
     if acc and found.given.wanted.level_deg is not None:
@@ -64,9 +64,9 @@ def left_open(
 
 
 def _length(observations: Observations) -> str:
-    """That the force at rest is not gravity, where no parameter says why.
+    """Warning that the force at rest is not gravity, if no parameter explains it.
 
-    Nothing where it lies within what gravity is on the Earth.
+    Empty if it is within the range of gravity on the Earth.
     """
     nominal = observations.nominal
     force = (observations.mean[:, :3] - nominal.acc_bias) / nominal.acc_scale
@@ -76,9 +76,10 @@ def _length(observations: Observations) -> str:
     if not len(length) or abs(size - known) <= most:
         return ""
     return (
-        f"|a| at rest is {size:.3f} m/s², {100 * (size / known - 1):+.1f} % of gravity:"
-        " biases or scale factors of the accelerometers are out by so much, and these"
-        " orientations do not tell which"
+        f"|a| at rest is {size:.3f} m/s², {100 * (size / known - 1):+.1f} % from"
+        " gravity: biases or scale factors of the accelerometers are off by as much,"
+        " and these orientations do not show which; add positions in other"
+        " orientations"
     )
 
 
@@ -96,13 +97,13 @@ def _turning(
     observations: Observations,
     found: Estimated,
 ) -> str:
-    """What of the gyroscopes turns or rates leave open."""
+    """Gyroscope parameters that turns or rates do not determine, with the remedy."""
     missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
     if not found.given.wanted.turned and not observations.rotating.any():
         return (
-            f"{join(missing)} {'are' if missing[1:] else 'is'} left out: the"
-            " Earth's rate gives it only roughly in these windows; average longer, or"
-            " integrate turns between the positions"
+            f"{join(missing)} {'are' if missing[1:] else 'is'} not estimated:"
+            " the Earth's rate gives it only roughly in these windows; average longer,"
+            " or record the turns between the positions"
         )
     turned = {ParameterName.of(n).entry[1] for n in cross}
     turned |= {ParameterName.of(n).axis for n in gyr}
@@ -117,7 +118,7 @@ def _turning(
 
 
 def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
-    """What lengths of the force leave open."""
+    """Parameters that the norm of the force does not determine, with the remedy."""
     hidden = [m for m in missing if group_of(m) == "cross_coupling"]
     if len(hidden) < len(missing):
         return words.not_determined(
@@ -127,7 +128,7 @@ def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
     pairs = [f"{AXES[row]} and {AXES[column]}" for row, column in entries]
     why = "axes held up and down alone cannot show it"
     if n < 9:
-        why = f"{n} norms cannot carry 9 parameters"
+        why = f"{n} norms cannot determine 9 parameters"
     elif found.acc.dof in words.FEW:
         why += f" (and all nine would leave {words.FEW[found.acc.dof]})"
     return (
@@ -137,40 +138,40 @@ def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
 
 
 def not_levelled(method: Method, asked: Asked, observations: Observations) -> list[str]:
-    """That nobody said how level the base is, where nothing shows it."""
+    """Warning that the base is assumed level, if nothing else determines its tilt."""
     if method != "two_position" or asked.level_deg:
         return []
     moved = observations.gravity * np.deg2rad(0.1)
     return [
-        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to "
-        f"{moved:.3f} m/s^2 unseen; take five positions, or say how level it is"
+        "the base is assumed exactly level: a tilt of 0.1° would change a bias by up"
+        f" to {moved:.3f} m/s² unnoticed; take five positions, or state how level it is"
         " (--level)"
     ]
 
 
 def doubts(method: Method, observations: Observations, found: Estimated) -> list[str]:
-    """What of the windows' agreement the user must know."""
+    """Warnings about how well the windows agree."""
     doubt = DoubtfulPosition.of(observations, found.bad)
     few, scattered = _few(method, found), _scattered(found)
     return [*few, doubt.sentence if doubt else "", *scattered]
 
 
 def _few(method: Method, found: Estimated) -> list[str]:
-    """What so few windows cannot check."""
+    """Warning that so few windows leave nothing to check the fit."""
     if np.isnan(found.acc.rms):
         return []
     if found.acc.dof <= 0:
         return [words.NO_DOF]
     if method == "scalar" and found.acc.dof in words.FEW:
         return [
-            f"{words.FEW[found.acc.dof]}: the residual says nothing about the fit; add"
-            " positions in other orientations"
+            f"only {words.FEW[found.acc.dof]}: too few to check the fit; add positions"
+            " in other orientations"
         ]
     return []
 
 
 def _scattered(found: Estimated) -> list[str]:
-    """Scatter beyond the noise."""
+    """Warnings of scatter beyond the noise."""
     what = "norms" if found.given.free.all() else "positions"
     sentences = []
     for name, agreed, channels in (
@@ -188,7 +189,7 @@ def _scattered(found: Estimated) -> list[str]:
 
 
 def closure_chi2(found: Estimated) -> tuple[float, int]:
-    """chi2 of the closures, and how many are left over."""
+    """Chi-squared of the turns' closures, and its degrees of freedom."""
     chi2, count = found.closures
     spent = sum(group_of(n) in OF_TURNS for n in found.names)
     return chi2, max(0, count - spent)

@@ -12,11 +12,11 @@ from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
 
-NO_DOF = "no degree of freedom: the residual says nothing; add a verification position"
+NO_DOF = "no degree of freedom is left to check the fit: add a verification position"
 
 NO_SCALE = (
-    "gyr_scale is not determined: the Earth's rate is too weak for it in windows like "
-    "these; the turns between the positions give it"
+    "gyr_scale is not determined: the Earth's rate is too weak for it in such windows; "
+    "record the turns between the positions, which determine it"
 )
 
 FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
@@ -35,21 +35,21 @@ def chance(chi2: float, dof: int) -> float:
 
 
 def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
-    """Tell of scatter beyond the noise; nothing where there is none."""
+    """Warning of scatter beyond the noise; empty if there is none."""
     if chi2 <= dof or chance(chi2, dof) >= thresholds.BEYOND_NOISE:
         return ""
-    few = "; of so few degrees of freedom it is itself uncertain" if dof < 5 else ""
-    cause = "diagnosis can say where it comes from"
+    few = " (itself uncertain, with so few degrees of freedom)" if dof < 5 else ""
+    cause = "run fieldcal diagnose to see where it comes from"
     if what == "positions":
         angle = np.rad2deg(spread / G0)
         cause = (
-            f"either the angles are set no better than {angle:.1g}°, or diagnosis can"
-            " say what the model leaves out"
+            f"either the angles are set no better than {angle:.1g}°, or the model"
+            " leaves something out, which fieldcal diagnose may name"
         )
     return (
-        f"the {what} disagree with the model beyond their windows' noise "
-        f"(chi2 {chi2:.0f} with dof {dof}): an extra scatter of {spread:.2g} {unit} is "
-        f"in the uncertainties{few}, and {cause}"
+        f"the {what} scatter more than the noise of their windows "
+        f"(χ² = {chi2:.0f} with {dof} degrees of freedom): the uncertainties include "
+        f"an additional scatter of {spread:.2g} {unit}{few}; {cause}"
     )
 
 
@@ -60,14 +60,14 @@ def carried(
     moved: Array,
     ended_s: float | None,
 ) -> str:
-    """Tell what is in a result that was not asked for; nothing where it may not be.
+    """Warning of effects that a result contains unasked; empty if they are unlikely.
 
     Parameters
     ----------
-    sure : probability that something is there
+    sure : probability that any effect is there
     causes : probability by id of the effect
-    names, moved : parameters, and by how many sigmas each moves with it
-    ended_s : when biases are as stated, s since the start; None if they stay
+    names, moved : parameters, and by how many sigmas the effects move each
+    ended_s : time for which biases are stated, s since the start; None if constant
 
     """
     if sure < thresholds.NAMED:
@@ -83,11 +83,11 @@ def carried(
     when = ""
     if ended_s is not None:
         when = (
-            " biases and scale factors are those at the end of the recording,"
+            " biases and scale factors are stated for the end of the recording,"
             f" {ended_s:.0f} s after its start, and"
         )
     return (
-        f"the recording shows {listed}, which the result carries:{when} the"
-        f" uncertainties are with it; without it {names[worst]} would be"
-        f" {abs(moved[worst]):.1f} σ off; fieldcal diagnose says what to do"
+        f"the recording shows {listed}, and the result takes it into account:{when}"
+        f" the uncertainties include it; otherwise {names[worst]} would be off by"
+        f" {abs(moved[worst]):.1f} σ; fieldcal diagnose says what to do"
     )

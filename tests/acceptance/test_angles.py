@@ -69,7 +69,7 @@ def held(found: Calibration, alpha: float, beta: float) -> Verification:
 
 def test_a_small_ladder_has_no_witness_and_names_the_remedy() -> None:
     said = unwitnessed(calibrated(five()), about(), BOUNDS, None, None)
-    assert said.startswith("nothing would contradict wrong angles")
+    assert said.startswith("wrong angles would not be noticed")
     two = calibrated([(0, 0), (45, 5)], used=BOUNDS.angle_setting_deg)
     made = decided(two, about())
     (check,) = [c for c in made.checks if c.name == ANGLES]

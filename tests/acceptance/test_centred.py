@@ -97,11 +97,11 @@ def test_both_are_told_apart_and_said() -> None:
     assert biases_taken_out(windows, block, BOTH, LEAST) == []
     block.gyr[:] -= 1e-3
     (said,) = biases_taken_out(windows, block, BOTH, LEAST)
-    assert "takes its bias out while it rests" in said
+    assert "removes its bias at rest" in said
     block.gyr[:] += 1e-3
     block.acc[:, 1] -= block.acc[:, 1].mean()
     (said,) = biases_taken_out(windows, block, BOTH, LEAST)
-    assert "is zero in ay, closer" in said
+    assert "closer to zero in ay than noise" in said
 
 
 STEP = 5e-3

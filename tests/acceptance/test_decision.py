@@ -68,12 +68,12 @@ def test_a_sound_calibration_is_go_and_says_what_it_could_not_check() -> None:
 @pytest.mark.parametrize(
     ("found", "seen", "says"),
     [
-        (calibration(good=False), {}, "the estimate itself is bad"),
+        (calibration(good=False), {}, "the estimate is bad"),
         (calibration((0.03, 1e-4, 1e-5)), {}, "acc_bias x is known to ± 0.03 m/s²"),
         (calibration((1e-3, 1e-2, 1e-5)), {}, "acc_scale x is known to ± 0.01"),
         (calibration((1e-3, 1e-4, 1e-3)), {}, "gyr_bias x is known to ± 0.001 rad/s"),
         (calibration(), {"temperatures": [70.0]}, "70.0 to 70.0 °C"),
-        (calibration(), {"temperatures": [20, 26.5]}, "let it warm up"),
+        (calibration(), {"temperatures": [20, 26.5]}, "let the device warm up"),
         (calibration(), {"link": {**LINK, "missing": 50}}, "50 of 10050 samples"),
         (calibration(), {"link": {**LINK, "bad": 50}}, "50 of 10050 frames refused"),
         (calibration(), {"doubts": ["position 3 was insisted on"]}, "insisted on"),
@@ -398,7 +398,9 @@ def test_a_misfit_counts_by_what_it_does_to_the_navigator(
     made = decided(replace(found, info={**found.info, **more}))
     fit = next(check for check in made.checks if check.name == "fit")
     assert (fit.ok, made.go) == (go, go)
-    assert "57.0 with 22" in fit.says and ("no navigator" in fit.says) == go
+    assert (
+        "57.0 with 22" in fit.says and ("not matter for navigation" in fit.says) == go
+    )
 
 
 def test_where_all_positions_have_a_third_angle_home_verifies_them() -> None:

@@ -29,12 +29,12 @@ def solved(tmp_path: Path, sides: int, full_scale: float) -> tuple[int, Any]:
 def test_a_full_scale_below_gravity_is_bad(tmp_path: Path) -> None:
     code, found = solved(tmp_path, 7, 8.0)
     assert (code, found["verdict"]) == (1, "bad")
-    (says,) = [w for w in found["warnings"] if "were left out, and without" in w]
-    assert "acc_scale.z" in says and says.endswith("take them again")
+    (says,) = [w for w in found["warnings"] if "were left out; without" in w]
+    assert "acc_scale.z" in says and says.endswith("record them again")
 
 
 @pytest.mark.parametrize("sides", [7, 2])
 def test_what_was_not_recorded_is_not_left_out(tmp_path: Path, sides: int) -> None:
     code, found = solved(tmp_path, sides, 80.0)
     assert (code, found["verdict"]) == (0, "good")
-    assert not any("left out, and without" in w for w in found["warnings"])
+    assert not any("left out; without" in w for w in found["warnings"])

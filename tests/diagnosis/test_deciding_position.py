@@ -32,7 +32,7 @@ def test_the_position_that_is_asked_for_is_on_the_ladder_and_decides(
     first = found_in(tmp_path / "five", FIVE)
     assert first.verdict == "ambiguous"
     step = first.next[0]
-    assert "it tells cross_coupling from" in step and "σ apart there" in step
+    assert "it distinguishes cross_coupling from" in step and "σ apart there" in step
     alpha, beta = map(float, re.findall(r"= (-?[\d.]+)°", step))
     assert {abs(alpha), abs(beta)} <= {0.0, 22.5, 45.0, 2.5, 5.0}
     assert abs(alpha) <= 45.0 and abs(beta) <= 5.0

@@ -92,7 +92,7 @@ def test_angles_that_were_set_otherwise_are_said(
     assert said.verdict == "unexplained" and not named(said)
     assert {p for _, p in places(said)} == {(window,)}
     assert said.after.held_out_rms < 0.2 * said.before.held_out_rms
-    assert f"Position {window + 1} is off by itself, as if" in said.says
+    assert f"Only position {window + 1} is off, as if" in said.says
     for joint, degrees in (("α", alpha), ("β", beta)):
         if degrees:
             _, _, rest = said.says.partition(f"{joint} had been off by ")
@@ -147,7 +147,7 @@ def test_an_effect_besides_has_its_numbers(
     said = diagnosed(tmp_path / "s", TACTICAL, coupling, seed=3)
     assert said.verdict == "unexplained" and named(said) == ["cross_coupling"]
     agrees(said, "cross_coupling", {"k12": 0.008, "k21": -0.006, "k32": 0.007})
-    assert "Position 4 is off by itself, as if α had been off by 0.49" in said.says
+    assert "Only position 4 is off, as if α had been off by 0.49" in said.says
 
 
 @pytest.mark.thorough

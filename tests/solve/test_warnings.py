@@ -16,11 +16,11 @@ from fieldcal.solve.assumed import Asked
     ("turned", "rates", "gyr", "cross", "says"),
     [
         (False, False, ["gyr_scale.x"], [],
-         "gyr_scale.x is left out: the Earth's rate gives it only roughly in these"
-         " windows; average longer, or integrate turns between the positions"),
+         "gyr_scale.x is not estimated: the Earth's rate gives it only roughly in these"
+         " windows; average longer, or record the turns between the positions"),
         (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
-         "gyr_scale.x and gyr_scale.y are left out: the Earth's rate gives it only"
-         " roughly in these windows; average longer, or integrate turns between the"
+         "gyr_scale.x and gyr_scale.y are not estimated: the Earth's rate gives it only"
+         " roughly in these windows; average longer, or record the turns between the"
          " positions"),
         (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
          "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
@@ -52,7 +52,7 @@ def test_what_turns_or_rates_leave_open(
          " it: add positions with gravity half way between x and y"),
         (["cross_coupling.k13", "cross_coupling.k23"], 8, 1,
          "cross_coupling.k13 and cross_coupling.k23 are not determined, 8 norms cannot"
-         " carry 9 parameters: add positions with gravity half way between x and z and"
+         " determine 9 parameters: add positions with gravity half way between x and z and"
          " y and z"),
         (["cross_coupling.k23"], 9, 2,
          "cross_coupling.k23 is not determined, axes held up and down alone cannot show"
@@ -68,7 +68,7 @@ def test_what_lengths_leave_open(
 
 @pytest.mark.parametrize(
     ("stretched", "says"),
-    [(1.111, "|a| at rest is 10.895 m/s², +11.1 % of gravity"), (1.001, ""),
+    [(1.111, "|a| at rest is 10.895 m/s², +11.1 % from gravity"), (1.001, ""),
      (np.nan, "")],
 )  # fmt: skip
 def test_a_force_that_no_parameter_explains_is_said(
@@ -84,7 +84,7 @@ def test_a_force_that_no_parameter_explains_is_said(
 def test_of_so_few_windows_the_residual_says_nothing() -> None:
     assert warnings._few("joint", estimated(acc=fit(dof=0))) == [words.NO_DOF]
     assert warnings._few("joint", estimated(acc=fit(dof=1))) == []
-    one = "one degree of freedom: the residual says nothing about the fit; add"
+    one = "only one degree of freedom: too few to check the fit; add"
     assert warnings._few("scalar", estimated(acc=fit(dof=1))) == [
         f"{one} positions in other orientations"
     ]
@@ -96,8 +96,8 @@ def test_a_base_that_two_positions_take_for_level_is_said() -> None:
     seen = observed(TWO, gravity=10.0)
     (text,) = warnings.not_levelled("two_position", Asked(), seen)
     assert text == (
-        "the base is taken as exactly level: a tilt of 0.1° moves a bias by up to 0.017"
-        " m/s^2 unseen; take five positions, or say how level it is (--level)"
+        "the base is assumed exactly level: a tilt of 0.1° would change a bias by up to"
+        " 0.017 m/s² unnoticed; take five positions, or state how level it is (--level)"
     )
     assert warnings.not_levelled("two_position", Asked(level_deg=0.1), seen) == []
     assert warnings.not_levelled("joint", Asked(), seen) == []
@@ -105,17 +105,17 @@ def test_a_base_that_two_positions_take_for_level_is_said() -> None:
 
 def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
     loud = {"chi2": 60.0, "dof": 6, "rms": 1e-3}
-    spread = "an extra scatter of {} {} is in the uncertainties"
+    spread = "the uncertainties include an additional scatter of {} {}"
     both = estimated(acc=fit(**loud), gyr=fit(**loud), closures=(90.0, 6))
     acc, gyr, turns = warnings._scattered(both)
-    assert acc.startswith("the positions disagree")
+    assert acc.startswith("the positions scatter")
     assert spread.format("2.9", "m/s^2") in acc
-    assert gyr.startswith("the gyroscopes' means disagree")
+    assert gyr.startswith("the gyroscopes' means scatter")
     assert spread.format("1.3", "rad/s") in gyr
-    assert turns.startswith("the turns disagree") and "dof 6" in turns
+    assert turns.startswith("the turns scatter") and "6 degrees" in turns
     assert spread.format("5", "rad") in turns
     both.given.free[:] = True
-    assert warnings._scattered(both)[0].startswith("the norms disagree")
+    assert warnings._scattered(both)[0].startswith("the norms scatter")
     few = estimated(closures=(90.0, 5), names=("gyr_scale.x",))
     assert len(warnings._scattered(few)) == 1, "four of five are left over"
     assert warnings.closure_chi2(few) == (90.0, 4)

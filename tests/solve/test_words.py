@@ -74,7 +74,7 @@ def test_scatter_is_told_from_one_in_a_hundred_on() -> None:
     limit = chi_square.isf(thresholds.BEYOND_NOISE, 10)
     assert words.excess("positions", 0.99 * limit, 10, 0.01, "m/s^2") == ""
     said = words.excess("positions", 1.01 * limit, 10, 0.01, "m/s^2")
-    assert "dof 10" in said and "0.01 m/s^2" in said and "0.06°" in said
+    assert "10 degrees of freedom" in said and "0.01 m/s^2" in said and "0.06°" in said
     assert "itself uncertain" not in said
     assert "itself uncertain" in words.excess("norms", 90.0, 4, 0.01, "m/s^2")
 
@@ -97,7 +97,7 @@ def test_an_effect_left_out_is_said_to_be_scatter() -> None:
     u = noisy(coupling=COUPLING)
     found = solve(observe(NINE, u), tilt="none")
     assert not found.good
-    assert any("beyond their windows' noise" in w for w in found.warnings)
+    assert any("than the noise of their windows" in w for w in found.warnings)
 
 
 def test_lists_read_as_sentences() -> None:
@@ -110,7 +110,7 @@ def test_lists_read_as_sentences() -> None:
 def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
     places = (Position.deg(0, 0), Position.deg(45, 5))
     found = solve(observe(places, outputs(places)))
-    assert any("0.017 m/s^2 unseen" in w for w in found.warnings)
+    assert any("0.017 m/s² unnoticed" in w for w in found.warnings)
     assert words.NO_DOF in found.warnings
     # whoever asks for two positions has not asked for the tilt
     assert not any("do not show the tilt" in w for w in found.warnings)

@@ -132,7 +132,7 @@ def test_without_enough_history_it_is_said_that_nobody_knows() -> None:
     of = drawn(np.random.default_rng(9))
     told = since_last(at(of, 36.0), [run(1, at(of, 12.0))], BOUNDS)
     assert told is not None and told["parameters"] is None
-    assert "from three calibrations over 10 K on" in told["says"][0]
+    assert "three calibrations over at least 10 K" in told["says"][0]
     assert since_last(at(of, 12.5), [run(1, at(of, 12.0))], BOUNDS) is None
     assert since_last(at(of, 36.0), [], BOUNDS) is None
     unknown = replace(at(of, 36.0), info={})

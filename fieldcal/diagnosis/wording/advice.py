@@ -40,15 +40,15 @@ def advice(
     """
     if odd:
         yield (
-            "Mend session.toml by the drawing on the device and its data sheet (axes,"
-            " signs, units, angles), and diagnose it again: what else is left out"
-            " cannot be told before."
+            "Correct session.toml with the drawing on the device and its data sheet"
+            " (axes, signs, units, angles), and diagnose again: until then no other"
+            " effect can be found."
         )
     yield from _look(unknown)
     if explanation.undecided:
         yield (
-            "Record it again with more positions, or longer ones: something is left"
-            " out, too weakly to say what."
+            "Record again with more positions, or longer ones: the simulation leaves"
+            " something out, but too weakly to name it."
         )
     yield from _deciding(explanation, effects)
     for name in dict.fromkeys(f.id for f in effects):
@@ -61,10 +61,10 @@ def advice(
             " of session.toml, or keep the device file that --twin writes."
         )
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
-        yield "Hold more positions, or longer ones: what is random averages out."
+        yield "Hold more positions, or hold them longer: random errors average out."
     held = len(explanation.dictionary.held)
     if held < LESS_THAN:
-        yield f"Record more than {held} position{'s' * (held > 1)}: few tell little."
+        yield f"Record more than {held} position{'s' * (held > 1)}: so few show little."
 
 
 def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
@@ -97,7 +97,7 @@ def _deciding(
                 ways.setdefault(place.text, []).append(apart)
         for way, others in ways.items():
             told = join(others, "and")
-            yield f"{_capital(way)}: it tells {one.id} from {told}."
+            yield f"{_capital(way)}: it distinguishes {one.id} from {told}."
         if open_:
             yield (
                 f"{one.id} or {join(open_, 'or')}? {_none_in_reach(explanation)}"
@@ -110,11 +110,11 @@ def _capital(text: str) -> str:
 
 
 def _none_in_reach(explanation: Explanation) -> str:
-    """That no position of the ladder decides, where positions are known."""
+    """Beginning of a sentence: no position of the ladder decides, if any is known."""
     positions = explanation.prepared.source.about.positions
     if not explanation.rows.x.oriented.all() or not ladder(positions):
-        return "What tells: "
-    return f"No position {extent(positions)} tells; what does: "
+        return "To decide: "
+    return f"No position {extent(positions)} decides; what does: "
 
 
 def _look(unknown: Sequence[Unknown]) -> Iterator[str]:
@@ -147,9 +147,9 @@ def _remedy(unknown: Unknown) -> tuple[str, str]:
             f": {off_by(unknown.turned)} there.",
         )
     if not np.isfinite(unknown.mismatch.correlation):
-        return f"Take {places} again", ": {channels} {be} off there by itself."
+        return f"Repeat {places}", ": {channels} {be} off only there."
     return (
-        f"Vary {unknown.cause} on purpose and hold the rest",
+        f"Vary {unknown.cause} on purpose and keep the rest constant",
         ": {channels} {follow} it, and no effect in the catalogue does.",
     )
 

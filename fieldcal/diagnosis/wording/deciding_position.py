@@ -1,7 +1,7 @@
 """The position that decides between two explanations: where they differ most.
 
-Only positions are named that the ladder of the session has: angles that it was set to,
-to either side, and home. What a fixture cannot do is no advice.
+Only positions are considered that the ladder of the session can be set to: the angles
+that were used, with either sign, and zero.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class DecidingPosition:
 
     @property
     def text(self) -> str:
-        """How the operator is asked for it."""
+        """Request to the operator, as part of a sentence."""
         angles = f"α = {self.alpha_deg:g}°, β = {self.beta_deg:g}°"
         if self.number:
-            return f"take position {self.number} ({angles}) once more at the end"
-        return f"take the position α = {self.alpha_deg:g}°, β = {self.beta_deg:g}° too"
+            return f"repeat position {self.number} ({angles}) at the end"
+        return f"add the position {angles}"
 
 
 def extent(positions: Sequence[Position]) -> str:

@@ -19,7 +19,7 @@ SURE = 0.99
 """Probability above which no digits are told."""
 
 TREATED = {
-    "mend": "nothing: put right",
+    "mend": "nothing: corrected",
     "mask": "nothing: left out",
     "note": "nothing known",
 }

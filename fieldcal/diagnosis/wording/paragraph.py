@@ -85,7 +85,7 @@ def paragraph(
 
 
 def _wrong(odd: Sequence[str]) -> str:
-    return f"Something that the recording says of itself is wrong: {'; '.join(odd)}."
+    return f"The description of the recording is wrong: {'; '.join(odd)}."
 
 
 def _opening(
@@ -94,8 +94,8 @@ def _opening(
     listed = _listed(effects)
     if verdict == "consistent":
         return (
-            "Recording and simulation agree: bias and scale factor, refitted, leave"
-            " nothing that this recording can show."
+            "Recording and simulation agree: beyond bias and scale factor, which were"
+            " fitted, this recording shows no effect."
         )
     if verdict == "left_out":
         return f"The simulation leaves out {listed}."
@@ -104,7 +104,7 @@ def _opening(
     where = _places(mismatch)
     some = f" Besides, it leaves out {listed}." if listed else ""
     return (
-        "Recording and simulation part, and no effect in the catalogue explains it"
+        "Recording and simulation differ, and no effect in the catalogue explains it"
         f" ({where}).{some}"
     )
 
@@ -137,13 +137,13 @@ def _is_random(found: FoundEffect) -> bool:
 
 def _how_random(found: FoundEffect) -> str:
     return (
-        f"{found.id} is random: it widens the intervals, and no equation is fitted to"
-        " it."
+        f"{found.id} is random: the uncertainties include it, and no equation is"
+        " fitted to it."
     )
 
 
 def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
-    """By how much recording and simulation agree better; nothing that did not fall."""
+    """By how much the residuals fall; nothing if the held-out rms does not fall."""
     if not after.held_out_rms < before.held_out_rms:
         return []
     fell = ""
@@ -164,12 +164,12 @@ def _deciding(explanation: Explanation, one: str, other: str) -> str:
 
 
 def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
-    """What is known of a mismatch; channels that are off in the same places in one."""
+    """A mismatch in a sentence, which names all channels that are off there."""
     where = one.mismatch
     if np.isfinite(where.correlation):
         return (
             f"{where.channel} follows {where.covariate} (correlation"
-            f" {where.correlation:+.2f}); a smooth function of {one.cause} takes"
+            f" {where.correlation:+.2f}); a smooth function of {one.cause} explains"
             f" {100 * where.share:.0f} % of its variance."
         )
     places = listed(where.positions)
@@ -177,13 +177,12 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
         angles = off_by(one.turned, "had been")
         if len(where.positions) > 1:
             return (
-                f"{places.capitalize()} are off alike, as if {angles} in each of them:"
-                " look at that angle of the fixture, set it again, and repeat these"
-                " positions."
+                f"{places.capitalize()} are off in the same way, as if {angles} in each"
+                " of them: check this angle of the fixture, set it again, and repeat"
+                " these positions."
             )
         return (
-            f"{places.capitalize()} is off by itself, as if {angles} there: set it"
-            " again and repeat it."
+            f"Only {places} is off, as if {angles} there: set it again and repeat it."
         )
     alike = [
         u
@@ -193,8 +192,8 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
     verb = "is" if len(alike) == 1 else "are"
     return (
-        f"{channels} {verb} off in {places} by itself; take it again, and look for what"
-        " was different there."
+        f"{channels} {verb} off in {places} only; repeat it, and look for what was"
+        " different there."
     )
 
 
@@ -208,7 +207,7 @@ def off_by(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:
 
 
 def _undecided(explanation: Explanation) -> str:
-    """That something is there that has no name, and what comes nearest."""
+    """Sentence about an effect that cannot be named, with the likeliest names."""
     posterior = explanation.posterior
     likeliest = [
         f"{name} ({probability:.2f})"
@@ -216,8 +215,8 @@ def _undecided(explanation: Explanation) -> str:
         if probability > thresholds.MENTIONED and name in catalogue()
     ]
     said = (
-        "Something is left out that this recording shows too weakly to say what it is"
-        f" (probability {1 - posterior.nothing:.2f})"
+        "The simulation leaves something out, which this recording shows too weakly to"
+        f" name it (probability {1 - posterior.nothing:.2f})"
     )
     return f"{said}; likeliest: {', '.join(likeliest)}." if likeliest else f"{said}."
 
@@ -228,5 +227,5 @@ def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     if explanation.shows_earth and not explanation.sees_earth:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
     if left:
-        out.append(f"The positions leave open: {', '.join(left)}.")
+        out.append(f"These positions do not determine {', '.join(left)}.")
     return out

@@ -54,7 +54,7 @@ def unwitnessed(
     family: Sequence[Calibration] | None,
 ) -> str:
     """Sentence if wrong angles would not be noticed; else empty."""
-    if about.angles_from or _told(about):
+    if about.angles_from or _set_by_program(about):
         return ""
     worst, part, most, sigmas = None, UNSEEN, "", 0.0
     for each in found.info.get("wrong_angles", ()):
@@ -62,8 +62,8 @@ def unwitnessed(
         shows = float(
             np.sqrt(
                 wrong.shows**2
-                + _verified(wrong, verification)
-                + _familiar(wrong, found, limits, family)
+                + _shown_by_verification(wrong, verification)
+                + _shown_by_family(wrong, found, limits, family)
             )
         )
         off = {
@@ -91,19 +91,21 @@ def stated(found: Calibration, about: Description, limits: GradeLimits) -> bool:
     return about.angle_setting_deg is not None or used < limits.angle_setting_deg
 
 
-def _told(about: Description) -> bool:
+def _set_by_program(about: Description) -> bool:
     """Whether a program sets the angles, and nobody states them."""
     run = about.raw.get("run", {})
     mover = run.get("mover", {}) if isinstance(run, dict) else {}
     return isinstance(mover, dict) and mover.get("kind") == VIRTUAL
 
 
-def _verified(wrong: WrongAngles, verification: Verification | None) -> float:
+def _shown_by_verification(
+    wrong: WrongAngles, verification: Verification | None
+) -> float:
     """l^2 that a position adds that was not fitted."""
     return 0.0 if verification is None else verification.shows(wrong)
 
 
-def _familiar(
+def _shown_by_family(
     wrong: WrongAngles,
     found: Calibration,
     limits: GradeLimits,

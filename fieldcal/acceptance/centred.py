@@ -99,33 +99,33 @@ def tracked(
 
     1 if they are significantly different from zero, or too few were measured.
     """
-    halves = [_settled(block, w) for w in windows]
+    halves = [_second_half_mean(block, w) for w in windows]
     means = np.array([mean for mean, _ in halves]).reshape(-1, 3)
     sigma = np.array([error for _, error in halves]).reshape(-1, 3)
     seen = np.isfinite(means) & (sigma > 0)
     if (count := int(seen.sum())) < 3 * LEAST or not seen.any(axis=0).all():
         return 1.0, ""
-    chi2, larger = _about_zero(means[seen], sigma[seen])
+    chi2, larger = _chi2_about_zero(means[seen], sigma[seen])
     if larger < least:
         return 1.0, ""
     info = np.where(seen, 1.0 / np.where(seen, sigma, 1.0) ** 2, 0.0).sum(axis=0)
     felt = float(np.hypot(repeat, EARTH_RATE / np.sqrt(3.0)))
-    chance = (1.0 - larger) * _so_near(1 / np.sqrt(info), felt)
+    chance = (1.0 - larger) * _chance_near_zero(1 / np.sqrt(info), felt)
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
 
 
-def _about_zero(means: Array, sigma: Array) -> tuple[float, float]:
+def _chi2_about_zero(means: Array, sigma: Array) -> tuple[float, float]:
     """Chi-squared of means, and the probability of a larger one, (1)."""
     chi2 = float(np.sum((means / sigma) ** 2))
     return chi2, chi2_tail(chi2, len(means))
 
 
-def _so_near(sigma: Array, spread: float) -> float:
+def _chance_near_zero(sigma: Array, spread: float) -> float:
     """Probability that offsets of a spread come so close to zero on all axes, (2)."""
     return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
 
 
-def _settled(block: Block, window: Average) -> tuple[Array, Array]:
+def _second_half_mean(block: Block, window: Average) -> tuple[Array, Array]:
     """Mean of the gyroscopes in the second half of a window, (3,), and its error."""
     middle = (window.start + window.end) / 2
     gyr = block.between(middle, window.end).gyr
@@ -167,9 +167,9 @@ def centred_and_rounded(
     found = []
     for shift, wide in ((0.0, 1.0), (-0.5, 1.0), (-signs / 2, 1.0 + 3.0 * zero)):
         sigma = np.sqrt((part**2 * (white + wide * step**2 / 12)).sum(axis=0))  # (4)
-        _, larger = _about_zero(mean - step * shift, sigma)
+        _, larger = _chi2_about_zero(mean - step * shift, sigma)
         if larger >= least:
-            found.append((1.0 - larger) * _so_near(sigma, repeat))
+            found.append((1.0 - larger) * _chance_near_zero(sigma, repeat))
     return min(sum(found), 1.0) if found else 1.0
 
 

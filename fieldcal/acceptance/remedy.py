@@ -162,11 +162,13 @@ def _besides(
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
         if ratios[best] <= SURE:
-            return _told(chosen, over, seconds)
+            return _as_remedy(chosen, over, seconds)
     return None
 
 
-def _told(chosen: Sequence[Position], over: dict[str, float], seconds: float) -> Remedy:
+def _as_remedy(
+    chosen: Sequence[Position], over: dict[str, float], seconds: float
+) -> Remedy:
     word = "one position" if len(chosen) == 1 else f"{len(chosen)} positions"
     where = " and ".join(p.name for p in chosen)
     worst = max(over, key=lambda name: over[name])
@@ -214,14 +216,15 @@ def _expected(
     """Sigma of each parameter, (k,), by (1); infinite where not determined."""
     j = design(names, positions, about.gravity, about.mounting)
     t = np.stack(
-        [_moved(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))], axis=2
+        [_force_slopes(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))],
+        axis=2,
     )
     r = sigma**2 * np.eye(3) + angle**2 * t @ t.transpose(0, 2, 1)
     whitened = np.linalg.solve(np.linalg.cholesky(r), j)
     return sigma_of(whitened.reshape(-1, len(names)))  # (1)
 
 
-def _moved(
+def _force_slopes(
     positions: Sequence[Position], about: Description, alpha: float, beta: float
 ) -> Array:
     """How the forces, device axes, move with an angle, (n, 3) m/s^2/rad."""

@@ -71,7 +71,7 @@ def prepare(block: Block, about: Description) -> Prepared:
 
     """
     if about.means_only:
-        return _of_means(block, about.in_time())
+        return _prepared_means(block, about.in_time())
     _refuse_empty(block, about)
     refuse_copies(block)
     about = about.in_time()
@@ -80,7 +80,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     checked = check(block, about)
     sways = swaying(masked(checked.block, checked.usable), about)
     if sways is not None:
-        checked = _hung_at_rest(checked, sways, about)
+        checked = _without_sway(checked, sways, about)
     rest = arrivals(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
     source = RowSource(
@@ -94,7 +94,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     left = tuple(remains for _, remains in lines)
     if found:
         source = replace(source, block=without(source.block, source, rows, found))
-        rows = _as_shaken(rows_of(source), rows)
+        rows = _with_vibration(rows_of(source), rows)
         checked = checked_again(checked, source.block, about)
     if not rows.used.any():
         raise InputError(
@@ -104,7 +104,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     return Prepared(checked, source, _warming(rows, warmth), known, found, left)
 
 
-def _hung_at_rest(checked: Checked, sways: Swaying, about: Description) -> Checked:
+def _without_sway(checked: Checked, sways: Swaying, about: Description) -> Checked:
     """The samples as on a base at rest, and that it sways."""
     size, spread = np.rad2deg(sways.amplitude), np.rad2deg(sways.spread[0])
     fault = Fault(
@@ -134,7 +134,7 @@ def _where(block: Block, mended: Block) -> Block:
     )
 
 
-def _of_means(block: Block, about: Description) -> Prepared:
+def _prepared_means(block: Block, about: Description) -> Prepared:
     """Means alone: one row each, and no turns between."""
     about.refuse_overlap()
     checked = check(block, about)
@@ -152,7 +152,7 @@ def _of_means(block: Block, about: Description) -> Prepared:
     )
 
 
-def _as_shaken(calm: Rows, shaken: Rows) -> Rows:
+def _with_vibration(calm: Rows, shaken: Rows) -> Rows:
     """Rows without lines, but with the vibration that these were part of."""
     if len(calm.x) != len(shaken.x):
         return calm

@@ -67,8 +67,8 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
     lost = {s.name: found_effects.removed(explanation, s) for s in standing}
     first, then = before(block, explanation), after(explanation)
     effects = _effects(explanation, lost, then)
-    strange = _strange(explanation, lost)
-    odd = _odd(explanation)
+    strange = _without_effect(explanation, lost)
+    odd = _impossible(explanation)
     verdict = _verdict(explanation, effects, strange, odd)
     # so far positions were counted as they were held, from here on as they are listed
     numbered = explanation.prepared.source.about.numbered
@@ -133,7 +133,9 @@ def _effects(
     return found
 
 
-def _strange(explanation: Explanation, lost: Mapping[str, Removed]) -> list[Unknown]:
+def _without_effect(
+    explanation: Explanation, lost: Mapping[str, Removed]
+) -> list[Unknown]:
     """Mismatches of causes that are no effects."""
     out = []
     for one in explanation.standing:
@@ -158,7 +160,7 @@ def _verdict(
     return "ambiguous" if explanation.undecided else "consistent"
 
 
-def _odd(explanation: Explanation) -> list[str]:
+def _impossible(explanation: Explanation) -> list[str]:
     """Values that no sensor has, and turns that lead elsewhere: some fact is wrong."""
     found = calibrated(explanation, explanation.best.set)
     nominal = explanation.prepared.source.about.nominal
@@ -247,7 +249,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
     numbers = calibrated(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
         if explanation.rows.used[:, first : first + 3].any():
-            spare = _spare(explanation, first)
+            spare = _degrees_of_freedom(explanation, first)
             if spare <= 1:
                 out.append(
                     f"{max(spare, 0)} degrees of freedom in the means of the {name}:"
@@ -263,7 +265,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _spare(explanation: Explanation, first: int) -> int:
+def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
     """Means of windows less parameters, for one triad."""
     rows, found = explanation.rows, explanation.best.set.state
     part = slice(first, first + 3)

@@ -87,7 +87,7 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     good = (found.bad <= thresholds.CERTAIN)[seen.window] | (0 not in channels)
     columns = np.hstack([free, loose])[good]
     columns = columns[:, np.any(columns != 0.0, axis=0)]
-    chi2, rank = _least(plain[np.ix_(good, good)], columns, y[good])
+    chi2, rank = _least_chi2(plain[np.ix_(good, good)], columns, y[good])
     residual = seen.along(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
     sizes = free * found.sizes[~random]
@@ -117,7 +117,7 @@ def _free_rotations(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
     return out.reshape(3 * p, 2 * p)
 
 
-def _least(stated: Array, free: Array, y: Array) -> tuple[float, int]:
+def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
     """Least chi2, and how many directions of what is free the means determine."""
     root = np.linalg.cholesky(stated)
     white = np.linalg.solve(root, np.column_stack([free, y]))

@@ -66,7 +66,7 @@ class Asked:
         still = ~observations.rotating
         known = int((observations.oriented & still).sum())
         if self.method == "auto":
-            return _suits(int(still.sum()), known)
+            return _suitable_method(int(still.sum()), known)
         if self.method == "two_position" and (known != 2 or still.sum() != 2):
             raise NotObservable(
                 f"two positions with known angles are needed, not {known}: "
@@ -96,7 +96,7 @@ class Asked:
         return None if self.heading_deg is None else float(np.deg2rad(self.heading_deg))
 
 
-def _suits(still: int, known: int) -> Method:
+def _suitable_method(still: int, known: int) -> Method:
     """Take the method that suits so many positions, some of them with known angles."""
     if not still:
         return "least_squares"

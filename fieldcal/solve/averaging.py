@@ -59,7 +59,7 @@ def averaged_over(
 ) -> Parameters:
     """The mean over all explanations, (1) of `shown`."""
     if not averaged or not any(one.members for one in given.explanations):
-        only = _ended(given, likeliest, nominal)
+        only = _at_the_end(given, likeliest, nominal)
         return Parameters(*only, np.zeros(len(only[0])))
     search = Search(given, gram)
     found, doubt = [], bool(likeliest.bad.max(initial=0.0) > thresholds.DOUBTED)
@@ -69,17 +69,17 @@ def averaged_over(
             if (*given.asked, *same.members) != given.members:
                 there = mixed(given, search, same.members, doubt)
             chance = one.probability * same.probability
-            found.append((chance, _ended(given, there, nominal)))
+            found.append((chance, _at_the_end(given, there, nominal)))
     weight = np.array([p for p, _ in found])
     means = np.array([value for _, (value, _) in found])
     values: Array = weight @ means
     covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
     covariance += (weight[:, None] * (means - values)).T @ (means - values)
-    plain, own = _ended(given, mixed(given, search, (), doubt), nominal)
+    plain, own = _at_the_end(given, mixed(given, search, (), doubt), nominal)
     return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 
 
-def _ended(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
+def _at_the_end(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2) of `shown`."""
     picked, before = picked_by(given, found.columns), _nominal_values(given, nominal)
     return before + picked @ found.mean, picked @ found.covariance @ picked.T

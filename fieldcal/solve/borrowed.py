@@ -69,7 +69,7 @@ class Borrowed:
                 f" {self._largest_shift()}; nothing of the lot is in the result:"
                 " see whether it is the right lot, and examine the unit"
             )
-        name = min(self.lot.names, key=self._share)
+        name = min(self.lot.names, key=self._part_left)
         unit = _unit(name)
         before = self.own.get(name)
         instead = f"± {before[1]:.2g}" if before else "none"
@@ -85,7 +85,7 @@ class Borrowed:
             f" {f'± {self.found[name][1]:.2g} {unit}'.strip()} with it{perhaps}"
         )
 
-    def _share(self, name: str) -> float:
+    def _part_left(self, name: str) -> float:
         """What is left of a parameter's uncertainty, as a part."""
         return self.found[name][1] / self.own.get(name, (0.0, np.inf))[1]
 

@@ -213,7 +213,7 @@ class _Session:
         Windows tell which; turns hardly add to that.
         """
         fits = {name: self._with(name, follow=False) for name in TILTED}
-        usable = {n: e for n, e in fits.items() if _shows(e)}
+        usable = {n: e for n, e in fits.items() if _determines_all(e)}
         if not usable:
             return self._with("none"), [self._level_taken()]
         if len(usable) == 1:
@@ -245,7 +245,7 @@ class _Session:
         )
 
 
-def _shows(found: Estimated) -> bool:
+def _determines_all(found: Estimated) -> bool:
     """Whether all of the accelerometers is determined, and the tilt with it."""
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False

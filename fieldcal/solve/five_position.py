@@ -127,7 +127,7 @@ def five_position(
 
     """
     each = axis_estimates(observations, tilt, as_printed)
-    pick, names = _picked(each, tilt, observations.mounting)
+    pick, names = _parameter_rows(each, tilt, observations.mounting)
     return Closed(names, pick @ each.values, pick @ each.covariance @ pick.T)
 
 
@@ -205,7 +205,7 @@ def _axis(axis: str, c: Array, lead: Array, g: float, as_printed: bool) -> Found
     return {f"{axis}.bias": c[0], f"{axis}.scale": sign * norm / g}
 
 
-def _picked(
+def _parameter_rows(
     each: AxisEstimates, tilt: Tilt, mounting: Array
 ) -> tuple[Array, tuple[str, ...]]:
     """Rows that turn the axes' estimates into parameters of the device, (p, q).

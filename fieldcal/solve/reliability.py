@@ -68,7 +68,9 @@ class WrongAngles:
         off = 0.0
         if self.position is None and self.angle_deg is None:
             off = priors.GAUGE * angle
-        elif self.angle_deg is not None and _same(angle, np.deg2rad(self.angle_deg)):
+        elif self.angle_deg is not None and _equal_angles(
+            angle, np.deg2rad(self.angle_deg)
+        ):
             off = float(np.deg2rad(priors.REPEATED_DEG))
         return (off, 0.0) if self.joint == 0 else (0.0, off)
 
@@ -131,7 +133,7 @@ def _mistakes(
             yield joint, None, int(place), u
         for value in np.unique(np.round(angles, 9)).tolist():
             u = np.zeros(2 * len(places))
-            u[joint::2] = np.deg2rad(priors.REPEATED_DEG) * _same(angles, value)
+            u[joint::2] = np.deg2rad(priors.REPEATED_DEG) * _equal_angles(angles, value)
             yield joint, float(np.rad2deg(value)), None, u
         u = np.zeros(2 * len(places))
         u[joint::2] = priors.GAUGE * angles
@@ -139,5 +141,5 @@ def _mistakes(
             yield joint, None, None, u
 
 
-def _same(angle: Any, value: float) -> Any:
+def _equal_angles(angle: Any, value: float) -> Any:
     return np.abs(angle - value) < 1e-8

@@ -62,7 +62,7 @@ def calibration(
     odd = [
         *senseless(names, found.values, sigma, observations.nominal),
         *elsewhere(_named(found.contradicted, observations)),
-        *_elsewhere(found, observations),
+        *_wrong_latitude(found, observations),
     ]
     sentences += doubts(method, observations, found)
     fit = found.acc if any(map(_is_acc, names)) else found.gyr
@@ -97,7 +97,7 @@ def _named(
     return [(names[before], names[behind]) for before, behind in turns]
 
 
-def _elsewhere(found: Estimated, observations: Observations) -> list[str]:
+def _wrong_latitude(found: Estimated, observations: Observations) -> list[str]:
     """A latitude that the gyroscopes contradict."""
     shown = EarthVertical.of(found.given, found.search, observations.latitude)
     return [shown.sentence] if shown and shown.wrong else []

@@ -59,7 +59,7 @@ def without_bad_windows(
 
     def inference(left: Mask) -> Inference:
         return Inference(
-            WindowSystem(_without(rows, given, left), given), nominal, turns
+            WindowSystem(_without_windows(rows, given, left), given), nominal, turns
         )
 
     bad, score = np.zeros(len(given.held), dtype=bool), np.nan
@@ -90,7 +90,7 @@ def _settled_fit(
     return gram, mixed(given, Search(given, gram), given.explanations[0].members)
 
 
-def _without(rows: Rows, given: Given, bad: Mask) -> Rows:
+def _without_windows(rows: Rows, given: Given, bad: Mask) -> Rows:
     """Rows of which some windows (p,) have no weight."""
     left = np.isin(rows.x.position, given.held[bad])
     return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))

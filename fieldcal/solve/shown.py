@@ -86,8 +86,8 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     likely = {k: p for k, p in total.items() if p >= least}
     # in the order in which they came: that of a set is another one in every run
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
-    here = {g: m for g, m in _moved(d, wanted)}
-    also = list(_elsewhere(d, [c for c, _ in here.values()]))
+    here = {g: m for g, m in _in_other_dictionary(d, wanted)}
+    also = list(_on_other_triad(d, [c for c, _ in here.values()]))
     out: dict[frozenset[Group], Shown] = {}
     for key, p in likely.items():
         members = tuple(m for g, m in here.items() if g in key)
@@ -114,7 +114,7 @@ def _adds(member: Member, has: set[str]) -> bool:
     return not carrying & has
 
 
-def _moved(
+def _in_other_dictionary(
     d: Dictionary, wanted: Mapping[Group, Cause]
 ) -> Iterator[tuple[Group, Member]]:
     """Groups of another dictionary, each with the member that it is in this one."""
@@ -148,7 +148,7 @@ def _variants(d: Dictionary, group: Group) -> list[Group]:
     own = (group.shape, group.origin)
     grid = [own, *(point for point in points(d, effect) if point != own)]
     out = [
-        one if len(some) == len(whole) else _some(one, some)
+        one if len(some) == len(whole) else _with_parameters(one, some)
         for one in at_points(d, replace(group, params=whole), grid)
         for n in range(1, len(whole) + 1)
         for some in combinations(whole, n)
@@ -156,7 +156,7 @@ def _variants(d: Dictionary, group: Group) -> list[Group]:
     return sorted(out, key=lambda g: (g.params, g.shape) != (group.params, group.shape))
 
 
-def _elsewhere(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
+def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
     """Effects of one triad on the other one: what a device has is often in both."""
     known = {c.key for c in causes}
     for name in dict.fromkeys(c.name for c in causes if c.kind == "effect"):
@@ -171,7 +171,7 @@ def _elsewhere(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
                 yield replace(other, variants=tuple(every)), every[0]
 
 
-def _some(whole: Group, params: tuple[int, ...]) -> Group:
+def _with_parameters(whole: Group, params: tuple[int, ...]) -> Group:
     """A group with some of its parameters."""
     at = [whole.params.index(j) for j in params]
     return replace(

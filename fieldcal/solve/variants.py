@@ -38,7 +38,7 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
 
     """
     each = [_choices(search, (*known, *one.members), m) for m in one.members]
-    each += [_perhaps(search, (*known, *one.members), m) for m in one.maybe]
+    each += [_with_and_without(search, (*known, *one.members), m) for m in one.maybe]
     share: dict[tuple[Member, ...], float] = {}
     points = spread(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
@@ -72,7 +72,7 @@ def _choices(
     return [((cause, other),) for other in cause.variants], weight
 
 
-def _perhaps(
+def _with_and_without(
     search: Search, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
     """A set as it is or with one variant of a further cause, and how likely each is.
@@ -93,7 +93,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     """Evidence of every variant of a cause beside the other members, over all sizes."""
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
-    rest = _without(search, members, own.columns)
+    rest = _without_columns(search, members, own.columns)
     inner, pull = rest.rest(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     score = np.zeros(len(others))
@@ -110,7 +110,9 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     return score
 
 
-def _without(search: Search, members: tuple[Member, ...], own: Index) -> Eliminated:
+def _without_columns(
+    search: Search, members: tuple[Member, ...], own: Index
+) -> Eliminated:
     """A set without some columns, windows being as unstable as with them."""
     full = search.evaluated(members)
     kept = ~np.isin(full.state.columns, own)

@@ -77,12 +77,12 @@ class Least:
 
     def of_means(self, cells: int) -> Array:
         """Least spread of a mean over so many cells, (c,)."""
-        least: Array = np.maximum(self.always, self._drawn(cells))
+        least: Array = np.maximum(self.always, self._random_error(cells))
         return least
 
     def of_changes(self, cells: int) -> Array:
         """Least spread of what two such means side by side differ by, (c,)."""
-        least: Array = np.maximum(self.always, np.sqrt(2.0) * self._drawn(cells))
+        least: Array = np.maximum(self.always, np.sqrt(2.0) * self._random_error(cells))
         return least
 
     def of_roots(self) -> Array:
@@ -91,7 +91,7 @@ class Least:
         least: Array = np.maximum(np.cbrt(self.always**2), drawn)
         return least
 
-    def _drawn(self, cells: int) -> Array:
+    def _random_error(self, cells: int) -> Array:
         drawn: Array = self.sampled / np.sqrt(cells * np.maximum(self.number, 1.0))
         return drawn
 
@@ -100,7 +100,7 @@ def pushes(about: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
     """Deviations of cell means from their line, `about` (m, c), (1)."""
     levels = zip(running(about), noise.spread, strict=False)
     return [
-        Statistic("push", 2**k, u, s, np.abs(u) / _no_less(s, least.of_means(2**k)))
+        Statistic("push", 2**k, u, s, np.abs(u) / _zero_as_inf(s, least.of_means(2**k)))
         for k, (u, s) in enumerate(levels)
     ]
 
@@ -111,7 +111,7 @@ def steps(means: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
     tests = []
     for k, (u, s) in enumerate(levels):
         change = u[2**k :] - u[: -(2**k)]
-        spread = _no_less(s, least.of_changes(2**k))
+        spread = _zero_as_inf(s, least.of_changes(2**k))
         tests.append(Statistic("step", 2**k, change, s, np.abs(change) / spread))
     return tests
 
@@ -125,7 +125,7 @@ def shakes(short: Array, number: Array, least: Least) -> list[Statistic]:
     most = np.maximum(np.median(number, axis=0), 1.0)
     centred = np.sqrt(np.minimum(1.0, number / most)) * (root - np.median(root, axis=0))
     usual = _HEAVY * DEVIATION * np.median(np.abs(centred), axis=0)
-    spread = _no_less(usual, least.of_roots())
+    spread = _zero_as_inf(usual, least.of_roots())
     noise = np.sqrt(np.median(short, axis=0))
     levels = zip(
         running(centred, SHAKE_LEVELS), running(short, SHAKE_LEVELS), strict=True
@@ -161,7 +161,7 @@ def repeats(
     return runs
 
 
-def _no_less(spread: Array, least: Array) -> Array:
+def _zero_as_inf(spread: Array, least: Array) -> Array:
     """Spread, infinite where there is none: what never varies cannot be judged."""
     bounded = np.maximum(spread, least)
     return np.where(bounded > 0, bounded, np.inf)

@@ -78,11 +78,13 @@ def _around_zero(mean: Array, noise: Array) -> Array:
     found = np.zeros(len(mean))
     for i in np.flatnonzero(np.abs(mean) < ZERO + 3 * noise):
         s = max(float(noise[i]), SHARP)
-        found[i] = np.mean([_drawn(mean[i] + u, s) ** 2 for u in AROUND])  # (3)
+        found[i] = np.mean(
+            [_offset_of_cut_values(mean[i] + u, s) ** 2 for u in AROUND]
+        )  # (3)
     return found
 
 
-def _drawn(v: float, s: float) -> float:
+def _offset_of_cut_values(v: float, s: float) -> float:
     """By how much the mean of what was cut is off, (2), in steps."""
     below, at, above = (0.5 * (1 + erf((a - v) / (s * 2**0.5))) for a in (-1, 0, 1))
     return (2 * at - above - below) / 2

@@ -62,7 +62,7 @@ class Jumps:
         self._held = concat([])
         self._rows = 0
         self._size = np.full(3, np.nan)
-        self._steps = self._least = 0.0
+        self._steps = self._least_jump = 0.0
         self._changes: list[JumpRows] = []
         self._begin = self._end = (np.nan, np.full(3, np.nan))
 
@@ -77,7 +77,9 @@ class Jumps:
             whole = block.acc[np.isfinite(block.acc).all(axis=1)]
             apart = np.abs(np.diff(whole, axis=0))
             self._size = FAR * _noise(apart)
-            self._least = float(np.nan_to_num(_least(apart), posinf=0.0).sum())
+            self._least_jump = float(
+                np.nan_to_num(_least_jump(apart), posinf=0.0).sum()
+            )
         view = np.lib.stride_tricks.sliding_window_view(block.acc, HALF, axis=0)
         middle = np.median(view, axis=-1)
         if np.isnan(self._begin[0]):
@@ -122,7 +124,7 @@ class Jumps:
         if long.sum() < FEWEST or rests[long].mean() < MOSTLY:
             return []
         differ = np.diff(np.concatenate([[0.0], some.steps, [self._steps]])) / rows
-        quiet = max(float(differ[long].min()), self._least)
+        quiet = max(float(differ[long].min()), self._least_jump)
         if (differ[long] > ALIKE * quiet).mean() > 1 - MOSTLY:
             return []
         starts = np.append(self._begin[0], time)
@@ -132,7 +134,7 @@ class Jumps:
         return list(zip(starts[long].tolist(), ends[long].tolist(), strict=True))
 
 
-def _least(step: Array) -> Array:
+def _least_jump(step: Array) -> Array:
     """Least step that is one, (3,); inf where there is none."""
     found: Array = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
     return found
@@ -143,6 +145,6 @@ def _noise(step: Array) -> Array:
     if not len(step):
         return np.full(3, np.nan)
     usual = DEVIATION * np.median(step, axis=0) / np.sqrt(2)
-    least = _least(step)
+    least = _least_jump(step)
     noise: Array = np.maximum(usual, np.where(np.isfinite(least), least, 0.0))
     return noise

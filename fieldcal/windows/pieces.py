@@ -143,7 +143,7 @@ class PiecedWindow:
         before = self._kept
         whole = self._together(before, self._now)
         if whole is not None:
-            self._gaps.append(_between(before, self._now))
+            self._gaps.append(_gap_between(before, self._now))
             return whole.average()
         self.dropped = before.seconds
         self._kept, self._gaps = None, []
@@ -154,7 +154,7 @@ class PiecedWindow:
         before = self._kept
         whole = self._together(before, piece) if before else None
         if before is not None and whole is not None:
-            self._gaps.append(_between(before, piece))
+            self._gaps.append(_gap_between(before, piece))
             self._kept = whole
             return
         self.dropped = before.seconds if before else 0.0
@@ -176,7 +176,7 @@ class PiecedWindow:
         return bool((off[known] <= AGREES * spread[known]).all())  # (1)
 
 
-def _between(before: Window, after: Window) -> tuple[float, float]:
+def _gap_between(before: Window, after: Window) -> tuple[float, float]:
     """From behind the last sample of a piece to the first of the next, s."""
     return float(np.nextafter(before.end, np.inf)), after.start
 

@@ -62,7 +62,7 @@ def table_of(rows: Array, origin: Array) -> CellTable:
     return CellTable(rows[:, 0], rows[:, 1:], origin)
 
 
-class _Usual(NamedTuple):
+class _Typical(NamedTuple):
     """What is usual of cells.
 
     Attributes
@@ -78,7 +78,7 @@ class _Usual(NamedTuple):
     flips: Array
 
 
-def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
+def _spans(rows: CellRows, usual: _Typical) -> Iterator[Spans]:
     """First span of a part, the spread and the mean of each of them, (k, 6).
 
     The mean of a cell with few values is that of the cell before: unlike
@@ -100,7 +100,7 @@ def _spans(rows: CellRows, usual: _Usual) -> Iterator[Spans]:
         yield first, spread, view.mean(axis=-1)
 
 
-def _usual(rows: CellRows) -> _Usual:
+def _typical(rows: CellRows) -> _Typical:
     """What is usual of the cells, by their medians."""
     every = -(-len(rows) // _SAMPLE)
     counts, steps = [], []
@@ -112,7 +112,7 @@ def _usual(rows: CellRows) -> _Usual:
         steps.append(np.diff(part[:, 0])[-first % every :: every])
     pause = _PAUSE * max(float(np.median(np.concatenate(steps))), SPAN * CELL / _PAUSE)
     flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
-    return _Usual(np.median(np.concatenate(counts), axis=0), pause, flips)
+    return _Typical(np.median(np.concatenate(counts), axis=0), pause, flips)
 
 
 def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
@@ -120,7 +120,7 @@ def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
 
     `bound` (6,) is what no spread at rest exceeds.
     """
-    usual = _usual(rows)
+    usual = _typical(rows)
     every = -(-len(rows) // _SAMPLE)
     # all spans of a long recording would not fit into memory: they are made twice
     short = list(_spans(rows, usual)) if len(rows) <= _PART else []
@@ -135,7 +135,7 @@ def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
         return []
     quiet = np.quantile(some, 0.1, axis=0)
     scale = np.where(quiet > 0, quiet, np.inf)
-    valley = np.clip(_valley((some / scale).max(axis=1)), _LEAST, _MOST)
+    valley = np.clip(_splitting_threshold((some / scale).max(axis=1)), _LEAST, _MOST)
     kept: list[RestRun] = []
     spans = short or _spans(rows, usual)
     least = np.maximum(np.minimum(valley * scale, bound), usual.flips)
@@ -190,7 +190,7 @@ def _weighted_median(values: Array, weights: Any) -> Array:
     return median
 
 
-def _valley(ratio: Array) -> float:
+def _splitting_threshold(ratio: Array) -> float:
     """Threshold that splits the logarithms of `ratio` into two heaps best."""
     logs = np.sort(np.log(np.maximum(ratio, 1e-3)))
     n = np.arange(1, len(logs))

@@ -24,13 +24,13 @@ BACK = 0.3
 
 def without_spikes(block: Block) -> Block:
     """Samples with nan in place of single ones that jump by (1); else the block."""
-    acc, gyr = _calmed(block.acc), _calmed(block.gyr)
+    acc, gyr = _limited_steps(block.acc), _limited_steps(block.gyr)
     if acc is block.acc and gyr is block.gyr:
         return block
     return replace(block, acc=acc, gyr=gyr)
 
 
-def _calmed(triad: Array) -> Array:
+def _limited_steps(triad: Array) -> Array:
     if len(triad) < len("abc"):
         return triad
     step = np.abs(np.diff(triad, axis=0))

@@ -107,7 +107,9 @@ class Stillness:
         if self._sways:
             self.meter = self._swinging(y)
         else:
-            self.meter = max(self._unrest(y, noise), self._turning(y[:, 3:], noise[3:]))
+            self.meter = max(
+                self._motion_ratio(y, noise), self._turning(y[:, 3:], noise[3:])
+            )
         if self.meter > 1:
             self.since = None
         elif self.since is None:
@@ -122,7 +124,7 @@ class Stillness:
         )
         return noise
 
-    def _unrest(self, y: Array, noise: Array) -> float:
+    def _motion_ratio(self, y: Array, noise: Array) -> float:
         """(2) and (3) over what the noise allows, within the limits of sanity."""
         slope = _SLOPE @ y
         about = y - y.mean(axis=0) - np.outer(_TIME, slope) / SPAN
@@ -130,8 +132,8 @@ class Stillness:
         known = 1.0 if self._rest is not None else _UNKNOWN
         bound = known * self._limits.noise
         ratio = np.maximum(
-            spread / _or_inf(np.minimum(SPREAD * noise, bound)),
-            np.abs(slope) / _or_inf(np.minimum(SLOPE * noise, bound)),
+            spread / _zero_as_inf(np.minimum(SPREAD * noise, bound)),
+            np.abs(slope) / _zero_as_inf(np.minimum(SLOPE * noise, bound)),
         )
         return float(ratio.max())
 
@@ -149,6 +151,6 @@ class Stillness:
         return float(off.max()) if self._even < EVEN else 0.0
 
 
-def _or_inf(allowed: Array) -> Array:
+def _zero_as_inf(allowed: Array) -> Array:
     """What is allowed; a channel without noise is not judged."""
     return np.where(allowed > 0, allowed, np.inf)

@@ -39,7 +39,7 @@ def reasons(
     """
     out = []
     for start, end in spans:
-        first, last = _at(rows, start), _at(rows, end - 1e-9)
+        first, last = _cell_of(rows, start), _cell_of(rows, end - 1e-9)
         inside = CellTable(rows[first : last + 1][:, 0], rows[first : last + 1][:, 1:],
                            origin)  # fmt: skip
         k = round(BEYOND / CELL)
@@ -50,7 +50,7 @@ def reasons(
     return out
 
 
-def _at(rows: CellRows, t: float) -> int:
+def _cell_of(rows: CellRows, t: float) -> int:
     """Which cell an instant lies in: the last that begins no later."""
     low, high = 0, len(rows) - 1
     while low < high:

@@ -68,14 +68,14 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     t, six = t[known], six[known]
     parts = max(1, int(np.ceil((t[-1] - t[0]) / WIDEST))) if len(t) > 1 else 1
     found = [
-        _stretch(t[some], six[some], scale)
+        _waves_of_stretch(t[some], six[some], scale)
         for some in np.array_split(np.arange(len(t)), parts)
     ]
     out = [one for one in found if one is not None]
     return out if len(out) == parts else []
 
 
-def _stretch(t: Array, six: Array, scale: Array) -> Waves | None:
+def _waves_of_stretch(t: Array, six: Array, scale: Array) -> Waves | None:
     """Waves of one stretch; None if there are none, or they are no turning."""
     cells = _cells(t, six)
     if cells is None:
@@ -84,7 +84,7 @@ def _stretch(t: Array, six: Array, scale: Array) -> Waves | None:
     span = float(at[-1] - at[0]) + length
     hz: Array = np.arange(1, int(2 * span * HIGHEST) + 1) / (2 * span)
     hz = hz[hz >= max(LOWEST, 1 / span)]
-    if not _swings(y[:, 3:] / scale, length):
+    if not _oscillates(y[:, 3:] / scale, length):
         return None
     force, ends = y[:, :3].mean(axis=0), (float(t[0]), float(t[-1]))
     none = np.zeros(6)
@@ -116,7 +116,7 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     return own.mean(axis=1)[whole], y[whole], each * step
 
 
-def _swings(rate: Array, length: float) -> bool:
+def _oscillates(rate: Array, length: float) -> bool:
     """Whether what rates (m, 3) sum up to goes to and fro enough to be looked at."""
     angle = np.cumsum((rate - rate.mean(axis=0)) * length, axis=0)
     about = flattened(np.arange(float(len(angle))), angle, ())
@@ -125,7 +125,7 @@ def _swings(rate: Array, length: float) -> bool:
 
 def _with_arm(found: Waves) -> Waves | None:
     """The waves with r of (1); None if accelerometers do not show that it turns."""
-    t, strong = np.linspace(*found.span, POINTS), _strong(found)
+    t, strong = np.linspace(*found.span, POINTS), _significant(found)
     made = np.cross(found.force, strong.turn(t))
     speeding = strong.turn(t, 2)
     design = np.stack([np.cross(speeding, e) for e in np.eye(3)] + [made], axis=2)
@@ -143,7 +143,7 @@ def _with_arm(found: Waves) -> Waves | None:
     return replace(found, arm=arm) if alike and np.abs(arm).max() < LONGEST else None
 
 
-def _strong(found: Waves) -> Waves:
+def _significant(found: Waves) -> Waves:
     """The waves that are no noise: of a quick one twice derived little is left else."""
     pulse = 2 * np.pi * found.hz
     power = (found.cos[:, 3:] ** 2 + found.sin[:, 3:] ** 2).sum(axis=1) / pulse**2

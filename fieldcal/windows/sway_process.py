@@ -52,7 +52,7 @@ def fitted(t: Array, y: Array, hz: Array, known: Waves) -> Waves | None:
 
 def frequencies(t: Array, y: Array, hz: Array, near: float) -> Array:
     """Frequencies, and those of the strongest lines for any so `near` to them, Hz."""
-    return _beside(hz, _lines(t, y, hz), near)
+    return _with_lines(hz, _lines(t, y, hz), near)
 
 
 class _Fitted:
@@ -150,7 +150,7 @@ def needed(waves: Waves) -> float:
     return float(LADDER[-1])
 
 
-def _beside(hz: Array, lines: Array, near: float) -> Array:
+def _with_lines(hz: Array, lines: Array, near: float) -> Array:
     """Frequencies with lines among them, but for those that are nearly the same."""
     kept: list[float] = []
     for line in lines.tolist():

@@ -119,7 +119,7 @@ def judge(
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
     laid = line(means, cells.resolution / np.maximum(_number(cells), 1.0))
     least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
-    tests = _tests(cells, means, laid, noise, _least(cells, least))
+    tests = _tests(cells, means, laid, noise, _least_spreads(cells, least))
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
     worst.append(_beyond_drift(cells, laid, noise, limits))
     worst.append(_beyond_noise(cells, noise.spread[0], limits))
@@ -147,7 +147,7 @@ def _rounding_noise(cells: CellTable) -> Array:
     return np.sqrt(of_mean(cells.resolution, np.nan_to_num(cells.noise)))
 
 
-def _least(cells: CellTable, always: Array) -> Least:
+def _least_spreads(cells: CellTable, always: Array) -> Least:
     """The least that spreads are: what jumps may be, and how often values change.
 
     A cell in which a value jumps by many steps counts as one that changed all through.

@@ -52,8 +52,8 @@ def test_what_turns_or_rates_leave_open(
          " it: add positions with gravity half way between x and y"),
         (["cross_coupling.k13", "cross_coupling.k23"], 8, 1,
          "cross_coupling.k13 and cross_coupling.k23 are not determined, 8 norms cannot"
-         " determine 9 parameters: add positions with gravity half way between x and z and"
-         " y and z"),
+         " determine 9 parameters: add positions with gravity half way between x and z"
+         " and y and z"),
         (["cross_coupling.k23"], 9, 2,
          "cross_coupling.k23 is not determined, axes held up and down alone cannot show"
          " it (and all nine would leave two degrees of freedom): add positions with"

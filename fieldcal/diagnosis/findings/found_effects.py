@@ -81,7 +81,9 @@ def of_rows(
 ) -> FoundEffect:
     """A cause of the catalogue that windows or turns show."""
     posterior = explanation.posterior
-    delta = 2 * (posterior.best.state.score - _at(lost.set, posterior.best))
+    delta = 2 * (
+        posterior.best.state.score - _score_at_instability(lost.set, posterior.best)
+    )
     count = sum(len(g.columns) for _, g in standing.members)
     count += sum(len(g.shape) for _, g in standing.members[:1])
     used = int(explanation.rows.used.sum())
@@ -103,7 +105,7 @@ def of_rows(
     )
 
 
-def _at(less: Set, best: Set) -> float:
+def _score_at_instability(less: Set, best: Set) -> float:
     """Score of a set at the instabilities of another."""
     rows = best.state.rows
     return type(less.state).of(rows, less.state.columns, less.state.sizes).score

@@ -31,7 +31,7 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     (at,) = group.shape.values()
     rows, block = explanation.rows, explanation.prepared.source.block
     changes = _changes(explanation, member)
-    plain = _plain(explanation, changes)
+    plain = _without_change(explanation, changes)
     change: Array = np.sum([c for _, c in changes], axis=0)
     seen = np.where(rows.used, rows.y - plain, np.nan)
     low, high = _possible(explanation, _squares(seen, change, rows.sd), at)
@@ -98,7 +98,9 @@ def _changes(explanation: Explanation, member: Member) -> list[tuple[Group, Arra
     return out
 
 
-def _plain(explanation: Explanation, changes: list[tuple[Group, Array]]) -> Array:
+def _without_change(
+    explanation: Explanation, changes: list[tuple[Group, Array]]
+) -> Array:
     """What the model makes of rows, without the change, (n, 6)."""
     rows = explanation.rows
     fitted: Array = rows.y - explanation.best.residual()

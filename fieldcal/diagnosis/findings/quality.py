@@ -30,7 +30,9 @@ def _agreement(
     fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
 ) -> Agreement:
     """Residuals of a fit; squares are weighed as another has the instability."""
-    squares = weighed.squares_of(fitted.residual()) if _alike(fitted, weighed) else None
+    squares = (
+        weighed.squares_of(fitted.residual()) if _same_rows(fitted, weighed) else None
+    )
     total = fitted.squares.sum() if squares is None else squares.sum()
     return Agreement(
         fitted.rows,
@@ -42,7 +44,7 @@ def _agreement(
     )
 
 
-def _alike(one: Fitted, other: Fitted) -> bool:
+def _same_rows(one: Fitted, other: Fitted) -> bool:
     """Whether two fits are of the same rows."""
     return one.rows.y.shape == other.rows.y.shape
 

@@ -76,8 +76,8 @@ def check(block: Block, about: Description) -> Checked:
     for sensor in dead:
         # of one that sends nothing at all nothing is stuck either
         usable[:, sensor.channels] &= not sensor.absent
-    block, samples = _put_right(block, usable, about, faults)
-    for name in _treated("mask"):
+    block, samples = _corrected(block, usable, about, faults)
+    for name in _ids_by_treatment("mask"):
         before = len(faults)
         found = _find(name, samples)
         for fault in _off_rails(found, samples) if name == "stuck" else found:
@@ -91,13 +91,15 @@ def check(block: Block, about: Description) -> Checked:
         usable[:, sensor.channels] = False
     if dead:
         samples = recording(block, usable, about)
-    for name in _treated("note"):
+    for name in _ids_by_treatment("note"):
         faults += [(name, fault) for fault in _find(name, samples)]
     unused = tuple(sensor.says for sensor in dead)
-    return Checked(block, usable, tuple(_once(faults)), samples.noise, unused)
+    return Checked(
+        block, usable, tuple(_without_rail_runs(faults)), samples.noise, unused
+    )
 
 
-def _put_right(
+def _corrected(
     block: Block,
     usable: NDArray[np.bool_],
     about: Description,
@@ -105,7 +107,7 @@ def _put_right(
 ) -> tuple[Block, CheckedSamples]:
     """Samples with what can be undone undone; what it was is added to `faults`."""
     samples = recording(block, usable, about)
-    for name in _treated("mend"):
+    for name in _ids_by_treatment("mend"):
         for fault in _find(name, samples):
             faults.append((name, fault))
             if fault.mended is not None:
@@ -130,7 +132,7 @@ def checked_again(checked: Checked, block: Block, about: Description) -> Checked
     return replace(checked, faults=tuple(faults))
 
 
-def _treated(treatment: str) -> list[str]:
+def _ids_by_treatment(treatment: str) -> list[str]:
     """Ids of the effects on samples with one treatment, in their order."""
     chain = [e for e in catalogue().values() if isinstance(e, Chain)]
     some = [e for e in chain if e.treatment == treatment]
@@ -190,7 +192,7 @@ def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
     return any(n == "stuck" and f.channel == fault.channel for n, f in faults)
 
 
-def _once(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
+def _without_rail_runs(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
     """Without runs of equal values that are the rail of a clipped channel."""
     clipped = {
         f.channel: {int(r) for r in f.rows} for n, f in faults if n == "saturation"

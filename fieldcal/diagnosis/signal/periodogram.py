@@ -132,8 +132,8 @@ def highest(
             odds = _beyond(float(total[at]), count * len(some))
             odds += np.log(LOOKS * len(total))
             if odds < best:
-                best, peak = odds, _about(hz, total / (count * len(some)), at)
-    return peak and replace(peak, noise=_beside(spectra[0], peak.hz, pieces.noise))
+                best, peak = odds, _peak_at(hz, total / (count * len(some)), at)
+    return peak and replace(peak, noise=_noise_near(spectra[0], peak.hz, pieces.noise))
 
 
 def _level(power: Array, count: int) -> Array:
@@ -142,7 +142,7 @@ def _level(power: Array, count: int) -> Array:
     return _on_a_slope(power, _floor(power) / (1 - 1 / (9 * count)) ** 3)
 
 
-def _beside(spectrum: Spectrum, hz: float, white: Array) -> Array:
+def _noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
     """White noise as strong as what is beside a frequency, (6,).
 
     Not stronger than that of the samples: a line in short windows is beside itself.
@@ -154,7 +154,7 @@ def _beside(spectrum: Spectrum, hz: float, white: Array) -> Array:
     return noise
 
 
-def _about(hz: Array, power: Array, at: int) -> Peak:
+def _peak_at(hz: Array, power: Array, at: int) -> Peak:
     """The peak about a frequency, of power (m,) in terms of the floor.
 
     What is no line, as of a machine whose speed wanders, is as broad as its power,

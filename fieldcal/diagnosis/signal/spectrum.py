@@ -52,7 +52,7 @@ def tones(source: RowSource, rows: Rows) -> list[tuple[Tone, Remains]]:
         if left.predictive_score[tone.clear].sum() > 0:
             found.append((tone, left))
             looked[-1] = replace(peak, hz=tone.hz, low=tone.hz, high=tone.hz)
-            _lessen(pieces, tone)
+            _subtract(pieces, tone)
             spectra = spectra_of(pieces)
     return found
 
@@ -95,12 +95,12 @@ def _explained(pieces: Pieces, near: float) -> Tone | None:
     places = np.log(sum(map(len, pieces.samples)))
     if best.gain <= places - np.log(thresholds.LINE_BY_CHANCE) or not best.channels:
         return None
-    if _share(pieces, best, moments) <= thresholds.ONE_LINE:
+    if _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE:
         return None
-    return best if _lasts(pieces, best) else None
+    return best if _in_both_halves(pieces, best) else None
 
 
-def _lasts(pieces: Pieces, tone: Tone) -> bool:
+def _in_both_halves(pieces: Pieces, tone: Tone) -> bool:
     """Whether a line takes of the squares in either half of the windows.
 
     What fades after turns has lines, too, where positions follow one another evenly.
@@ -121,7 +121,7 @@ def _lasts(pieces: Pieces, tone: Tone) -> bool:
     return bool(most > thresholds.LINE_LASTS * taken.sum())
 
 
-def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:
+def _coherent_part(pieces: Pieces, tone: Tone, moments: Moments) -> float:
     """Part of the energy at a line's frequency that one steady line takes.
 
     A line keeps amplitude and phase through all windows. A hand that trembles or a base
@@ -138,7 +138,7 @@ def _share(pieces: Pieces, tone: Tone, moments: Moments) -> float:
     return float(1 - (weight @ left - noise) / max(weight @ energy - noise, 1e-9))
 
 
-def _lessen(pieces: Pieces, tone: Tone) -> None:
+def _subtract(pieces: Pieces, tone: Tone) -> None:
     """Take a line out of the samples, in place: there are many of them."""
     response = tone.effect.response(pieces.x, tone.hz) @ tone.causes
     for samples, t, seen in zip(pieces.samples, pieces.times, response, strict=True):

@@ -44,7 +44,7 @@ def advice(
             " (axes, signs, units, angles), and diagnose again: until then no other"
             " effect can be found."
         )
-    yield from _look(unknown)
+    yield from _about_mismatches(unknown)
     if explanation.undecided:
         yield (
             "Record again with more positions, or longer ones: the simulation leaves"
@@ -117,7 +117,7 @@ def _none_in_reach(explanation: Explanation) -> str:
     return f"No position {extent(positions)} decides; what does: "
 
 
-def _look(unknown: Sequence[Unknown]) -> Iterator[str]:
+def _about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
     """What to do about mismatches without an effect, channels alike in one sentence."""
     alike: dict[tuple[str, str], list[str]] = {}
     for mystery in unknown:

@@ -36,14 +36,16 @@ def lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
 
 def _line(name: str, found: Sequence[FoundEffect]) -> EffectLine:
     largest = max(
-        found, key=lambda f: max(map(_clear, f.parameters.values()), default=0)
+        found, key=lambda f: max(map(_significance, f.parameters.values()), default=0)
     )
     often = f" ({len(found)} times)" if len(found) > 1 else ""
     what = name.replace("_", " ") + often
     if others := largest.aliases:
         what += f", or {' or '.join(o.replace('_', ' ') for o in others)}"
     sure = format_probability(min(f.probability for f in found))
-    return EffectLine(what, size(largest.parameters), sure, _does(largest))
+    return EffectLine(
+        what, size(largest.parameters), sure, _calibration_change(largest)
+    )
 
 
 def size(parameters: Mapping[str, Quantity]) -> str:
@@ -59,8 +61,8 @@ def size(parameters: Mapping[str, Quantity]) -> str:
     if not parameters:
         return "not known"
     told = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
-    name = max(told, key=lambda n: _clear(parameters[n]))
-    clear = sum(_clear(q) > 3 for n, q in parameters.items() if n != name)
+    name = max(told, key=lambda n: _significance(parameters[n]))
+    clear = sum(_significance(q) > 3 for n, q in parameters.items() if n != name)
     more = f" (+{clear})" if clear else ""
     called = "" if name in UNITS else name.removesuffix("_deg").removesuffix("_s")
     return f"{called} {pretty_quantity(parameters[name])}{more}".lstrip()
@@ -73,14 +75,14 @@ def pretty_quantity(quantity: Quantity) -> str:
     return text.removesuffix(unit) + pretty(unit) if unit != "1" else text
 
 
-def _clear(quantity: Quantity) -> float:
+def _significance(quantity: Quantity) -> float:
     """By how many standard deviations a value stands out; text not at all."""
     if isinstance(quantity.value, str) or not quantity.sigma:
         return 0.0
     return abs(quantity.value) / quantity.sigma
 
 
-def _does(found: FoundEffect) -> str:
+def _calibration_change(found: FoundEffect) -> str:
     """What it does to the calibration, in a few words."""
     effect = catalogue()[found.id]
     if isinstance(effect, Chain):
@@ -91,9 +93,9 @@ def _does(found: FoundEffect) -> str:
         return "nothing: subtracted"
     if not found.moves:
         return "nothing that shows"
-    name = max(found.moves, key=lambda n: _clear(found.moves[n]))
+    name = max(found.moves, key=lambda n: _significance(found.moves[n]))
     most = found.moves[name]
-    sigmas = _clear(most)
+    sigmas = _significance(most)
     if sigmas < thresholds.MOVED:
         return f"less than {thresholds.MOVED:g} σ"
     unit = pretty(most.unit)

@@ -71,7 +71,7 @@ def paragraph(
 
     `odd` are facts of the recording that cannot be.
     """
-    out = [_wrong(odd)] if odd else []
+    out = [_wrong_description(odd)] if odd else []
     if mismatch or not odd:
         out.append(_opening(verdict, effects, mismatch))
     out += [_how_random(f) for f in effects if _is_random(f)]
@@ -84,7 +84,7 @@ def paragraph(
     return " ".join([*filter(None, out), *notes])
 
 
-def _wrong(odd: Sequence[str]) -> str:
+def _wrong_description(odd: Sequence[str]) -> str:
     return f"The description of the recording is wrong: {'; '.join(odd)}."
 
 

@@ -96,7 +96,7 @@ class Dictionary(ColumnTable):
         self.common, self.turns = common, turns
         self.earth = self.attitude = -1
         self.always: list[Group] = [
-            *self._calibration(), *self._gravity(), *self._earth_anyhow(),
+            *self._calibration(), *self._gravity(), *self._unoriented_earth(),
             *self._attitudes(), *self._speeds(),
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
@@ -231,7 +231,7 @@ class Dictionary(ColumnTable):
         wide = np.hypot(off, EARTH_RATE / 3**0.5) / known
         yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed=1.0)
 
-    def _earth_anyhow(self) -> Iterator[Group]:
+    def _unoriented_earth(self) -> Iterator[Group]:
         """What the Earth may add wherever nobody knows the orientation.
 
         One position alone has it in its bias.

@@ -127,7 +127,7 @@ class MotionDictionary(Dictionary):
                 yield cause
         yield from of_no_effect(self)
 
-    def _earth_anyhow(self) -> Iterator[Group]:
+    def _unoriented_earth(self) -> Iterator[Group]:
         """The reference says whether it feels the Earth turn."""
         yield from ()
 

@@ -20,9 +20,10 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
     """Functions that no effect makes, on each channel."""
     sizes = typical(table)
     for c in table.observed.tolist():
-        if _goes_on(table):
+        if _has_times(table):
             groups = [
-                _course(table, CHANNELS[c], [c], sizes, span) for span in smooth.SPANS
+                _smooth_course(table, CHANNELS[c], [c], sizes, span)
+                for span in smooth.SPANS
             ]
             yield _cause("time", CHANNELS[c], groups)
         at = table.window(c)
@@ -38,12 +39,12 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
             yield _cause(
                 "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
             )
-    if _goes_on(table):
+    if _has_times(table):
         yield from _together(table, sizes)
     yield from _of_covariates(table, sizes)
 
 
-def _goes_on(table: ColumnTable) -> bool:
+def _has_times(table: ColumnTable) -> bool:
     """Whether rows have times: without, a course is a constant, as a bias is."""
     return bool(np.ptp(table.x.t) > 0)
 
@@ -60,11 +61,13 @@ def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
         some = [c for c in channels if c in table.observed]
         if len(some) < 2:
             continue
-        groups = [_course(table, part, some, sizes, span) for span in smooth.SPANS]
+        groups = [
+            _smooth_course(table, part, some, sizes, span) for span in smooth.SPANS
+        ]
         yield _cause("time", part, groups)
 
 
-def _course(
+def _smooth_course(
     table: ColumnTable, part: str, channels: Sequence[int], sizes: Array, span: float
 ) -> Group:
     """A smooth course in time on some channels."""
@@ -77,7 +80,7 @@ def _course(
 def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
     """Functions of what is known of a row beside the time."""
     for covariate, of in smooth.covariates(table.span).items():
-        if not _shows(table, covariate):
+        if not _covers(table, covariate):
             continue
         width = of(table.x).shape[1]
         first = table.course(covariate, of, width, False)
@@ -95,14 +98,14 @@ def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
     return Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown")
 
 
-def _shows(table: ColumnTable, covariate: str) -> bool:
+def _covers(table: ColumnTable, covariate: str) -> bool:
     x = table.x
     if covariate in ("alpha", "beta", "joints"):
         return bool(x.oriented.all()) and len(table.held) > 3
     if covariate == "temperature":
         return x.warms
     if covariate == "force and time":
-        return len(table.held) > FEW and _goes_on(table)
+        return len(table.held) > FEW and _has_times(table)
     if covariate == "since turn":
         return bool(np.isfinite(x.since_turn).all())
     return len(table.held) > 3

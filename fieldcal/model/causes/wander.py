@@ -84,7 +84,7 @@ class Wander:
 
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""
-        q, a, count = self._of(channel)
+        q, a, count = self._of_channel(channel)
         walks: Array = q**2 * _left_of_walk(self.length, length, count)
         if not a:
             return walks
@@ -98,7 +98,7 @@ class Wander:
         y = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
         out, diagonal = np.zeros((6, *y.shape)), np.s_[:: len(t) + 1]
         for c in range(6):
-            q, a, count = self._of(c)
+            q, a, count = self._of_channel(c)
             alone = self.left(length, c)
             if not alone.any():
                 continue
@@ -112,7 +112,7 @@ class Wander:
             out[c].flat[diagonal] = alone
         return out
 
-    def _of(self, channel: int) -> tuple[float, float, int]:
+    def _of_channel(self, channel: int) -> tuple[float, float, int]:
         """Walk and flicker of a channel as likely as each is, and its cosines."""
         share = float(self.share[channel])
         q = float(self.speed[channel]) * (1 - share) ** 0.5

@@ -162,7 +162,7 @@ def _walk(rows: Rows) -> tuple[Array, float]:
 
 def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
     """Of one channel in the later halves of the windows; nothing of too few."""
-    at = _later(rows, 2 * lag)
+    at = _later_half(rows, 2 * lag)
     y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
     known = rows.used[:, c]
     at = at[known[at] & known[at + lag] & known[at + 2 * lag]]
@@ -191,7 +191,7 @@ def _squared_ln(x: Array) -> Array:
     return out
 
 
-def _later(rows: Rows, ahead: int) -> Index:
+def _later_half(rows: Rows, ahead: int) -> Index:
     """Rows of the later half of each window that have another one so far ahead."""
     position = rows.x.position
     near = np.flatnonzero(position[ahead:] == position[:-ahead])

@@ -108,11 +108,11 @@ class Bands:
         apart = np.diff(self.place[1:])
         both = _smooth(np.log(np.maximum(even, LEAST)), free.sum(axis=0), apart, None)
         return [
-            self._to_the_mean(_smooth(one, some, apart, both + by))
+            self._with_mean_level(_smooth(one, some, apart, both + by))
             for one, some, by in zip(raw, free, loud, strict=True)
         ]
 
-    def _to_the_mean(self, level: Array) -> Array:
+    def _with_mean_level(self, level: Array) -> Array:
         """Levels with that of the mean before them."""
         near = self.place[1:] < self.place[1] + OVER
         slope = 0.0

@@ -69,11 +69,11 @@ def rows_of(source: RowSource) -> Rows:
     turned, pushed = np.zeros((len(held), 3)), np.zeros(len(held))
     for i, (a, b) in enumerate(bound):
         white, lasts = one.sd[i], float(one.length[i])
-        turned[i] = _to_and_fro(block.gyr[a:b], lasts, white[3:])
+        turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
         up = one.x.f[i] / np.linalg.norm(one.x.f[i])
         along = (block.acc[a:b] / unit) @ up
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
-        pushed[i] = _to_and_fro(along[:, None], lasts, spread)[0]
+        pushed[i] = _tremor_rms(along[:, None], lasts, spread)[0]
     slow = np.sqrt(2 * (angle**2 + turned**2)) / one.length[:, None]  # (1)
     one.sd[:, 3:] = np.hypot(one.sd[:, 3:], slow)
     fast = np.sqrt(2.0) * pushed / one.length  # (1)
@@ -100,7 +100,7 @@ def _beside_tremor(
     return beside
 
 
-def _to_and_fro(values: Array, length: float, white: Array) -> Array:
+def _tremor_rms(values: Array, length: float, white: Array) -> Array:
     """What trembles sums up to an angle or a speed: its rms about a line, (k,).
 
     Parameters

@@ -138,7 +138,7 @@ class MotionRows:
 
     def motion(self, response: Response, order: int = 0) -> Array:
         """What a triad took the motion for, or a derivative, (n, 6)."""
-        values = self._of(response.sensed, response.late, order)
+        values = self._means_of(response.sensed, response.late, order)
         if order == 0:
             values += np.hstack([self.alignment.unseen[p] @ self._turn for p in TRIADS])
         return values
@@ -151,7 +151,7 @@ class MotionRows:
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
             f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
-            slope=self._of(response.slower, response.late, 1),
+            slope=self._means_of(response.slower, response.late, 1),
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=warming,
             heating=np.gradient(warming, t), variance=np.zeros((n, 3)),
@@ -165,7 +165,7 @@ class MotionRows:
     def _turn(self) -> Array:
         return self.alignment.rotation.T
 
-    def _of(self, reference: Reference, late: float, order: int) -> Array:
+    def _means_of(self, reference: Reference, late: float, order: int) -> Array:
         """Means over the rows of a reference as it was, in device axes, (n, 6)."""
         s = self.alignment.reference_time(self.t.ravel() - late)
         means = reference.at(s, order).reshape(*self.t.shape, 6).mean(axis=1)

@@ -71,10 +71,10 @@ class Reference:
         self.start, self.end = float(self.t[0]), float(self.t[-1])
         self.splines = [
             (channels, CubicSpline(block.t[known], six[np.ix_(known, channels)]))
-            for known, channels in self._alike(np.isfinite(six))
+            for known, channels in self._by_missing_samples(np.isfinite(six))
         ]
 
-    def _alike(
+    def _by_missing_samples(
         self, finite: NDArray[np.bool_]
     ) -> Iterator[tuple[NDArray[np.bool_], Index]]:
         """Samples (n,), and the channels that it has of which these are known."""

@@ -35,13 +35,13 @@ def arrivals(block: Block, about: Description, noise: Array) -> Array:
             held = np.concatenate(
                 [triad[first:last].mean(axis=0) for triad in (block.acc, block.gyr)]
             )
-            moved = _moved(block[before:first].six, held, noise, m)
+            moved = _last_motion(block[before:first].six, held, noise, m)
             out[p] = block.t[before + moved if before else 0]
             before = int(last)
     return out
 
 
-def _moved(gap: Array, held: Array, noise: Array, m: int) -> int:
+def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
     """Samples of a gap up to the last sign of motion; `held` is the window's mean."""
     whole = len(gap) // m
     if not whole:

@@ -96,7 +96,7 @@ def _compared(
     for i, (a, b) in enumerate(windows):
         out[i] = np.concatenate([short_lag(t[a:b]) for t in (block.acc, block.gyr)])
     grain = grain_of(block, windows)  # outputs may stay on one step all through some
-    stands = _stands(out, grain)
+    stands = _never_changes(out, grain)
     out[stands] = np.nan
     known = np.maximum(np.isfinite(out).sum(axis=0), 1)
     first = np.sort(out, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
@@ -114,7 +114,7 @@ def _compared(
     return ChannelNoise(white, quick), more, loud
 
 
-def _stands(levels: Array, grain: Array) -> NDArray[np.bool_]:
+def _never_changes(levels: Array, grain: Array) -> NDArray[np.bool_]:
     """Windows in which an output never changes, though in others noise exceeds a step.
 
     On its rail or stuck it tells nothing of the noise.

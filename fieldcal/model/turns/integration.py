@@ -124,21 +124,21 @@ def integrated(leg: Leg, steps: Steps, rid: Array) -> Integrated:
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     ends = [x.w[x.position == p].mean(axis=0) for p in leg.pair]
     earth = (1 - part) * ends[0] + part * ends[1]
-    rate = _undone(leg, t, _between(t, steps.at, rid))
+    rate = _angular_rates(leg, t, _interpolated(t, steps.at, rid))
     for _ in range(2):  # the Earth's rate turns with the device, once it is known how
         angle = small_turns(t, rate - earth, edge) / leg.source.pace
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
         attitude, done = carry(angle), size / size[-1]
-        earth = _between(t, steps.at, between(attitude, done, *ends))
+        earth = _interpolated(t, steps.at, between(attitude, done, *ends))
     return Integrated(rate, earth, attitude, done)
 
 
-def _between(t: Array, at: Array, values: Array) -> Array:
+def _interpolated(t: Array, at: Array, values: Array) -> Array:
     """Columns of values given at some instants, straight between them, (n, k)."""
     return np.column_stack([np.interp(t, at, column) for column in values.T])
 
 
-def _undone(leg: Leg, t: Array, rid: Array) -> Array:
+def _angular_rates(leg: Leg, t: Array, rid: Array) -> Array:
     """Angular rate at some samples, (n, 3) rad/s."""
     block = leg.source.block
     first, n = int(np.searchsorted(block.t, t[0])), len(t)

@@ -54,13 +54,13 @@ def moving(
     before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
     after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]
     margin = round(MARGIN_S * rate)
-    start = first + int(at[0]) - _touched(before, noise) - margin
-    end = first + int(at[-1]) + m + _touched(after[::-1], noise) + margin
+    start = first + int(at[0]) - _moving_at_end(before, noise) - margin
+    end = first + int(at[-1]) + m + _moving_at_end(after[::-1], noise) + margin
     start, end = max(start, first), min(end, last)
     return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
 
 
-def _touched(off: Array, noise: Array) -> int:
+def _moving_at_end(off: Array, noise: Array) -> int:
     """Samples from where the angle turned stands out of the noise, to the end.
 
     What is turned too slowly to be seen at once is seen by its sum.

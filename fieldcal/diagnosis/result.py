@@ -1,4 +1,4 @@
-"""What a diagnosis says: the content of diagnosis.json."""
+"""The content of diagnosis.json."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
-"""How well the means of windows agree with a given set.
+"""Agreement of the window means with a given set.
 
     S = D + Phi_r L Phi_r^T,   chi2 = min_x (y - Phi x)^T S^-1 (y - Phi x)
     K = (S + Phi V Phi^T)^-1,  r_p = K_pp^-1 (K y)_p                               (1)
 
-D is the noise of the means and rounding, Phi_r what is random with its sizes L (how
-angles were set, the turns of a position whose orientation nobody knows), Phi what is
-estimated, V its size before; for r_p what windows wander by is in D. chi2 is that of
-the stated noise, and of windows that are not certainly bad; r_p is the residual of a
-window by a fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
+D is the covariance of noise and rounding of the means. Phi_r are the columns of random
+errors with prior covariance L (errors of set angles, rotations of positions with
+unknown orientation), Phi the columns of the estimated parameters with prior covariance
+V. For r_p, D also includes the instability from window to window. chi2 uses the stated
+noise, and the windows that are not certainly bad; r_p is the residual of a window in a
+fit without it. Source: Rasmussen and Williams 2006, 5.4.2, for (1).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is assumed when a calibration is asked for: the method, and with it the set."""
+"""Defaults of a requested calibration: the method, and with it the set."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """The parameters of a set: the mean over all explanations, and which are determined.
 
-What the recording shows to be there beside what was asked for may be one explanation or
-another; each gives its own estimate, and the calibration is their mean with what they
-differ by in its covariance, (1) of `shown`. Biases that change are as they are at the
-end of the recording, (2) of `shown`.
+The recording may show effects in addition to the requested parameters, with several
+possible explanations. Each explanation gives an estimate. The calibration is their
+mean, and its covariance includes their differences, (1) of `shown`. Biases that change
+are stated for the end of the recording, (2) of `shown`.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""What a unit borrows from its lot, unless it is odd.
+"""Prior of a unit from its production lot, unless the unit is an outlier.
 
 The lot's mean and covariance are rows of the model (`averaging.known_rows`), so that
-estimate, tilt and bad windows are found with them. A unit need not be as its lot is,
-(1) of `calibration.lot_prior`: with x, C what the unit says on its own, m the lot's
-mean, and of each hypothesis h the spread P_h,
+estimate, tilt and bad windows are found with them. A unit may differ from its lot, (1)
+of `calibration.lot_prior`. With x, C the estimate and covariance of the unit alone, m
+the lot's mean, and P_h the covariance of the units under hypothesis h,
 
     C_h = (C^-1 + P_h^-1)^-1,    x_h = m + C_h C^-1 (x - m)                        (1)
     ln Z_h = [(x_h - m)^T C_h^-1 (x_h - m) + ln |C_h| - ln |P_h|] / 2 + const       (2)
 
-and the answer is their mixture, as everywhere. A unit that is likelier odd than not
-has nothing from its lot at all. Source: Box and Tiao, Biometrika 55 (1968) 119.
+and the result is the mixture of the hypotheses. If a unit is more likely an outlier
+than not, the lot is not used. Source: Box and Tiao, Biometrika 55 (1968) 119.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a printed formula gives: parameters that are linear in the means."""
+"""Result of a printed formula: parameters that are linear in the means."""
 
 from __future__ import annotations
 

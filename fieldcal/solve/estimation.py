@@ -1,7 +1,7 @@
-"""A given set fitted to rows, and what it then says of the parameters.
+"""A given set fitted to rows, and the parameters that follow.
 
-The set is fitted until it has settled (`settling`); there the answer is taken, averaged
-over what may be beside what was asked for (`averaging`).
+The set is fitted until it converges (`settling`). The result there is averaged over the
+effects that may exist in addition to the requested parameters (`averaging`).
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
-"""The set that `solve` is given: what a device is to be described by.
+"""The given set of `solve`: the parameters that describe the device.
 
-It is a set of the one model (`fieldcal.model`) like any other, only that nobody
-searches for it. What is estimated has a size so wide that it decides nothing; how level
-the base is, how well angles are set and what is not known of the Earth's rate have the
-size that is said of them. How well an angle is set has two parts of equal variance: a
-fixture repeats one (the same detent is off by the same each time), the other is new in
-each position.
+It is a set of the model (`fieldcal.model`) that is given instead of searched for. The
+priors of the estimated parameters are so wide that they do not matter. The tilt of the
+base, the errors of set angles, and the uncertainty of the Earth's rate have the stated
+sizes. The error of an angle has two parts of equal variance: one is repeated by the
+fixture each time the same detent is set, the other is new in each position.
 """
 
 from __future__ import annotations

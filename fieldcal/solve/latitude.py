@@ -1,14 +1,14 @@
-"""The latitude that is stated, against the Earth's rate that gyroscopes show.
+"""The stated latitude, compared with the Earth's rate that the gyroscopes measure.
 
-Its part about the vertical goes round with the device's turns as gravity does, so that
-it tells itself from the biases wherever the positions lean far enough:
+The vertical part of the Earth's rate changes with the attitude as gravity does. If the
+positions are inclined enough, it can therefore be distinguished from the biases:
 
     U sin(phi) = U sin(stated) - d,    d ~ N(0, U^2)                               (1)
 
-The site of the other hemisphere is the mistake that nothing else shows: gravity is the
-same there. Whether the latitude is wrong is asked as of any cause, by the evidence of
-the set with d and without. A simulated device may have no Earth's rate at all: that is
-a third possibility, with a fit of its own.
+A latitude of the wrong sign shows in nothing else, since gravity is the same on both
+hemispheres. Whether the latitude is wrong is decided as for any cause, by the evidence
+of the set with d and without it. A simulated device may have no Earth's rate at all;
+this is a third hypothesis, with its own fit.
 """
 
 from __future__ import annotations

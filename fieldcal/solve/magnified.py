@@ -1,15 +1,15 @@
-"""Cross-coupling that nobody asked for, and what unfavourable positions make of it.
+"""Effect of cross-coupling that was not estimated, in unfavourable positions.
 
-A set without cross-coupling takes the axes as square. What each coefficient k that the
-device has all the same moves the parameters by, and what of k the rows would show, are
+A set without cross-coupling assumes orthogonal axes. If the device has a coefficient k,
+it moves the parameters by D k, and the rows would determine k to a variance of C:
 
     D = P_tA Phi_A^T R^-1 Phi_k,    C = (1 / T^2 + M_kk)^-1                        (1)
 
-with A the columns of the set, P their covariance, T a usual size and M_kk what the rows
-say of k beside the set. So not knowing k adds D C D^T to the covariance of the
-parameters. Where each axis is held up and down, as much of gravity as k is large moves
-a bias. Positions that are few or alike may magnify it many times, and then the stated
-uncertainties say nothing of what the device may be off by.
+with A the columns of the set, P their covariance, T the typical size of k, and M_kk the
+information of the rows on k with the set eliminated. The unknown k adds D C D^T to the
+covariance of the parameters. If each axis is held up and down, a bias moves by k g. Few
+or similar positions may magnify this many times; the stated uncertainties, which do not
+include it, are then far too small.
 """
 
 from __future__ import annotations

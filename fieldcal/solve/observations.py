@@ -1,4 +1,4 @@
-"""What every estimator is given: window averages and where they were taken.
+"""Input of every estimator: window averages and the positions they were taken in.
 
 Means and covariances are in device axes, in `samples.CHANNELS` order; positions and
 angles are in procedure axes; ``mounting`` is P with procedure = P device, so that a

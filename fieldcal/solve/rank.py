@@ -1,4 +1,4 @@
-"""What a design determines, and which further positions would determine the rest.
+"""Parameters that a design determines, and further positions for the other ones.
 
 Columns are scaled to length one, so that the rank does not depend on units; directions
 whose singular value is below `RCOND` of the largest are not determined, nor is a

@@ -1,18 +1,18 @@
-"""What wrong angles would do to a result without being noticed.
+"""Effect of wrong angles on a result, and how well they would be noticed.
 
-The angles of a set that were stated are off by u, which nobody meant: a detent is worn,
-a gauge is long, two positions are exchanged. With V the variance that is stated of the
-angles, P the covariance of the estimate, a for the angles and t for a parameter,
+The true angles differ from the stated ones by u: a detent is worn, a gauge is too long,
+two positions are exchanged. With V the stated covariance of the angles, P the
+covariance of the estimate, index a for the angles and t for a parameter,
 
     l^2 = u^T (V^-1 - V^-1 P_aa V^-1) u,     d t = -P_ta V^-1 u                    (1)
 
-l^2 is the non-centrality of chi-squared, by which the mistake shows, and d t what it
-moves a parameter by. Source: W. Baarda, A testing procedure for use in geodetic
+l^2 is the non-centrality of chi-squared, by which the mistake is noticed, and d t the
+change of the parameter. Source: W. Baarda, A testing procedure for use in geodetic
 networks, 1968: internal and external reliability.
 
-Mistakes are looked at one kind at a time, with the largest size that hands make: a
-position by itself, an angle wherever it is repeated, all angles of a joint in
-proportion.
+Three kinds of mistakes are considered, each with the largest size that operators and
+fixtures make: one position, one angle in all positions that repeat it, and all angles
+of a joint in proportion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A given set, estimated, as a calibration with what the user must know."""
+"""An estimated set as a calibration, with its warnings."""
 
 from __future__ import annotations
 

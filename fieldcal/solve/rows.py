@@ -1,7 +1,7 @@
-"""Rows of windows that are known by their means alone, one for each.
+"""Rows of windows of which only the means are known, one row for each.
 
-A recording has several rows for each window (`model.reduce`); of a table of means, or
-while a procedure is under way, the means with their covariances are all there is.
+A recording has several rows for each window (`model.reduce`). A table of means, and a
+procedure that is still running, have only the means and their covariances.
 """
 
 from __future__ import annotations

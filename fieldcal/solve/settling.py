@@ -1,7 +1,7 @@
-"""A given set fitted to rows: relinearised until it stays, bad windows left out.
+"""A given set fitted to rows: linearised until it converges, without bad windows.
 
 The state is moved to the estimate of the set (`model.inference`), turns between windows
-are followed about it, and the likeliest explanation is taken there (`mixture`).
+are integrated with this state, and the most probable explanation is taken (`mixture`).
 """
 
 from __future__ import annotations

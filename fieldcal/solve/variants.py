@@ -1,11 +1,11 @@
-"""An explanation on all axes and in all shapes that its causes may have.
+"""Variants of an explanation: on other axes, and with other shapes, of its causes.
 
-The search names the axes that show a cause beyond doubt and the shape that fits best;
-what other axes have of it, and where in time, is as uncertain as anything. So an
-explanation is the mean over its variants, each weighed by its evidence over all sizes,
-the other causes as they are ((3) of `model.evidence`). There are hundreds, and of two
-causes the product: points that are spread evenly over the probabilities of each stand
-for all. Source: Niederreiter 1992 for the points.
+The search names the axes that show a cause beyond doubt, and the shape that fits best.
+Whether other axes have it too, and its time constant or instant, remain uncertain. An
+explanation is therefore the mean over its variants, each weighted by its evidence over
+all sizes with the other causes unchanged ((3) of `model.evidence`). There are hundreds,
+and for two causes their product; a sample that is evenly spread over the probabilities
+of each represents all. Source: Niederreiter 1992 for the points.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """From samples to averages: mean, honest standard error, stillness, disturbance.
 
-Here is the one measurement of white noise and rounding that everything uses. Nothing
-here knows positions, parameters or files.
+This room has the only measurement of white noise and rounding. It knows no positions,
+parameters or files.
 """
 
 from fieldcal.windows.limits import StillnessLimits

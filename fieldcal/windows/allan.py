@@ -2,9 +2,9 @@
 
     sigma^2(tau) = <(y_k+1 - y_k)^2> / 2          y: means over tau, overlapping
 
-At tau it is the standard error of a mean over tau as far as the next mean would show
-it: it falls as 1/sqrt(tau) with white noise, stays level with flicker (the bias
-instability), and rises with random walk, where more time makes a mean worse. Device
+It is the standard error of a mean over tau, as estimated from the next mean. It falls
+as 1/sqrt(tau) for white noise, is constant for flicker (the bias instability), and
+rises for a random walk, where a longer mean is a worse one. Device
 axes, SI. Source: IEEE 952-1997 annex C; intervals by Greenhall and Riley 2003. The sums
 are allantools', which fieldcal installs as its extra ``allan``.
 """

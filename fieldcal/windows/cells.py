@@ -6,10 +6,9 @@ origin, and the sum D_c of m_c squared differences of successive values. From th
     y_c = S_c / n_c                    mean of the cell
     q_c = D_c / (2 m_c)                variance of the short-lag noise in the cell
 
-are all that the mean, its error and the stillness of a window are judged by, so that
-the cost of judging does not depend on the sample rate and the result does not depend
-on how the samples were cut into blocks. A nan is a missing value: it enters neither
-sum. Device axes, SI.
+follow the mean of a window, its error and the test for rest. Their cost therefore does
+not depend on the sample rate, and their result does not depend on how the samples were
+cut into blocks. A nan is a missing value and enters neither sum. Device axes, SI.
 """
 
 from __future__ import annotations

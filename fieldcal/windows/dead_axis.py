@@ -1,7 +1,7 @@
-"""An axis that tells nothing all through a recording, and so its sensor with it.
+"""Axes without a signal in the whole recording; their sensor cannot be used.
 
-A wire that is off, a column of zeros, a device without gyroscopes that sends zeros in
-their place: the force is known by three axes alone, and so is a turn.
+Examples are a broken wire, a column of zeros, and a device without gyroscopes that
+sends zeros instead. A force or a turn needs all three axes of its sensor.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class DeadSensor(NamedTuple):
     Attributes
     ----------
     channels : its three, in `CHANNELS`
-    axes : those that tell nothing, in `CHANNELS`
+    axes : those without a signal, in `CHANNELS`
     says : a sentence for the user
 
     """
@@ -43,15 +43,15 @@ class DeadSensor(NamedTuple):
 
     @property
     def absent(self) -> bool:
-        """Whether none of its axes tells anything."""
+        """Whether none of its axes has a signal."""
         return len(self.axes) == len("xyz")
 
 
 def dead_sensors(six: Array) -> list[DeadSensor]:
-    """Sensors of which an axis tells nothing; not those that were not recorded.
+    """Sensors with an axis without a signal; not those that were not recorded.
 
-    It is missing, or never changes while the axes beside it are noisier than their
-    steps; where these are coarse as well, it may just never be turned.
+    Such an axis is missing, or it never changes while the other axes are noisier than
+    their steps. If these are as coarse, it may just never have been turned.
 
     Parameters
     ----------
@@ -74,10 +74,10 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
 
 
 def broken(six: Array) -> list[str]:
-    """Sentences about axes that are recorded, and never change as those beside them do.
+    """Sentences about recorded axes that never change while the other axes do.
 
-    A column that is missing is a choice of whoever recorded; a value that stands still
-    for ever is a wire or a sensor that is broken, and no device to fly with.
+    A missing column may be intended. A value that never changes means that a wire or a
+    sensor is broken.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def broken(six: Array) -> list[str]:
 
 
 def _dead(triad: Array) -> list[int]:
-    """Axes of a sensor that tell nothing; none of one that was not recorded."""
+    """Axes of a sensor without a signal; none if the sensor was not recorded."""
     shares = np.array([_changes(axis) for axis in triad.T])
     if np.isnan(shares).all():
         return []
@@ -119,9 +119,9 @@ def _changes(values: Array) -> float:
 
 
 def without_dead(six: Array) -> Array:
-    """Samples (n, 6) with nan in place of axes that tell nothing.
+    """Samples (n, 6) with nan in place of axes without a signal.
 
-    The others of their sensor still say whether the device is at rest.
+    The other axes of their sensor still show whether the device is at rest.
     """
     dead = [axis for sensor in dead_sensors(six) for axis in sensor.axes]
     if not dead:

@@ -1,4 +1,4 @@
-"""What disturbs a window: a push, a step, a shake, each over its usual size by noise.
+"""Disturbances of a window: push, step and shake, relative to their size by noise.
 
 y_i are the means of m cells, u_k,i their running means over 2^k cells, s_k and a_k the
 noise of module `quiet`, l_i a robust straight line through y.
@@ -7,11 +7,11 @@ noise of module `quiet`, l_i a robust straight line through y.
     step     z_k,i = |u_k,i+2^k - u_k,i| / (sqrt(2) a_k)                         (2)
     shake    z_k,i = sqrt(2^k) (mean of 2^k of q^(1/3) - median) / spread        (3)
 
-The line lets the slow drift of a device that warms up pass: it widens the error of the
-mean but is no disturbance. A step tilts the line and so hides from (1), but not from
-(2), for which such a drift is too slow. What shakes and comes back to where it was
-shows in the short-lag noise q of the cells, whose cube root is close to normal (Wilson
-and Hilferty 1931). Apart from these, a channel may be stuck at one value.
+The line removes the slow drift of a device that warms up, which increases the error of
+the mean but is no disturbance. A step tilts the line and may not show in (1), but it
+does in (2), where such a drift does not. A vibration after which the device is where it
+was shows in the short-lag noise q of the cells, whose cube root is nearly normal
+(Wilson and Hilferty 1931). A channel may also be stuck at one value.
 """
 
 from __future__ import annotations

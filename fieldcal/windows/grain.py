@@ -1,13 +1,13 @@
-"""What a device rounds its outputs to, where it says so, and what that does to a mean.
+"""Rounding of the outputs as the device states it, and the error of a mean from it.
 
-A mean of values rounded to a step q is off as `rounding` says. Values that are cut
-toward zero and put in the middle of what they may have been, k + sign(k)/2 and 0, are
-off besides, around zero, where two steps have become one of twice the width:
+The error of a mean of values rounded to a step q is that of `rounding`. Values that are
+rounded toward zero, and then shifted to the middle of their interval, k + sign(k)/2 and
+0, have a further error around zero, where the interval is two steps wide:
 
     d(x) = -1/2 for 0 < x < 1, 1/2 for -1 < x < 0, 0 elsewhere                   (1)
     D(v, s) = E d(v + s n) = (2 P(0) - P(1) - P(-1)) / 2,  P(a) = Phi((a - v)/s) (2)
 
-The mean of the values is v + D, and v is known from it to about a step, so
+The mean of the values is v + D. It determines v to about a step, so the variance
 
     var = mean of D(u, s)^2 over |u - v| < 1                                     (3)
 
@@ -26,10 +26,10 @@ from fieldcal.core.samples import Array, Grain
 from fieldcal.windows import rounding
 
 AROUND = np.linspace(-1.0, 1.0, 21)
-"""Where the true mean may lie about the mean of what was cut, steps."""
+"""Possible differences of the true mean from the mean of the values, steps."""
 
 SHARP = 1e-3
-"""Least noise, steps: what does not vary at all falls on one side of an edge."""
+"""Least noise, steps: an output without noise is always on the same side of an edge."""
 
 ZERO = 2.0
 """Means below this are around zero, steps."""
@@ -61,9 +61,9 @@ def variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
 
 
 def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
-    """Largest jump between neighbouring values where noise does not hide it, (6,).
+    """Largest jump between neighbouring values that noise does not hide, (6,).
 
-    0 where it does, or where the steps are not known; as for `variance`.
+    0 if noise hides it, or if the steps are not known; arguments as for `variance`.
     """
     q = grain.step
     fine = rounding.visible_steps(q, sampled)
@@ -85,6 +85,6 @@ def _around_zero(mean: Array, noise: Array) -> Array:
 
 
 def _offset_of_cut_values(v: float, s: float) -> float:
-    """By how much the mean of what was cut is off, (2), in steps."""
+    """Error of the mean of values rounded toward zero, (2), in steps."""
     below, at, above = (0.5 * (1 + erf((a - v) / (s * 2**0.5))) for a in (-1, 0, 1))
     return (2 * at - above - below) / 2

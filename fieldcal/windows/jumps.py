@@ -1,13 +1,13 @@
-"""Positions of a recording that holds rests alone: its rows jump from one to the next.
+"""Positions of a recording without turns: its rows jump from one rest to the next.
 
     d_i = |median(x_i .. x_(i+4)) - median(x_(i-5) .. x_(i-1))| > 8 s               (1)
 
-s is the noise of a row. A single wild row moves no median. At a jump between two rows
-(1) holds at five rows, or six with a wild one beside it; at a turn that was recorded it
-holds at more. At rest the first and the last median of a position differ by less, and
-its rows differ as much as those of another: who walks about meanwhile is told by that.
-Whoever presses a key at each position, and takes a hundred rows then, leaves such a
-recording.
+s is the noise of a row. A single outlier does not change a median. At a jump between
+two rows (1) is true at five rows, or at six with an outlier next to it; at a recorded
+turn it is true at more. In a rest the first and the last median differ by less than a
+jump, and its rows scatter as much as those of other rests, which a moving device does
+not. Such a recording results if the operator presses a key at each position and a
+hundred rows are then taken.
 """
 
 from __future__ import annotations

@@ -9,15 +9,15 @@
     var  = sum over g of p(g | I) * Q / (n - 1) * v(g) / m                       (5)
 
 The noise is white, low-passed with the corner c, flicker with the knee k, or a random
-walk with the knee r, Hz. How likely each shape is, the data say: Whittle's likelihood
-with the level w integrated out (2). The variance (5) is that of the mean averaged over
-the shapes, so what the window is too short to know widens it. (3) and (4) are the Allan
-variance at the length T of the window in units of white noise: the error stated is
-that by which the mean of the next window would differ, over sqrt(2). For white and
-low-passed noise that is the standard error. Flicker and random walk also wander at
-frequencies below 1/T, and nothing in the window shows that part; a knee below about
-3/T hides in the white noise and is seen by several windows of a device together, which
-is why the shapes learnt from one window can be handed to the next.
+walk with the knee r, Hz. The probability of each shape follows from Whittle's
+likelihood with the level w integrated out (2). The variance (5) of the mean is averaged
+over the shapes, so it is larger if the window is too short to distinguish them. (3) and
+(4) are the Allan variance at the length T of the window in units of white noise: the
+stated error is the difference to the mean of the next window, over sqrt(2). For white
+and low-passed noise this is the standard error. Flicker and random walk also vary at
+frequencies below 1/T, which the window does not show. A knee below about 3/T is hidden
+by the white noise of one window, but several windows of a device show it together; the
+shapes learnt from one window can therefore be passed to the next.
 
 Sources: Whittle 1953; IEEE 952-1997 annex C (Allan variances).
 """

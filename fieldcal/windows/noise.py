@@ -4,23 +4,21 @@ With means over m consecutive samples, the Hadamard variance times m,
 
     s^2(m) = m <(mean_{k+2} - 2 mean_{k+1} + mean_k)^2> / 6                      (1)
 
-is the variance of one sample for white noise, whatever m and however the mean drifts.
-What is wanted is the level that a mean over a second obeys; shorter m are pooled in as
-long as they agree with it, so that filtered or otherwise coloured outputs are not taken
-for quieter ones. The mean of squares leaves out the largest tenth, so that a few
-disturbed spots do not count.
-Biases that walk by q sqrt(t) add a term in m^2, and where the levels rise like that,
-white noise is what they rise from. Of one sample to the next (m = 1) the level is that
-of the quickest noise alone. What shakes for long must not be left out where one asks
-which window is louder: there the short-lag noise is
+is the variance of one sample for white noise, for any m and any linear drift. The
+result is the level that a mean over a second obeys. Shorter m are included if they
+agree with it, so that filtered or otherwise coloured outputs do not appear quieter. The
+mean of squares leaves out the largest tenth, and with it short disturbances. Biases
+with a random walk of q sqrt(t) add a term in m^2; if the levels rise like that, the
+white noise is the level without this term. At m = 1 the level is that of the fastest
+noise. To compare the noise of windows, long vibration must not be left out; there the
+short-lag noise is
 
     s^2 = <(x_{k+1} - x_k)^2> / 2                                                (2)
 
-What turns to and fro, as a hand that trembles, has an s^2(m) that rises above that of
-one sample to the next and falls again, in the end as 1/m: how far an angle has come in
-a time does not grow with it. Noise of a sensor, whatever its colour, does not fall. The
-noise beside it is that of fourth differences, of which what is slower than a tenth of
-the samples a second has next to nothing,
+A rotation to and fro, such as hand tremor, has an s^2(m) that rises above that at m = 1
+and falls again, finally as 1/m, since its angle stays bounded. Noise of a sensor does
+not fall. The noise of the sensor is then that of fourth differences, which contain
+almost nothing of motion slower than a tenth of the sample rate,
 
     s^2 = <(x_{k+2} - 4 x_{k+1} + 6 x_k - 4 x_{k-1} + x_{k-2})^2> / 70            (3)
 

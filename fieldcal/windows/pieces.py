@@ -1,13 +1,13 @@
-"""A window in pieces: what was calm before a disturbance is kept.
+"""A window in pieces: the undisturbed part before a disturbance is kept.
 
-A gust, a step beside the fixture or a moment without samples costs what it spoilt and
-no more, if the device lies afterwards as it lay before. Pieces agree if their means do,
+A gust, a step near the fixture or a gap in the samples costs only the disturbed part,
+if the device has the same attitude afterwards. Pieces agree if their means do,
 
     |u_k - v_k| <= AGREES sqrt(s_k^2 + t_k^2)      on each channel k                (1)
 
-with the standard errors s and t of the pieces. Then they are one window, whose mean and
-error are those of all cells. If they do not, what was before is given up: no mean of
-two attitudes is the mean of either.
+with the standard errors s and t of the pieces. They are then one window, whose mean and
+error are those of all cells. If they do not agree, the earlier pieces are discarded,
+since a mean over two attitudes is wrong for both.
 """
 
 from __future__ import annotations

@@ -6,11 +6,11 @@
     a_k^2 = A / 2^k + B                    beyond the longest level measured     (2)
     s_k^2 = sum over j >= k of a_j^2 / 2                                         (3)
 
-(1) is a robust Allan deviation. Differences of neighbours see nothing of a step or a
-lean but its edge, so it is the device's own noise even in a window that was disturbed.
-Too few of them fit into a window for the longest levels, which (2) continues as white
-noise and flicker. (3) is the spread of u_k about the mean for any stationary noise
-(Haar analysis of variance); for white noise s_k = a_k.
+(1) is a robust Allan deviation. Only few of the differences contain the edge of a step
+or a push, so it is the noise of the device also in a disturbed window. For the longest
+levels a window has too few differences; (2) extrapolates with white noise and flicker.
+(3) is the spread of u_k about the mean for any stationary noise (Haar analysis of
+variance); for white noise s_k = a_k.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Where cells of a recording are at rest, be it on a table or in a hand.
+"""Which cells of a recording are at rest, on a table or in a hand.
 
     r_i = max over channels of sd(y over 1 s about i) / quietest tenth of them     (1)
 
-y are cell means. Rest and turns make two heaps of log r; the valley between them (Otsu
-1979) tells one from the other. Each run is then held to its own noise and to the level
-of the gyroscopes at rest. What happens during a pause of the recording nobody knows: a
-run ends there.
+y are cell means. log r has two clusters, rest and turns, which are split by a threshold
+(Otsu 1979). Each run of cells below it is then compared with its own noise and with the
+gyroscopes' level at rest. A run ends at a pause of the recording, since the device may
+move during it.
 """
 
 from __future__ import annotations

@@ -1,27 +1,27 @@
-"""What rounding to a step does to samples, and to the mean of many.
+"""Errors of samples and of their mean from rounding to a step.
 
     U = q round(V / q),   V with noise s of its own, its mean anywhere within a step
 
-With s above half a step rounding only adds to the variance of a sample,
+If s is above half a step, rounding only adds to the variance of a sample,
 
     var U = s^2 + q^2 / 12                                                       (1)
 
-Below that samples may not vary at all, though each is off by q / sqrt(12), rms: no
-noise of a sample is taken for less. The mean itself is off then, which averaging does
-not lower, by
+If s is smaller, samples may not vary at all, though each has an error of q / sqrt(12),
+rms; this is the least noise of a sample. The mean then has an error that averaging does
+not reduce,
 
     var = sum over h = 1, 2, .. of (q / (pi h))^2 / 2 * exp(-4 pi^2 h^2 s^2 / q^2)   (2)
 
-and at most by what a value anywhere within a step is off by. Where the noise is so low
-that only two neighbouring values come, a share p of the one, the mean is off by
-p - 1/2 - s Phi^-1(p) steps, with an s that nothing tells (Phi is the distribution of
-a unit normal); over s < 0.3 q the mean of its square is near
+and at most that of a value anywhere within a step. If the noise is so low that only two
+neighbouring values occur, one of them with frequency p, the error of the mean is
+p - 1/2 - s Phi^-1(p) steps, with an unknown s (Phi is the distribution of a unit
+normal). For s < 0.3 q the mean of its square is approximately
 
     var = (1 - 4 p (1 - p)) q^2 / 12,   p (1 - p) q^2 the variance of the values     (3)
 
-How often neighbouring samples differ bounds what they scatter by. It is most where the
-mean lies in the middle of a step, and a share p / 2 of the samples one step to each
-side: then a share f of them differs from the one before, and
+The frequency f at which successive samples differ is an upper bound of their variance.
+The variance is largest if the mean is in the middle of a step, and a fraction p / 2 of
+the samples is one step to each side:
 
     var U <= p q^2,   f = 2 p - 3 p^2 / 2                                        (4)
 

@@ -2,8 +2,8 @@
 
     |x_i - x_(i-1)|, |x_(i+1) - x_i| > 12 s,   |x_(i+1) - x_(i-1)| < 0.3 of both    (1)
 
-s is the usual difference of successive samples. The device has not moved by such a
-jump, so who looks for rests passes over it.
+s is the typical difference of successive samples. The device has not moved by such a
+jump, so the search for rests ignores it.
 """
 
 from __future__ import annotations

@@ -3,16 +3,17 @@
 Every 0.1 s the means y of the last 0.8 s of cells are looked at:
 
     a = sqrt(mean of (y_i - y_i-1)^2 / 2)          noise of a cell                 (1)
-    d = sd of y about their straight line          what goes to and fro            (2)
-    e = their slope times 0.8 s                    what goes on                    (3)
-    w = mean rate less that of the last rest       what turns evenly               (4)
+    d = sd of y about their straight line          oscillation                     (2)
+    e = their slope times 0.8 s                    trend                           (3)
+    w = mean rate less that of the last rest       constant rotation               (4)
 
-Rest is d, e and w of every channel within what its noise explains. The noise is the
-smallest tenth of a of the last 20 s, so it is known from the first second on, a turn
-does not spoil it, and a device that became noisier is at rest again after a while.
+The device is at rest if d, e and w of every channel are explained by noise. The noise
+is the smallest tenth of a in the last 20 s. It is thus known from the first second on,
+it does not change by a turn, and a device that becomes noisier is at rest again after a
+while.
 
-On a base that sways nothing comes to rest so. Where somebody says that it does, rest is
-that what goes to and fro, and on, stays within the limits of sanity.
+On a base that sways this never happens. If the session states that the base sways, the
+device is at rest if oscillation and trend are within the limits of `limits`.
 """
 
 from __future__ import annotations

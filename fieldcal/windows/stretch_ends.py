@@ -1,7 +1,7 @@
-"""Why a still stretch begins and ends where it does, in words.
+"""Why a still stretch begins and ends, in words.
 
-What lies within a second beyond its end tells: nothing, a pause, a rotation, an
-acceleration that changes, or a disturbance after which the device rests as before.
+The second beyond its end shows the reason: end of the recording, a pause, a rotation, a
+changing acceleration, or a disturbance after which the device rests as before.
 """
 
 from __future__ import annotations

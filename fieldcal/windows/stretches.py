@@ -1,7 +1,7 @@
 """Finds still stretches of a recording without marks.
 
-Where cells are at rest (`rests`) is held to the test that a window must pass, so that
-no sample of a turn gets in.
+Runs of cells at rest (`rests`) must pass the test of a window, so that they contain no
+sample of a turn.
 """
 
 from __future__ import annotations

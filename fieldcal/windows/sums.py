@@ -3,8 +3,8 @@
     n = number of values x                 S = sum of x about an origin
     m = number of changes d between successive values      D = sum of d^2
 
-A channel lies in one piece, (c, n) of c channels, and `first` says with which sample
-each of the m cells begins. A nan is a missing value and enters no sum.
+Samples are (c, n) for c channels, and `first` is the index of the first sample of each
+of the m cells. A nan is a missing value and enters no sum.
 """
 
 from __future__ import annotations

@@ -1,15 +1,16 @@
 """A window on a base that sways: its outputs as they would be with the base at rest.
 
-The base turns by a small vector phi(t) (device axes) about where it hangs at rest, a
-ship at the pier, a vehicle on its springs, a mast in the wind. With the specific force
-f0 at rest and the arm r from the turning centre, the device has
+The base (a ship at the pier, a vehicle on its springs, a mast in the wind) rotates by a
+small vector phi(t), device axes, about its attitude at rest. With the specific force f0
+at rest and the arm r from the centre of rotation, the device measures
 
     f - f0 = f0 x phi + phi x (phi x f0) / 2 + w' x r + w x (w x r)              (1)
     w      = phi' - phi x phi' / 2                                               (2)
 
-The first terms are waves, and their mean over a window is what its ends leave of them;
-the mean of the others is none: phi^2 / 2 of gravity, and a coning rate. Waves are those
-of `sway_process`, squares in (1) and (2) are taken of those that the gyroscopes show.
+The first terms are waves; their mean over a window depends only on its ends. The mean
+of the other terms is not zero: phi^2 / 2 of gravity, and a coning rate. The waves are
+those of `sway_process`; the squares in (1) and (2) use the waves that the gyroscopes
+measure.
 
 Source: rotation kinematics to second order.
 """

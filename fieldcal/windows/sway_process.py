@@ -1,11 +1,11 @@
-"""Fits of waves to a stretch of a window: a spectrum that all outputs share.
+"""Fits of waves to a stretch of a window, with one spectrum for all outputs.
 
     y_c = m_c + q_c t + sum_k s_ck (a_ck cos w_k t + b_ck sin w_k t) + noise,
     a, b ~ N(0, v_k),   s = |f0| of accelerometers, w_k of gyroscopes            (1)
 
-on frequencies half a cycle a window apart, and on those of the strongest lines. v_k and
-the noise are those of greatest evidence: a swell is one line, gusts are many. What the
-stretch leaves open of m_c is its variance beyond that of white noise.
+at frequencies half a cycle per window apart, and at those of the strongest lines. v_k
+and the noise maximise the evidence: a swell is one line, gusts are many. The remaining
+uncertainty of m_c is its variance in addition to that of white noise.
 
 Source: MacKay 1992, Tipping 2001.
 """

@@ -1,4 +1,4 @@
-"""What sways in a window: waves of the outputs, and what follows from their turning."""
+"""Waves of the outputs in a window on a swaying base, and the rotation they show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The straight line through a window that a disturbance in part of it does not turn."""
+"""A straight line through a window, robust against a disturbance of part of it."""
 
 from __future__ import annotations
 

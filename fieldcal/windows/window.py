@@ -1,9 +1,9 @@
-"""A window as it fills: mean, error, stillness and verdict after every block.
+"""A window while it fills: mean, error, test for rest and verdict after every block.
 
-A device that turns a little at rest, in a hand or on a sagging rest, moves gravity
-across itself: its specific force changes across the mean force, not along it. So the
-mean along n = f / |f| has a noise of its own, lower than that of the axes tells, and
-the covariance C of the axes takes it over:
+If a device rotates slightly at rest, in a hand or on a support that gives way, its
+specific force changes across the mean force and not along it. The noise of the mean
+along n = f / |f| is then lower than the noise of the axes suggests, and the covariance
+C of the axes is changed accordingly:
 
     C' = C - C n n^T C (1 / q - v / q^2),   q = n^T C n                          (1)
 

@@ -1,6 +1,5 @@
-"""The contents of a diagnosis, made from what explains the recording.
+"""The contents of a diagnosis, made from the explanation of the recording.
 
-Effects with values and ±, the places of each mismatch, the candidates that lost, the
-residuals before and after: each module makes one part of `result.Diagnosis`. Sentences
-are made in `wording`.
+Effects with values and ±, mismatches, rejected candidates, residuals before and after:
+each module makes one part of `result.Diagnosis`. Sentences are made in `wording`.
 """

@@ -1,4 +1,4 @@
-"""Bias and scale factor beside the effects, and what each effect does to them."""
+"""Bias and scale factor fitted with the effects, and how each effect moves them."""
 
 from __future__ import annotations
 

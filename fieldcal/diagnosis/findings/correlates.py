@@ -1,4 +1,4 @@
-"""What a residual that no effect makes could follow, by name."""
+"""Names of quantities with which a residual without a known effect may correlate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Residuals over what they follow, before and after: the pictures of a diagnosis.
+"""Residuals over their covariate, before and after: the plots of a diagnosis.
 
 For each mismatch in the windows, the residual of the simulation alone and that of the
 simulation with the effects found, averaged over parts of windows, with its standard

@@ -1,12 +1,13 @@
-"""When something changed, from the samples about it.
+"""The instant of a change, from the samples around it.
 
-With z the samples less what the rows' model makes of them before the change, and A the
-change of each channel, the instant k is where
+With z the samples less the output of the model before the change, and A the change of
+each channel, the instant k is that at which
 
     S(k) = sum_{i<k} z_i^2 + sum_{i>=k} (z_i - A)^2
 
-is least, over the noise; its uncertainty is the spread of exp(-S / 2). Of the means in
-the rows it is calculated first, to see between which samples the instant can be.
+is smallest, in units of the noise; its uncertainty is the spread of exp(-S / 2). S is
+first calculated from the means in the rows, to find the samples between which the
+instant can be.
 """
 
 from __future__ import annotations

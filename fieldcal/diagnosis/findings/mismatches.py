@@ -1,7 +1,7 @@
 """Where recording and simulation differ: channel, positions, time, covariate.
 
-For a cause the residual without it, all else fitted, is looked at: the channels whose
-squares it accounts for, the positions in which it stands out.
+For a cause these follow from the residual without it, with all other causes fitted: the
+channels whose squares it explains, and the positions in which it is significant.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How well recording and simulation agree, before and after.
+"""Agreement of recording and simulation, before and after.
 
-Lines do not show in means over a second: their squares, averaged over windows at their
-own frequency, are added.
+Lines average out in means over a second. Their mean squares, at their own frequency,
+are added.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ OF_TURNS = "standard deviations, in turns"
 def _agreement(
     fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
 ) -> Agreement:
-    """Residuals of a fit; squares are weighed as another has the instability."""
+    """Residuals of a fit; squares are weighted with the instability of another fit."""
     squares = (
         weighed.squares_of(fitted.residual()) if _same_rows(fitted, weighed) else None
     )
@@ -50,7 +50,7 @@ def _same_rows(one: Fitted, other: Fitted) -> bool:
 
 
 def before(block: Block, explanation: Explanation) -> Agreement:
-    """The simulation alone, on the samples as they came."""
+    """The simulation alone, compared with the samples as recorded."""
     prepared = explanation.prepared
     base = raw(block, explanation)
     lines = sum((r.before for r in prepared.remains), np.zeros(6))
@@ -59,7 +59,7 @@ def before(block: Block, explanation: Explanation) -> Agreement:
 
 
 def after(explanation: Explanation) -> Agreement:
-    """The simulation with what was found; alone, where rows show nothing more."""
+    """The simulation with the effects found; alone, if the rows show none."""
     remains, best = explanation.prepared.remains, explanation.best
     lines = sum((r.after for r in remains), np.zeros(6))
     predicted = sum((r.held_out for r in remains), np.zeros(6))
@@ -72,7 +72,7 @@ def after(explanation: Explanation) -> Agreement:
 
 
 def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
-    """The turns without and with what was found, in standard deviations."""
+    """The turns without and with the effects found, in standard deviations."""
     best, turned = explanation.best, explanation.inferred.turned
     nothing = explanation.posterior.search.evaluated(())
     plain = replace(best, set=nothing)
@@ -88,7 +88,7 @@ def _of_turns(fitted: Fitted, turned: Sequence[TurnRows], ahead: Array) -> Quali
 
 
 def raw(block: Block, explanation: Explanation) -> Fitted:
-    """Bias and scale factor alone, on the samples as they came."""
+    """Fit of bias and scale factor alone to the samples as recorded."""
     prepared: Prepared = explanation.prepared
     if block is prepared.source.block and not prepared.checked.ids:
         return explanation.base
@@ -104,9 +104,9 @@ def raw(block: Block, explanation: Explanation) -> Fitted:
 
 
 def parted(one: Agreement, other: Agreement) -> int:
-    """The triad in which two models differ most, in what they see or predict: 0 or 1.
+    """The triad in which two models differ most, in residuals or predictions: 0 or 1.
 
-    What is random takes nothing from the residuals, but predicts.
+    A random effect does not reduce the residuals, but it improves predictions.
     """
     sizes = []
     for triad in (0, 1):

@@ -1,4 +1,4 @@
-"""Residuals averaged over parts of the windows: the mismatch counts, not the noise."""
+"""Residuals averaged over parts of the windows, to reduce their noise."""
 
 from __future__ import annotations
 

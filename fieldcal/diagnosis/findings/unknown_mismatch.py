@@ -1,4 +1,4 @@
-"""Mismatches that no effect of the catalogue makes, for the words about them."""
+"""Mismatches without an effect of the catalogue, as input of the sentences."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The signal chain first: physics fitted to a broken chain is nonsense.
+"""Faults of the signal chain, which must be treated before any physics is fitted.
 
-What can be put right is put right (axes, units, bytes), what cannot is left out (stuck,
-clipped, bumped), and the rest is remembered (lost samples, the clock, coarse steps).
+Some are corrected (axes, units, bytes), some samples are left out (stuck, clipped,
+bumped), and other faults are only reported (lost samples, the clock, coarse steps).
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """A line in the spectrum: its frequency, its causes, and what it predicts.
 
-Of the amplitudes A of a wave in windows, or in stretches of them (`moments`), causes c
-make R c, with R of the effect; they follow by least squares, and hz is where they take
-most. What a line is worth on samples that it was not fitted to is held against the same
-amplitudes: a part of the windows is left out, causes and frequency are found from the
-rest, and |A - R c|^2 / 2 of the part left out is what remains of the mean square.
-Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
+Causes c of an effect produce the amplitudes R c of a wave in windows, or in stretches
+of them (`moments`). c follows from the measured amplitudes A by least squares, and the
+frequency is that at which they explain most. To test the prediction, part of the
+windows is left out, causes and frequency are found from the rest, and |A - R c|^2 / 2
+of the part left out is the remaining mean square. Source: D. Rife, R. Boorstyn,
+Single-tone parameter estimation, 1974.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Samples summed up as the amplitude of a wave, in each window or stretch of one.
+"""Amplitudes of a wave, in each window or in stretches of it.
 
     A = 2/n sum_k s_k exp(-2 pi i hz t_k)                                           (1)
 
-which in white noise of sigma has the variance 4 sigma^2 / n. Sums over a few parts of
-each window are kept, so that A at a frequency a little off is a sum over the parts.
+with variance 4 sigma^2 / n for white noise of sigma. Sums over a few parts of each
+window are stored, so that A at a slightly different frequency is a sum over the parts.
 Source: D. Rife, R. Boorstyn, Single-tone parameter estimation, 1974.
 """
 

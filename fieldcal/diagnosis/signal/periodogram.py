@@ -1,8 +1,9 @@
-"""Where in the spectrum of the outputs at rest a line stands out.
+"""Significant lines in the spectrum of the outputs at rest.
 
-Hann-windowed periodograms of the windows are summed; a line stands out of the median of
-its neighbours. With W windows and white noise the sum at one frequency is Gamma(W)
-about its mean W, so the odds of the highest of all frequencies and channels are known.
+Hann-windowed periodograms of the windows are summed and compared with the median of
+neighbouring frequencies. With W windows and white noise the sum at one frequency has
+the distribution Gamma(W), which gives the probability of the highest value of all
+frequencies and channels.
 Source: D. Percival, A. Walden, Spectral Analysis for Physical Applications, chapter 10.
 """
 
@@ -28,10 +29,10 @@ BESIDE = 40
 """Neighbours that give the floor, to either side."""
 
 CLOSE, FAR = 5, 12
-"""Neighbours that no taper reaches, and that are still near."""
+"""Neighbours that the taper does not reach and that are still close."""
 
 STEEP = 4.0
-"""Times the floor that these have to have to be taken for it."""
+"""Multiple of the floor above which these neighbours replace it."""
 
 SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
@@ -106,9 +107,9 @@ class Peak:
 def highest(
     pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[Peak]
 ) -> Peak | None:
-    """What stands out most, None if nothing does.
+    """The most significant peak, None if there is none.
 
-    Near a peak that is taken already, what is left belongs to it.
+    Peaks close to one that was taken already are ignored.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low = max(0.05, CYCLES / shortest)
@@ -143,9 +144,9 @@ def _level(power: Array, count: int) -> Array:
 
 
 def _noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
-    """White noise as strong as what is beside a frequency, (6,).
+    """White noise as strong as the spectrum near a frequency, (6,).
 
-    Not stronger than that of the samples: a line in short windows is beside itself.
+    At most that of the samples, since a line in short windows reaches its neighbours.
     """
     noise, at = white.copy(), int(np.argmin(np.abs(spectrum.hz - hz)))
     for c in sorted({c for some in spectrum.together for c in some}):
@@ -155,10 +156,10 @@ def _noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
 
 
 def _peak_at(hz: Array, power: Array, at: int) -> Peak:
-    """The peak about a frequency, of power (m,) in terms of the floor.
+    """The peak at a frequency; power (m,) in units of the floor.
 
-    What is no line, as of a machine whose speed wanders, is as broad as its power,
-    smoothed, stays above the floor.
+    It reaches as far as the smoothed power stays above the floor: a machine whose speed
+    varies makes a broad peak, which is no line.
     """
     kernel = np.ones(2 * FAR + 1) / (2 * FAR + 1)
     low = np.flatnonzero(np.convolve(power, kernel, "same") < HUMP)

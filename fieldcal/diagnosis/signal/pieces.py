@@ -1,4 +1,4 @@
-"""Samples of the windows at rest, as the search for lines looks at them."""
+"""Samples of the windows at rest, prepared for the search for lines."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Lines in the spectrum of the outputs at rest.
 
-A line found (`periodogram`) is fitted (`line`) to the samples of all windows, one phase
-throughout: as any amplitude in each output, or as what a `Line` effect makes of few
-causes. It is one if the rest of the recording predicts it in what was left out.
+A line found (`periodogram`) is fitted (`line`) to the samples of all windows, with one
+phase throughout: with any amplitude in each output, or with those that a `Line` effect
+makes from few causes. It is accepted if the rest of the recording predicts it in the
+samples that were left out.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Columns: the derivative of the rows by what a group can change.
 
-A `Course` is the same function of the row on every channel, a column a channel; all
-else is general. What a column is does not hang on where it is used: windows and turns
-ask the same object, with what the device goes through there.
+A `Course` is one function of the row on every channel, one column for each channel; all
+other columns are general. Windows and turns use the same object, with what the device
+experiences there.
 """
 
 from __future__ import annotations

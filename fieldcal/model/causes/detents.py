@@ -1,4 +1,4 @@
-"""Angles that a fixture repeats: a detent is off by the same wherever it is set."""
+"""Detents of a fixture: an angle has the same error each time it is set."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
 
 
 def together(some: Sequence[Detent], places: int) -> Array:
-    """Which turns of the positions go together, (2 p, m): those of the same angle."""
+    """Rotations of the positions by each detent, (2 p, m): 1 where its angle is set."""
     out = np.zeros((2 * places, len(some)))
     for k, one in enumerate(some):
         out[2 * np.array(one.positions) + one.joint, k] = 1.0
@@ -54,11 +54,11 @@ def together(some: Sequence[Detent], places: int) -> Array:
 
 
 def columns_of(table: ColumnTable, some: Sequence[Detent]) -> Index:
-    """Columns of what detents are off by, rad, appended to a table, (m,)."""
+    """Columns of the errors of detents, rad, appended to a table, (m,)."""
     shared = together(some, table.places)
 
     def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
-        """The same, where turns meet the positions."""
+        """Central differences at both ends of a turn."""
         small = state.small_rotation
         for column in shared.T:
             off = columns.SMALL * column.reshape(small.shape)

@@ -1,9 +1,9 @@
 """What could have made the rows: causes, each with the groups of columns it may be.
 
-A session's dictionary holds the columns once; groups say which of them they are made
-of, and how large these are typically. What a device has anyway is always in: bias,
-scale factor where something shows it, instability, what is not known of gravity, the
-Earth's rate, and the turns of positions whose orientation nobody knows.
+A session's dictionary holds each column once. A group states which columns belong to it
+and their typical sizes. Some groups are always included: bias, scale factor if the rows
+determine it, instability, the uncertainty of gravity, the Earth's rate, and rotations
+of the positions whose orientation is not known.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Causes that effects of the catalogue with an equation are, and their columns."""
+"""Causes from effects of the catalogue that have an equation, and their columns."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Causes of a device in motion, whose motion a reference follows moment by moment.
 
-Beside bias and scale factor of both triads there is always what the two clocks are off
-by, the turn between their axes, and what the reference says nothing of where it lacks
-a channel. What moves positions has no place here, and noise of every colour is in the
-weight of the rows.
+Always included are bias and scale factor of both triads, the difference of the two
+clocks, the rotation between the two sets of axes, and free values for channels that the
+reference lacks. Effects that move positions do not exist here, and coloured noise is in
+the weights of the rows.
 """
 
 from __future__ import annotations

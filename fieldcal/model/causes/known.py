@@ -1,8 +1,8 @@
-"""What is known of columns from elsewhere: rows of their own beside the recording's.
+"""Prior knowledge of columns, as rows in addition to those of the recording.
 
     off = design u + e,    e ~ N(0, 1)                                              (1)
 
-They weigh as any other rows: in the estimate, and in the evidence of every set.
+They count as any other rows do, in the estimate and in the evidence of every set.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Columns of positions that are not taken yet, or were not fitted.
+"""Columns of positions that are planned, or were not fitted.
 
-What the accelerometers of a device with given parameters read in known positions at
-rest, and how that moves with each parameter: the same columns that are fitted to rows.
-m/s^2, device axes; a tilt in degrees.
+Outputs of the accelerometers of a device with given parameters in known positions at
+rest, and their derivatives by each parameter; the columns are those that are fitted to
+rows. m/s^2, device axes; a tilt in degrees.
 """
 
 from __future__ import annotations

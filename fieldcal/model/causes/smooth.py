@@ -1,14 +1,14 @@
-"""Smooth functions of a row's covariates, which no effect in the catalogue makes.
+"""Smooth functions of a row's covariates, for mismatches without a known effect.
 
-They compete with the effects on the same footing, so that a mismatch that follows the
-angle of a joint or the time, and no physics, is not laid to the physics that comes
-nearest. Each is a short series with smaller and smaller terms; a course in time is
+They compete with the effects under the same rules. A mismatch that depends on the angle
+of a joint or on time, and on no effect of the catalogue, is thus not attributed to the
+most similar effect. Each is a short series with decreasing terms; a course in time is
 
     sum_k a_k cos(pi k s),    s = (t - t_0) / (t_1 - t_0),    k = 1 ... WAVES
 
-with a_k ~ N(0, exp(-(k / w)^2 / 2)) for a smooth one of w half waves. A random walk is
-the same series with a_k of standard deviation q sqrt(2 T) / (pi k) (Karhunen-Loeve, but
-for its mean, which is the bias'); far above the noise it takes more of them (`wander`).
+with a_k ~ N(0, exp(-(k / w)^2 / 2)) for a smooth course of w half waves. A random walk
+is the same series with a_k of standard deviation q sqrt(2 T) / (pi k) (Karhunen-Loeve;
+its mean is part of the bias); a walk far above the noise needs more terms (`wander`).
 """
 
 from __future__ import annotations

@@ -1,27 +1,26 @@
-"""How the biases wander inside windows, and what cosines leave of it.
+"""Variation of the biases within windows, and its part that cosines do not describe.
 
-Biases walk by q per sqrt(s), or flicker with cosines k of variance a^2 / k over T s: a
-one-sided power of a^2 / 2 over the frequency (`wander_sizes`). Of K cosines, means over
-l s keep of a walk
+Biases have a random walk of q per sqrt(s), or flicker: cosines k with variance a^2 / k
+over T s, a one-sided power of a^2 / 2 over the frequency (`wander_sizes`). With K
+cosines fitted, means over l s of a walk keep the variance
 
     q^2 [T / (pi^2 K) - l / 6]                                                      (1)
 
-of variance, which is as good as white from row to row, and of flicker, with z =
-pi l / T,
+which is nearly white from row to row, and means of flicker, with z = pi l / T,
 
     a^2 / 2 [3 / 2 - ln z + z^2 / 144 - sum_k (sin(k z / 2) / (k z / 2))^2 / k]     (2)
 
-Two means tau apart share, with y = pi tau / T,
+The covariance of two means tau apart is, with y = pi tau / T,
 
     q^2 T / pi^2 [pi^2 / 6 - pi y / 2 + y^2 / 4 - sum_k cos(k y) / k^2]             (3)
     + a^2 / 2 [-ln(2 sin(y / 2)) - sum_k cos(k y) / k]                              (4)
 
-with k = 1 ... K: the sum over all k, and (2) is its mean over an interval of l to the
-fourth power of z. Cosine k is beyond the noise of rows of deviations s up to
+with k = 1 ... K. (2) is the mean of (4) over an interval of l, to the fourth power of
+z. Cosine k exceeds the noise of rows with standard deviations s up to
 
     k = q sqrt(2 T J) / pi,    k = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
-and as many more, each of which is lost in it, still show together: K is twice that.
+K is twice that, since as many more are still significant together.
 Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise.
 """
 

@@ -1,22 +1,22 @@
-"""How fast the biases walk or flicker inside windows, before anything is fitted.
+"""Size of random walk and flicker of the biases within windows, before any fit.
 
-Of three rows of about the same length l, tau apart, what goes evenly takes the middle
-one to the mean of the others, and
+For three rows d, d', d'' of about the same length l, tau apart, the second difference
+does not contain a straight line, and has the variance
 
     var(d'' - 2 d' + d) = s''^2 + 4 s'^2 + s^2 + 4 D(tau) - D(2 tau)                (1)
 
-where s is their white noise and D(tau) what two means tau apart differ by, squared: of
-biases that walk by q per sqrt(s), and of those that flicker with cosines k of variance
+with s the white noise of a row and D(tau) the mean squared difference of two means tau
+apart: for a random walk of q per sqrt(s), and for flicker from cosines k of variance
 a^2 / k,
 
     D = q^2 [tau - l / 3]                                                           (2)
     D = a^2 / 2 [(x + 1)^2 ln(x + 1) + (x - 1)^2 ln|x - 1| - 2 x^2 ln x]            (3)
 
-with x = tau / l. The median of the squares over (1) tells the size, in the later half
-of each window, when what settles after a turn has. Ln r, r being that median over the
-one of chi squared, scatters by 2.7 / sqrt(n) with n of white noise, and of walks with
-as many as do not overlap. Source: IEEE Std 952 and Barnes et al. 1971, of whose
-variances of averages (3) is the sum.
+with x = tau / l. The size follows from the median of the squares over (1). The later
+half of each window is used, when settling after a turn is over. With r that median over
+the median of chi-squared, ln r has the standard deviation 2.7 / sqrt(n), with n the
+number of rows for white noise, and of rows that do not overlap for walks. Source: IEEE
+Std 952 and Barnes et al. 1971; (3) is the sum of their variances of averages.
 """
 
 from __future__ import annotations

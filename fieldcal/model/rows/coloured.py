@@ -1,23 +1,24 @@
-"""Noise of rows in motion by frequency, from what is left of them.
+"""Noise of rows in motion as a function of frequency, from the residuals.
 
-Noise is taken as stationary. Each channel has one power P_b a band b of frequencies, so
-that P follows from what is left r of rows after columns were fitted: with n_b
-coefficients of a band, l_b the sum of their leverages and L_b = ln P_b the likeliest
-are those that minimise
+The noise is assumed stationary. Each channel has one power P_b in each band b of
+frequencies. It follows from the residuals r of the rows after columns were fitted. With
+n_b coefficients in a band, l_b the sum of their leverages, and L_b = ln P_b, the most
+probable powers minimise
 
     sum_b (n_b - l_b) / 2 [L_b + d_b exp(-L_b)]
         + sum_b (L_b+1 - L_b)^2 / (2 STEEP^2 (x_b+1 - x_b))
         + sum_b (L_b - a - S_b)^2 / (2 UNLIKE^2)                                   (1)
 
-with d_b = sum r^2 / (n_b - l_b), x the logarithm of the frequency, S_b the same of all
-channels of the triad together and a by how much this one is louder: spectra are smooth,
-and those of a triad alike, so that few coefficients borrow from their neighbours. With
-s_b^2 the uncertainty of L_b the power is its mean, exp(L_b + s_b^2 / 2). Of the mean of
-the rows, which the bias takes, nothing is left: it counts as half the lowest frequency,
-and L goes on there as steeply as it comes, a walk's slope at most. What correlates with
-the motion and has no column is in r at the frequencies of the motion, so it makes all
-that is told from there as uncertain as it is. Source: restricted likelihood, Patterson
-and Thompson 1971; P. Whittle 1953.
+with d_b = sum r^2 / (n_b - l_b), x the logarithm of the frequency, S_b the logarithm of
+the power of all channels of the triad together, and a the difference of this channel
+from it. The second and third term state that spectra are smooth and that the channels
+of a triad have similar spectra, which matters in bands with few coefficients. With
+s_b^2 the variance of L_b, the mean power is exp(L_b + s_b^2 / 2). The mean of the rows
+has no residual, since the bias fits it. It is treated as half the lowest frequency: L
+is extrapolated there, with the slope of a random walk at most. An error that correlates
+with the motion and has no column is part of r at the frequencies of the motion, and so
+increases the uncertainty of all that is estimated from these frequencies. Source:
+restricted likelihood, Patterson and Thompson 1971; P. Whittle 1953.
 """
 
 from __future__ import annotations

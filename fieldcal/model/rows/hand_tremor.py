@@ -1,25 +1,26 @@
 """Hand tremor: a device that is held by hand rotates slightly all the time.
 
-Where orientations are not known, only the length of the force says something about the
-accelerometers. On a table its direction stays within the noise of the rows of a window;
-in a hand it wanders, and would pass for biases that do. Then each window is one row:
-the mean of the force over it is as long as ever, to second order in the angle. The mean
-rate over T s is the angle between its ends, over T: of one that wanders by a (rms) it
-is off by
+If orientations are not known, only the norm of the force determines the accelerometers.
+On a table the direction of the force is constant within the noise of the rows. In a
+hand it varies, which would look like a bias that varies. Each window is then a single
+row, since the norm of the mean force changes only to second order in the angle. The
+mean rate over T s is the difference of the angles at both ends over T. If the angle
+varies by a (rms), the error of the mean rate is
 
     sqrt(2) a / T                                                                  (1)
 
-How slowly hands wander is seen by the accelerometers, in all windows together. Where,
-and about which axis, a hand trembles more than that the gyroscopes see: what their rate
-sums up to has about a line the variance
+The accelerometers show the slow part of the tremor, in all windows together. The
+gyroscopes show in which windows and about which axes the tremor is larger: the
+integrated rate has about a straight line the variance
 
     a^2 + N^2 T / 15                                                               (2)
 
-with N the density of white noise, whose sum is a walk. A tremor is real motion, and no
-noise of the sensors: the gyroscopes follow it from one rest to the next, and how far it
-has turned the device at the end of a rest bends the closure of a turn. To the force it
-adds the push of the hand. Along gravity that sums up to a speed, which comes back as
-the angle does, so that of the mean force along it (1) and (2) hold with the speed.
+with N the density of the white noise, whose integral is a random walk. Tremor is motion
+and not noise of the sensors: the gyroscopes follow it from one rest to the next, and
+the angle that it has reached at the end of a rest changes the closure of a turn. The
+hand also accelerates the device. Along gravity the integral of this is a speed that
+returns to zero as the angle does, so (1) and (2) hold with the speed for the mean force
+along gravity.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Rows of a session that holds means alone: one for each position.
 
-Nothing is known of the samples behind them, nor of the turns between; where nobody
-wrote down when they were taken, all are of the same instant, so nothing that goes with
-time can be found in them.
+The samples of these means and the turns between them are not recorded. If no times are
+stated, all means count as taken at the same time, and no effect that depends on time
+can be found.
 """
 
 from __future__ import annotations

@@ -1,20 +1,21 @@
-"""Rows of a device in motion, beside a reference that follows the same motion.
+"""Rows of a device in motion, compared with a reference that has the same motion.
 
-The reference says specific force and angular rate at every moment of its own clock.
-What the device goes through at t of its clock is
+The reference states specific force and angular rate, u(s), at every time s of its own
+clock. The device experiences at time t of its clock
 
     v(t) = R u(s),    s = t - delay + drift (t - middle)                           (1)
 
-with u what the reference says and R the turn from its axes to the device's. A row is
-the mean of some samples, and of v at their instants; rows lie in stretches without
-gaps. What is off by colour, not white, is told apart by frequency: rows count as the
-cosine coefficients of each stretch,
+with R the rotation from the axes of the reference to those of the device. A row is the
+mean of some samples, and of v at the same times. Rows lie in stretches without gaps.
+Since the noise is not white, the rows of each stretch are replaced by their cosine
+coefficients,
 
     c_k = sqrt(2 / n) sum_j y_j cos(pi k (j + 1/2) / n),    c_0 by 1 / sqrt(n)       (2)
 
-at f_k = k / (2 n d), d s from row to row, which of stationary noise are all but
-independent; of what is slower than a stretch, the c_0 of the m stretches are put
-through (2) once more and lie at j / (2 m n d). m/s^2, rad/s, device axes. Source:
+at the frequencies f_k = k / (2 n d), with d the spacing of the rows, s. For stationary
+noise these are nearly independent. For noise slower than a stretch, (2) is applied once
+more to the c_0 of the m stretches, at frequencies j / (2 m n d). m/s^2, rad/s, device
+axes. Source:
 DCT-II, N. Ahmed et al. 1974; P. Whittle 1953 for the independence.
 """
 

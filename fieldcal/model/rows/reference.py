@@ -1,23 +1,24 @@
-"""A reference of a device's motion between its samples, and what a triad makes of it.
+"""A reference of the device's motion, interpolated, and filtered as a sensor does.
 
-A sensor that is late by d and follows with a time constant tau puts out, of u,
+A sensor with a delay d and a time constant tau puts out for an input u
 
     y(t) = int_0^inf u(t - d - tau a) exp(-a) da,                tau >= 0         (1)
     y(t) = u(t - d) - tau u'(t - d),                             tau < 0          (2)
 
-a low-pass of first order, and what one in the reference has taken away. The integral is
-Gauss and Laguerre's sum, exact for polynomials of degree 2 NODES - 1. With the
-operator D = d/dt, (1) has the derivative
+which is a low-pass of first order, or the inverse of one in the reference. The integral
+is evaluated by Gauss-Laguerre quadrature, exact for polynomials of degree 2 NODES - 1.
+With the operator D = d/dt, (1) has the derivative
 
     dy / dtau = -D (1 + |tau| D)^-1 y                                             (3)
 
-which for tau = 0 is that of a delay. Where |tau| is less than `LEAST`, that stands for
-it in (3): t of the two is the difference from the one to the other. What tells a time
-constant from a delay goes as its square, so a step by (3) to tau' makes
+which for tau = 0 equals the derivative by the delay. If |tau| is below `LEAST`, `LEAST`
+replaces it in (3); t is the difference of the two. The effect that distinguishes a time
+constant from a delay is proportional to its square. A step by (3) from tau to tau'
+therefore gives a squared time constant of
 
     tau |tau| + (|tau| + t) (tau' - tau)                                          (4)
 
-of it. s, m/s^2, rad/s, axes of the reference. Source: first-order lag; Abramowitz and
+Units: s, m/s^2, rad/s; axes of the reference. Source: first-order lag; Abramowitz and
 Stegun 25.4.45.
 """
 

@@ -1,9 +1,9 @@
 """The instant at which the device came to rest in each position.
 
-Between two windows it is turned; the last sign of motion, in the gyroscopes or, without
-them, in the accelerometers, is the arrival. What settles after a turn may count from
-there or from some fixed time before the window (the fixture clamped, the operator's
-hands off); which of them, the samples before the window tell.
+Between two windows the device is turned. It arrives at the last sign of motion in the
+gyroscopes or, if there are none, in the accelerometers. An effect that settles after a
+turn may start at the arrival, or at a fixed time before the window, when the fixture
+was clamped and the hands were taken off.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from fieldcal.session.description import Description
 
 PIECE_S = 0.2
 MOVING = 7.0
-"""Departure of a short mean from the window's that is motion, in standard errors."""
+"""Difference of a short mean from the window's that is motion, in standard errors."""
 
 RATE, FORCE = 2e-3, 0.05
-"""Departures that are no motion whatever the noise, rad/s and m/s^2."""
+"""Differences that are never motion, however low the noise, rad/s and m/s^2."""
 
 
 def arrivals(block: Block, about: Description, noise: Array) -> Array:
@@ -42,7 +42,7 @@ def arrivals(block: Block, about: Description, noise: Array) -> Array:
 
 
 def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
-    """Samples of a gap up to the last sign of motion; `held` is the window's mean."""
+    """Samples of a gap up to the last motion; `held` is the next window's mean."""
     whole = len(gap) // m
     if not whole:
         return len(gap)

@@ -1,10 +1,10 @@
-"""A base that sways: its windows, and the ways between them, as if it hung at rest.
+"""A base that sways: windows and turns corrected to a base at rest.
 
-In a window that the base sways in, what it adds is taken out (`windows.sway`). At its
-ends the device is turned by phi from where it would be at rest, and the gyroscopes on
-the way to the next window begin and end there. So the device
-is turned by phi(end) and -phi(start) there, in a tenth of a second: the closure of the
-way is then that between two attitudes at rest.
+In the windows the effect of the swaying is subtracted (`windows.sway`). At the ends of
+a window the device is rotated by phi from its attitude on a base at rest, and a turn to
+the next window starts and ends with such a rotation. It is removed by an added rotation
+of phi(end) before the turn and -phi(start) after it, in a tenth of a second each. The
+turn then leads from one attitude at rest to the next.
 """
 
 from __future__ import annotations

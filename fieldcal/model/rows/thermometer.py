@@ -1,9 +1,9 @@
 """The temperature that the device reports, smoothed, and its rate.
 
-Over a span of some seconds about each instant a straight line is fitted to the means
-over a second, and its value is taken; the rate is the slope of a parabola. Both over
-the longest span that flattens nothing. So little of the noise and the steps of a
-thermometer do not enter the hypotheses as if they were temperature.
+A straight line is fitted to the means over a second within some seconds about each
+instant; its value is the temperature. The rate is the slope of a parabola. Both use the
+longest span that does not flatten the course of the temperature, so that noise and
+rounding of the thermometer are not taken for changes of temperature.
 """
 
 from __future__ import annotations

@@ -1,22 +1,24 @@
-"""What goes round in the gyroscopes while a rate table turns.
+"""The Earth's rate in the gyroscopes while a rate table turns.
 
-With the table's rate v in device axes, |v| = v, and the Earth's rate w, what of w lies
-across v goes round in the device, and averages out over whole turns:
+With the table's rate v in device axes, |v| = v, the part of the Earth's rate w across v
+rotates in device axes and averages out over whole turns:
 
     w_across(t) = a e_1(t) + b e_2(t),   e_i(t) = exp(-[v (t - t_0)]x) e_i(t_0)     (1)
 
-e_1, e_2 lie across v and each other. Where the table stood when its window began is not
-known, so a and b are found in the window, beside the mean, and taken out. Means over d
-seconds are less by sin(v d / 2) / (v d / 2). What is larger than the Earth makes is
-something else, and stays. rad/s, s, device axes. Source: rotation kinematics.
+e_1, e_2 are perpendicular to v and to each other. The angle of the table at the start
+of the window is not known, so a and b are fitted to the window with the mean, and
+subtracted. Means over d seconds are smaller by sin(v d / 2) / (v d / 2). An oscillation
+larger than the Earth's rate has another cause and is kept. rad/s, s, device axes.
+Source: rotation kinematics.
 
-Of less than a turn by an angle c the mean keeps at most 2 sin(c / 2) / c of it, in a
-direction that is not known:
+If the table turns by less than a full turn, by an angle c, the mean contains at most
+2 sin(c / 2) / c of the rate across, in an unknown direction:
 
     cov = (I - v v^T / v^2) 2/3 Omega^2 min(1/2, 1 / c^2)                           (2)
 
-About an axis that nobody knows a table has a speed only. Its axis is where what is
-read points, less a bias b that leaves every window its length, linear in b and |b|^2:
+If the axis of the table is not known, only its speed v_i is. The axis then follows from
+the measured rates w_i less a bias b, which is found from the norms, linear in b and
+|b|^2:
 
     |w_i|^2 - v_i^2 = 2 b w_i - |b|^2                                               (3)
 """

@@ -1,10 +1,10 @@
-"""How noisy each window is, and lines that shake some windows and not others.
+"""Noise of each window, and vibration at single frequencies in some windows.
 
-An engine or a machine shakes at a few frequencies. Over a second the sine of one does
-not average out, though it says nothing about the sensors, so in windows louder than the
-usual ones the lines that stand out are fitted, a + b cos(2 pi f t) + c sin(2 pi f t) in
-all outputs, and taken out before rows are averaged. How hard each window is shaken is
-measured before that.
+An engine or a machine vibrates at a few frequencies. Such a sine does not average out
+over a second, and it is no property of the sensors. In windows with more noise than
+usual the significant lines are therefore fitted, a + b cos(2 pi f t) + c sin(2 pi f t)
+in all outputs, and subtracted before rows are averaged. The strength of the vibration
+in each window is measured before that.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Kinematics of a turn: what of it is known at both ends.
+"""Kinematics of a turn: its attitudes, and what is known of them at both ends.
 
 R (3, 3) takes vectors of the attitude at the start to that on the way (`rotation`);
 angles in rad, t in s.

@@ -4,8 +4,8 @@ With bias d and scale s of the model, w^ = (W - d)/s - w_earth and steps of dt,
 
     R_k = exp(-[w^ dt]x) R_{k-1},   u_k = sum_{j<=k} |w^ dt| / sum_j |w^ dt|
 
-R turns what was seen where the turn began into the axes on the way, u is the part of
-the turn that is done. Axes of the device, rad/s. Source: rotation kinematics.
+R transforms vectors from device axes at the start of the turn to device axes at step k;
+u is the part of the turn that is completed. rad/s. Source: rotation kinematics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where between two windows the device moves, by its gyroscopes."""
+"""When the device moves between two windows, by its gyroscopes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fieldcal.core.sampling import unbroken
 from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
-"""Time before and after the motion that is taken along."""
+"""Time before and after the motion that is integrated too, s."""
 
 LONGEST_S = 60.0
 """A turn that takes longer is not followed."""

@@ -1,19 +1,19 @@
-"""Turns from rates: integration on SO(3), and how it depends on the rates.
+"""Rotations from rates: integration on SO(3), and its derivative by the rates.
 
-A vector u that is fixed outside, seen from a body that turns at w, obeys
+A vector u that is fixed in space obeys, in the axes of a body that turns at w,
 
     du/dt = -w x u,   u(t) = F(t) u(0),   F = ... E_2 E_1,   E_j = exp(-[q_j x])   (1)
 
-in steps from edge a to edge b of T seconds, with samples every h seconds in them:
+in steps of T seconds from edge a to edge b, which contain samples every h seconds:
 
     m_k = (w_k + w_k+1) / 2 - h_k (w'_k+1 - w'_k) / 12                            (2)
     q_j = sum_k h_k m_k + T^2 (w_a x w_b) / 12                                    (3)
 
-(2) is the mean of the rate from one sample to the next, of the fourth order in even
-steps, where it is (13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24; w' are differences over two
-steps. The last term of (3) is what two axes turning in turn (coning) leave after a
-cycle. w rad/s, device axes. Source: rule of Euler and Maclaurin (2); Magnus 1954, for
-rates that change evenly within a step (3); P. G. Savage 1998, for coning.
+(2) is the mean rate between two samples. With w' from differences over two steps it is
+(13 (w_k + w_k+1) - w_k-1 - w_k+2) / 24 for even steps, of fourth order. The last term
+of (3) is the rotation that remains after a cycle of coning. w rad/s, device axes.
+Source: rule of Euler and Maclaurin (2); Magnus 1954, for rates that change evenly
+within a step (3); P. G. Savage 1998, for coning.
 """
 
 from __future__ import annotations

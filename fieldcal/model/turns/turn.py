@@ -1,12 +1,12 @@
 """One turn between two windows, followed by the gyroscopes.
 
-With w^ = (W - d)/s - w_earth, rid of what else the state has wrong of the gyroscopes,
-the attitude is carried from position p to q: R_k = exp(-[w^ dt]x) R_{k-1}. If the
-outputs are off by dW, the true attitude is R (I + [phi]x) with
+With w^ = (W - d)/s - w_earth, corrected also for the other errors of the gyroscopes in
+the state, the attitude is integrated from position p to q, R_k = exp(-[w^ dt]x)
+R_{k-1}. If the outputs have an error dW, the true attitude is R (I + [phi]x) with
 
     phi_k = sum_{j<=k} R_j^T dW_j dt / s                                            (1)
 
-On the way the accelerometers see, u being the part of the turn that is done,
+During the turn the accelerometers measure, with u the completed part of the turn,
 
     f_k = (1 - u) R_k f_p + u R_k R_T^T f_q + R_k ((phi_k - u phi_T) x f_p)          (2)
 

@@ -112,7 +112,7 @@ def test_a_damaged_file_is_said_and_a_run_goes_on(
     assert np.array_equal(made.values, found.values)
     if content:
         assert any("name another with --history" in w for w in made.warnings)
-        assert "not kept" in store_in_history(History(path), session, made)
+        assert "not stored" in store_in_history(History(path), session, made)
 
 
 def test_a_history_of_another_version_is_refused(tmp_path: Path) -> None:

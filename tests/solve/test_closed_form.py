@@ -348,7 +348,7 @@ def test_a_scale_factor_beyond_the_gyroscopes_is_not_offered() -> None:
                    sigma_gyr=2e-5, latitude=LATITUDE, grade="navigation")  # fmt: skip
     found = solve(seen)
     assert not any(n.startswith("gyr_scale") for n in found.names)
-    assert any("integrate turns" in w for w in found.warnings)
+    assert any("record the turns" in w for w in found.warnings)
 
 
 def test_as_printed_everything_is_as_in_print() -> None:

@@ -1,4 +1,4 @@
-"""Angles that nothing would contradict, and what bears witness to them."""
+"""Wrong angles that would not be noticed, and checks that would show them."""
 
 from __future__ import annotations
 

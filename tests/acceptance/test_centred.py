@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.stats import chi2, norm
 
 from fieldcal.acceptance.centred import (
     biases_taken_out,
@@ -11,7 +14,7 @@ from fieldcal.acceptance.centred import (
     centred_and_rounded,
     tracked,
 )
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
 NOISE, RATE = 5e-4, 100.0
@@ -142,3 +145,83 @@ def test_a_mean_that_was_taken_before_rounding(mode: str) -> None:
     assert np.mean(np.array(found) < LEAST) > 0.6
     block.acc[:] += 1e-3 * rng.standard_normal(block.acc.shape)
     assert centred_and_rounded(windows, block, 0.05, LEAST) == 1.0
+
+
+def near_zero(sigma: Array, spread: float) -> float:
+    """Probability that offsets lie within two sigma about zero, by their density."""
+    density = float(norm.pdf(0.0, scale=spread))
+    return float(np.prod(np.minimum(4 * sigma * density, 1.0)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_chance_of_gyroscopes_at_zero_is_that_of_chi2_and_of_the_spread(
+    seed: int,
+) -> None:
+    windows, block = at_rest(np.random.default_rng(seed), 0.0)
+    block.gyr[:] *= 4.0
+    half = np.array([block.gyr[COUNT * k + COUNT // 2 : COUNT * (k + 1)].mean(axis=0)
+                     for k in range(6)])  # fmt: skip
+    sigma = 4.0 * NOISE / np.sqrt(COUNT / 2)
+    square = float(np.sum((half / sigma) ** 2))
+    spread = float(np.hypot(1e-4, EARTH / np.sqrt(3)))
+    expected = chi2.cdf(square, 18) * near_zero(np.full(3, sigma / np.sqrt(6)), spread)
+    chance, what = tracked(windows, block, 1e-4, LEAST)
+    assert expected > 1e-3 and chance == pytest.approx(expected, rel=0.12)
+    assert float(what.split()[3]) == pytest.approx(square, rel=0.1)
+
+
+def test_windows_without_noise_or_without_an_axis_do_not_count() -> None:
+    windows, block = at_rest(np.random.default_rng(3), 0.0)
+    block.gyr[COUNT : 2 * COUNT] = 0.0
+    block.gyr[2 * COUNT : 3 * COUNT, 1] = np.nan
+    assert "of 14 means" in tracked(windows, block, REPEAT, LEAST)[1]
+    # two windows of three axes are the fewest
+    assert tracked(windows[3:5], block, REPEAT, LEAST)[0] < LEAST
+    assert tracked(windows[2:4], block, REPEAT, LEAST) == (1.0, "")
+    block.gyr[:, 0] = np.nan
+    assert tracked(windows, block, REPEAT, LEAST) == (1.0, "")
+
+
+@pytest.mark.parametrize("sigmas", [0.1, 0.5, 1.5])
+def test_the_chance_of_a_mean_so_small_is_that_of_the_normal(sigmas: float) -> None:
+    block = recording(np.random.default_rng(8), 0.0)
+    block.acc[:] += sigmas / np.sqrt(COUNT) - block.acc.mean(axis=0)
+    expected = float(norm.cdf(sigmas) - norm.cdf(-sigmas))
+    for _, p in centred(block):
+        assert p == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("mode", ROUNDED)
+def test_the_chance_of_a_mean_that_rounding_leaves_is_as_written(mode: str) -> None:
+    """(4) for six faces, with noise of some steps; x is at zero in four of them."""
+    rng, noise, spread = np.random.default_rng(9), 4 * STEP, 0.01
+    long = np.array([1000, 700, 900, 1000, 1200, 1100])
+    ends = np.concatenate([[0], np.cumsum(long)])
+    up = np.repeat(9.81 * np.vstack([np.eye(3), -np.eye(3)]), long, axis=0)
+    acc = up + noise * rng.standard_normal(up.shape)
+    acc = ROUNDED[mode](acc - acc.mean(axis=0))
+    windows = [
+        Average(np.zeros(6), np.eye(6), 21.0, 1000, a / RATE, (b - 0.5) / RATE)
+        for a, b in pairwise(ends.tolist())
+    ]
+    part = (long / long.sum())[:, None]
+    mean, signs = acc.mean(axis=0), np.sign(acc).mean(axis=0)
+    held = np.array([acc[a:b].mean(axis=0) for a, b in pairwise(ends)])
+    twice = np.where(np.abs(held) < STEP / 2, 2.0, 1.0)
+    assert (twice == 2).sum() >= 1
+    expected = 0.0
+    for shift, steps in ((0.0, np.ones((6, 3))), (-0.5, np.ones((6, 3))),
+                         (-signs / 2, twice)):  # fmt: skip
+        rounding = (part * steps * STEP) ** 2 / 12
+        var = noise**2 / long.sum() + rounding.sum(axis=0)
+        square = float(np.sum((mean - STEP * shift) ** 2 / var))
+        if chi2.sf(square, 3) >= LEAST:
+            expected += chi2.cdf(square, 3) * near_zero(np.sqrt(var), spread)
+    block = Block.of(np.arange(len(acc)) / RATE, acc, np.zeros_like(acc))
+    found = centred_and_rounded(windows, block, spread, LEAST)
+    assert 0 < expected < 1 and found == pytest.approx(expected, rel=0.05)
+    block.acc[5, 1] = np.nan
+    assert centred_and_rounded(windows, block, spread, LEAST) == 1.0
+    block.acc[5, 1] = 0.0
+    block.acc[:, 0] += 1e-3 * rng.standard_normal(len(acc))
+    assert centred_and_rounded(windows, block, spread, LEAST) == 1.0

@@ -1,12 +1,12 @@
-"""Axes that tell nothing all through a recording."""
+"""Axes without a signal in the whole recording."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from fieldcal.core.samples import ACC, GYR
-from fieldcal.windows.dead_axis import dead_sensors, without_dead
+from fieldcal.core.samples import ACC, GYR, Block
+from fieldcal.windows.dead_axis import LivingRows, broken, dead_sensors, without_dead
 
 
 def test_an_axis_that_changes_once_is_not_dead() -> None:
@@ -20,6 +20,12 @@ def test_beside_axes_as_coarse_it_may_only_not_be_turned() -> None:
     six[:, 1] = 0.0
     assert dead_sensors(six) == []
     np.testing.assert_array_equal(without_dead(six), six)
+
+
+def test_beside_axes_that_jump_once_it_may_only_not_be_turned() -> None:
+    six = np.zeros((50, 6))
+    six[10:, [0, 2, 3, 4, 5]] = 1.0
+    assert dead_sensors(six) == []
 
 
 def test_others_of_its_sensor_still_tell_of_rest() -> None:
@@ -56,3 +62,46 @@ def test_rows_of_either_sensor_in_turn_are_both_alive() -> None:
     six[1::2, 0] = 0.5
     (found,) = dead_sensors(six)
     assert found.axes == (0,)
+
+
+def test_an_axis_that_never_changes_beside_others_that_do_is_a_broken_one() -> None:
+    six = np.random.default_rng(4).normal(size=(50, 6))
+    assert broken(six) == []
+    six[:, 1] = 0.3
+    (said,) = broken(six)
+    assert said.startswith("ay never changes while the rest of the sensor does")
+    six[:, 0], six[4, 0] = 0.1, np.nan
+    (said,) = broken(six)
+    assert said.startswith("ax and ay never change while")
+    # a column that is missing was not recorded, and a sensor of zeros is not there
+    six[:, :2], six[:, 3:] = np.nan, 0.0
+    assert broken(six) == []
+
+
+def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:
+    """And of the others as they are, in every part of a long recording."""
+    rows = np.random.default_rng(5).normal(size=(5000, 35))
+    rows[:, 27:33] = np.nan
+    rows[100, 27] = rows[4900, [28, 30, 31, 32]] = 1e-3
+    alive = LivingRows(rows)
+    assert len(alive) == 5000
+    found, expected = alive[10:4950], rows[10:4950].copy()
+    expected[:, [1 + 2, 7 + 2, 13 + 2, 19 + 2]] = 0.0
+    np.testing.assert_array_equal(found, expected)
+    assert (rows[:, 3] != 0).all()
+
+    t = np.arange(4.0)
+    block = Block.of(t, np.ones((4, 3)), np.ones((4, 3)))
+    (seen,) = alive.of(lambda start, end: iter([block]))(0.0, 4.0)
+    assert seen.acc.shape == seen.gyr.shape == (4, 3)
+    assert np.isnan(seen.acc[:, 2]).all() and (seen.acc[:, :2] == 1).all()
+    assert (seen.gyr == 1).all() and (block.acc == 1).all()
+
+
+def test_where_nothing_changes_everything_is_looked_at() -> None:
+    rows = np.ones((10, 35))
+    rows[:, 27:33] = np.nan
+    alive = LivingRows(rows)
+    np.testing.assert_array_equal(alive[:], rows)
+    nothing = iter(())
+    assert alive.of(lambda start, end: nothing)(0.0, 1.0) is nothing

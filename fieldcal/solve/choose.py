@@ -21,6 +21,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.sentences import join
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
@@ -35,6 +36,9 @@ from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import calibration
 from fieldcal.solve.rows import of_means, without_angles
+
+Earth = Literal["stated", "another", "none"]
+"""Whose rate gyroscopes have: of the stated latitude, of another one, or none."""
 
 TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
 
@@ -118,15 +122,29 @@ def _solved(
 def _fitted(
     observations: Observations, asked: Asked, method: Method, recorded: Recorded | None
 ) -> tuple[Estimated, list[str]]:
-    """The set that fits, with the Earth's rate unless gyroscopes show none."""
-    found, notes = _Session(observations, asked, method, recorded).best()
+    """The set that fits, with what other rates of the Earth differ by in its sigmas.
+
+    The rate of the stated latitude, of another, or none as simulators have it: one
+    that fits a little better is not the only one that is possible.
+    """
+
+    def fitted(earth: Earth) -> tuple[Estimated, list[str]]:
+        return _Session(observations, asked, method, recorded, earth).best()
+
+    found, notes = fitted("stated")
     shown = EarthVertical.of(found.given, found.search, observations.latitude)
-    if shown and shown.wrong:
-        still = _Session(observations, asked, method, recorded, earth=False)
-        other, others = still.best()
-        if other.score - found.score + np.log(priors.ELSEWHERE) > shown.gain:
-            return other, [NO_EARTH, *others]
-    return found, notes
+    if shown is None or not shown.favoured:
+        return found, notes
+    other, (none, others) = fitted("another")[0], fitted("none")
+    ahead = none.score - found.score + np.log(priors.ELSEWHERE)
+    score = np.array([0.0, shown.gain, ahead])
+    weights = np.exp(score - score.max())
+    as_said, elsewhere, absent = (weights / weights.sum()).tolist()
+    if ahead > max(0.0, shown.gain):
+        mixed = none.mixed_with(none, found, as_said)
+        return mixed.mixed_with(none, other, elsewhere), [NO_EARTH, *others]
+    mixed = found.mixed_with(found, other, elsewhere)
+    return mixed.mixed_with(found, none, absent), notes
 
 
 class _Session:
@@ -138,7 +156,7 @@ class _Session:
     asked : what for
     method : that was chosen
     recorded : its rows, if there are more than the means
-    earth : whether gyroscopes have the Earth's rate
+    earth : whose rate gyroscopes have
 
     """
 
@@ -148,14 +166,16 @@ class _Session:
         asked: Asked,
         method: Method,
         recorded: Recorded | None,
-        earth: bool = True,
+        earth: Earth = "stated",
     ) -> None:
         self.observations, self.asked, self.method = observations, asked, method
         navigation = observations.grade == "navigation"
         base, self.unknown = earth_known(
             observations.latitude, navigation, asked.heading, observations.under_way
         )
-        if not earth:
+        if earth == "another":
+            self.unknown = (self.unknown[0], EARTH_RATE, self.unknown[2])
+        elif earth == "none":
             base, self.unknown = np.zeros(3), (0.0, 0.0, 0.0)
         given = recorded or of_means(observations)
         rows = given.rows

@@ -6,6 +6,7 @@ effects that may exist in addition to the requested parameters (`averaging`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,22 +104,30 @@ class Estimated:
     wrong_angles: tuple[WrongAngles, ...] = ()
 
     def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
-        """The same, with what another model of the tilt differs by in the uncertainty.
+        """The same, with what another model differs by in the uncertainty.
 
-        `one` is this model fitted to what `other` is fitted to.
+        `one` is this model fitted to what `other` is fitted to, a model of another
+        tilt or of another rate of the Earth, as likely as `weight`.
         alpha0 turns about z and beta0 about x: the same angles in the other order.
         """
         twin = {"angle_offset.alpha0_deg": "base_tilt.about_z_deg",
                 "angle_offset.beta0_deg": "base_tilt.about_x_deg"}  # fmt: skip
         twin |= {b: a for a, b in twin.items()}
         ours, theirs = (dict(zip(e.names, e.values, strict=True)) for e in (one, other))
-        apart = np.zeros(len(self.names))
-        for i, name in enumerate(self.names):
-            if name in ours and twin.get(name, name) in theirs:
-                apart[i] = theirs[twin.get(name, name)] - ours[name]
-        return replace(
-            self, covariance=self.covariance + weight * np.outer(apart, apart)
+        at = [i for i, n in enumerate(self.names)
+              if n in ours and twin.get(n, n) in theirs]  # fmt: skip
+        named = [self.names[i] for i in at]
+        apart = np.array([theirs[twin.get(n, n)] - ours[n] for n in named])
+        more = np.zeros_like(self.covariance)
+        more[np.ix_(at, at)] = np.outer(apart, apart) + _wider(
+            one.among(named), other.among([twin.get(n, n) for n in named])
         )
+        return replace(self, covariance=self.covariance + weight * more)
+
+    def among(self, names: Sequence[str]) -> Array:
+        """Covariance of some of its parameters, in their order."""
+        at = [self.names.index(name) for name in names]
+        return self.covariance[np.ix_(at, at)]
 
     @property
     def causes(self) -> dict[str, float]:
@@ -164,6 +173,15 @@ class Estimated:
         ]
         white = np.concatenate([np.zeros(0), *off])
         return float(white.sum()), len(white)
+
+
+def _wider(ours: Array, theirs: Array) -> Array:
+    """By how much a covariance is larger, in directions in which it is."""
+    sigma = np.sqrt(np.diag(ours))
+    size, along = np.linalg.eigh((theirs - ours) / np.outer(sigma, sigma))
+    along = along * sigma[:, None]
+    larger: Array = (along * np.maximum(size, 0.0)) @ along.T
+    return larger
 
 
 def estimated(

@@ -74,6 +74,11 @@ class EarthVertical:
         )
 
     @property
+    def favoured(self) -> bool:
+        """Whether the rows speak for another one at all, possible or not."""
+        return self.gain > float(np.log(priors.ELSEWHERE))
+
+    @property
     def wrong(self) -> bool:
         """Whether it is likelier that of another latitude; what none has is no such."""
         beyond = abs(self.shown) - EARTH_RATE

@@ -217,7 +217,10 @@ def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() ->
 
 
 def test_the_other_model_is_covered_by_its_weight() -> None:
-    """Covariance C + w d d^T, d from one model to the other, w = 1 / (1 + e^ahead)."""
+    """At least C + w (d d^T + C' - C), d from one model to the other, and C + w d d^T.
+
+    w = 1 / (1 + e^ahead).
+    """
     u = outputs(FIVE, offset_deg=(0.02, -0.03))
     seen = observe(FIVE, u + 3e-4 * np.random.default_rng(2).standard_normal((5, 3)))
     both = solve(seen)
@@ -230,17 +233,20 @@ def test_the_other_model_is_covered_by_its_weight() -> None:
     names = dict(zip(order, [*one.names[:6], "angle_offset.alpha0_deg",
                              "angle_offset.beta0_deg"], strict=True))  # fmt: skip
     names |= {b: a for a, b in names.items()}
-    apart = [
-        other.value(n if n in other.names else names[n]) - one.value(n)
-        for n in one.names
-    ]
+    at = [other.names.index(n if n in other.names else names[n]) for n in one.names]
+    apart = other.values[at] - one.values
+    wider = other.covariance[np.ix_(at, at)] - one.covariance
     np.testing.assert_allclose(both.values, one.values)
-    more = np.outer(apart, apart) / (1 + np.exp(ahead))
+    weight, scaled = 1 / (1 + np.exp(ahead)), np.outer(one.sigma, one.sigma)
+    more = weight * np.outer(apart, apart)
     assert (np.sqrt(np.diag(more)) > 0.05 * one.sigma).sum() > 4, "it shows"
     # the difference in chi2 is printed to a tenth
-    np.testing.assert_allclose(
-        both.covariance - one.covariance, more, rtol=0.06, atol=1e-9
-    )
+    beyond = (both.covariance - one.covariance - more) / scaled
+    low = -0.06 * np.diag(more / scaled).sum()
+    assert np.linalg.eigvalsh(beyond).min() > low
+    assert np.linalg.eigvalsh(beyond - weight * wider / scaled).min() > low
+    most = weight * np.abs(np.linalg.eigvalsh(wider / scaled)).sum()
+    assert np.trace(beyond) < most - low
 
 
 def test_what_windows_scatter_by_is_an_rms_of_a_triad() -> None:

@@ -13,6 +13,8 @@ from fieldcal.solve import Observations, solve
 from fieldcal.solve.latitude import EarthVertical
 
 EARTH = 7.292115e-5
+UNSURE = 5e-5
+"""Noise of a window's mean at which the latitude is hardly told, rad/s."""
 LEANING = [Position.deg(a, b) for a, b in product((-50, 0, 50), (-40, 0, 40))]
 UPRIGHT = [Position.deg(a, b) for a, b in product((-4, 0, 4), (-5, 0, 5))]
 
@@ -121,3 +123,54 @@ def test_a_device_without_the_rate_of_the_earth_is_said_to_be_that() -> None:
         value, sigma = found.vector("gyr_bias")
         pulls += ((value - bias_of(seed)[3:]) / sigma).tolist()
     assert 0.6 < np.sqrt(np.mean(np.square(pulls))) < 1.4
+
+
+SOME = [Position.deg(a, b) for a, b in
+        ((0, 0), (22.5, 0), (45, 5), (180, 0), (90, 0), (0, 90))]  # fmt: skip
+
+
+def mixture(means: np.ndarray, noise: float, said: float) -> tuple[np.ndarray, ...]:
+    """Weights of the Earth's rate as stated, another or none; mean and sigma of biases.
+
+    Dense, of gyroscopes whose scale factor is 1: y_i = b + R_i e + noise.
+    """
+    phi = np.deg2rad(said)
+    level = EARTH * np.cos(phi) / np.sqrt(2)
+    turns = [about_x(p.beta or 0.0) @ about_z(p.alpha or 0.0) for p in SOME]
+    a = np.hstack([np.tile(np.eye(3), (len(SOME), 1)), np.vstack(turns)])
+    y = means[:, 3:].ravel()
+    ln, value, square = [], [], []
+    for vertical, sizes in (
+        (-EARTH * np.sin(phi), [level, 0.0, level]),
+        (-EARTH * np.sin(phi), [level, EARTH, level]),
+        (0.0, [0.0, 0.0, 0.0]),
+    ):
+        left = y - a[:, 4] * vertical
+        prior = np.diag([1e-2, 1e-2, 1e-2, *sizes]) ** 2
+        cov = a @ prior @ a.T + noise**2 * np.eye(len(y))
+        square_sum = left @ np.linalg.solve(cov, left)
+        ln.append(-0.5 * (square_sum + np.linalg.slogdet(cov)[1]))
+        gain = prior @ a.T @ np.linalg.inv(cov)
+        value.append((gain @ left)[:3])
+        square.append(np.diag(prior - gain @ a @ prior)[:3])
+    odds = np.exp(np.array(ln) - max(ln)) * [1.0, 1e-3, 1e-3]
+    weight = odds / odds.sum()
+    mean = weight @ value
+    spread = weight @ (np.array(square) + (np.array(value) - mean) ** 2)
+    return weight, mean, np.sqrt(spread)
+
+
+def test_what_cannot_be_decided_of_the_latitude_is_in_the_uncertainty() -> None:
+    """As averaged densely over the three possibilities."""
+    seen_open = 0
+    for seed in range(20):
+        means, _ = seen(SOME, 47.0, UNSURE, seed)
+        weight, mean, sigma = mixture(means, UNSURE, -47.0)
+        found = solved(SOME, 47.0, -47.0, noise=UNSURE, seed=seed)
+        value, got = found.vector("gyr_bias")
+        if not found.good or not 0.05 < weight.max() < 0.95:
+            continue
+        seen_open += 1
+        assert (got > 0.95 * sigma).all() and (got < 2.5 * sigma).all()
+        assert (np.abs(value - mean) < got).all()
+    assert seen_open >= 4

@@ -95,17 +95,20 @@ def unassessed(
     about, of_acc = session.about, "acc_scale" in found.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += [_lacking(found, session, still), *broken(session.block.six)]
+    wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
     wrong += _taken_out(session, still, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))
     return replace(found, warnings=warnings, good=found.good and not wrong)
 
 
-def _lacking(found: Calibration, session: Session, still: Rests) -> str:
+def _lacking(
+    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+) -> str:
     """What is not determined where positions had to be left out; empty for nothing.
 
-    A person who recorded so few on purpose knows what they do not show.
+    That is what is known no better than of any unit of the grade. A person who recorded
+    so few on purpose knows what they do not show.
     """
     out = len(session.positions) - len(still.rows)
     lost = [
@@ -113,7 +116,7 @@ def _lacking(found: Calibration, session: Session, still: Rests) -> str:
         for group in ("acc_bias", "acc_scale")
         if group in found.groups
         for axis, s in zip("xyz", found.vector(group)[1], strict=True)
-        if not np.isfinite(s)
+        if not s < (limits.tolerance(group) or np.inf)
     ]
     if not out or not lost:
         return ""

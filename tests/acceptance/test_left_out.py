@@ -33,6 +33,35 @@ def test_a_full_scale_below_gravity_is_bad(tmp_path: Path) -> None:
     assert "acc_scale.z" in says and says.endswith("record them again")
 
 
+def test_what_is_known_no_better_than_of_any_unit_is_not_determined(
+    tmp_path: Path,
+) -> None:
+    """Tilted positions in which az is within its full scale leave a number for z."""
+    device = Block.of(*leaning(full_scale=9.6))
+    held = [{"start_s": 10.0 * i, "end_s": 10.0 * i + 9.9} for i in range(12)]
+    folder = write_session(tmp_path / "s", device, held)
+    assert main(["solve", str(folder)]) == 1
+    found = json.loads((folder / "result.json").read_text())
+    sigma = found["parameters"]["acc_scale"]["sigma"]
+    assert all(s is not None for s in sigma) and max(sigma) > 0.01
+    (says,) = [w for w in found["warnings"] if "were left out, and without" in w]
+    assert "acc_scale.z" in says
+
+
+def leaning(full_scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, forces and rates of a device on its six faces and leaning in six more."""
+    faces = np.vstack([np.eye(3), -np.eye(3)])
+    lean = [[7, -5, 4.8], [-5, -7, 4.7], [7, 7, 0.3], [-7, 7, -0.2],
+            [5, -6.9, -5], [-6.9, 5, -5.1]]  # fmt: skip
+    axes = np.vstack([faces, lean])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    rng = np.random.default_rng(5)
+    acc = np.repeat(9.80665 * axes, 500, axis=0) + [0.05, -0.04, 0.02]
+    acc += rng.normal(0, 5e-3, acc.shape)
+    gyr = rng.normal(0, 1e-3, acc.shape)
+    return np.arange(len(acc)) / 50, np.clip(acc, -full_scale, full_scale), gyr
+
+
 @pytest.mark.parametrize("sides", [7, 2])
 def test_what_was_not_recorded_is_not_left_out(tmp_path: Path, sides: int) -> None:
     code, found = solved(tmp_path, sides, 80.0)

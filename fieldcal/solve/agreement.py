@@ -40,6 +40,34 @@ wide sizes of what is estimated show."""
 
 
 @dataclass(frozen=True, slots=True)
+class Furthest:
+    """The mean that is furthest from what the other windows predict of it.
+
+    Attributes
+    ----------
+    window : its number
+    axis : 0 to 2 of the triad, -1 for the length of a force of unknown orientation
+    off, sigma : by how much, and how well it was predicted; outputs
+
+    """
+
+    window: int
+    axis: int
+    off: float
+    sigma: float
+
+    @classmethod
+    def of(cls, off: Array, sigma: Array, lengths: Mask) -> Furthest | None:
+        """Of residuals and their sigmas, (p, 3); `lengths` (p,) where one is that."""
+        far = np.abs(off) / sigma
+        if not np.isfinite(far).any():
+            return None
+        i, c = (int(n) for n in np.unravel_index(np.nanargmax(far), far.shape))
+        axis = -1 if lengths[i] else c
+        return cls(i, axis, float(off[i, c]), float(sigma[i, c]))
+
+
+@dataclass(frozen=True, slots=True)
 class Fit:
     """Of one triad.
 
@@ -50,6 +78,7 @@ class Fit:
     left_out : the same of windows that the fit did not see; nan where none could be
     rows : (p, 3) residuals, nan where nothing was measured; of a position whose
         orientation nobody knows only along the force, or along the rate of a table
+    furthest : of those that the fit did not see; None where there is none
 
     """
 
@@ -58,6 +87,7 @@ class Fit:
     rms: float
     left_out: float
     rows: Array
+    furthest: Furthest | None = None
 
     @property
     def contradicts(self) -> bool:
@@ -92,10 +122,12 @@ def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -
     residual = seen.along(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
     sizes = free * found.sizes[~random]
-    alone = seen.along(*_left_out(stated + wander, sizes, y, seen))
+    off, unsure = _left_out(stated + wander, sizes, y, seen)
+    alone = seen.along(off, unsure)
     return Fit(
-        chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual
-    )
+        chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual,
+        Furthest.of(alone, seen.sigmas(unsure), seen.turned),
+    )  # fmt: skip
 
 
 def _random(d: Given) -> Mask:
@@ -167,6 +199,14 @@ class _Seen:
                 n = self._normal(i)[None] if self.turned[i] else np.eye(3)
                 if np.trace(n @ unsure[i] @ n.T) > UNCHECKED * self.d.unit[0] ** 2:
                     out[i] = np.nan
+        return out
+
+    def sigmas(self, unsure: Array) -> Array:
+        """What the rows of `along` have beside them, of covariances (p, 3, 3)."""
+        out = np.full((len(self.d.held), 3), np.nan)
+        for i in np.flatnonzero(self.used.reshape(-1, 3).all(axis=1)).tolist():
+            n = self._normal(i)[None] if self.turned[i] else np.eye(3)
+            out[i, : len(n)] = np.sqrt(np.diag(n @ unsure[i] @ n.T))
         return out
 
     @property

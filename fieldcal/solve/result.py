@@ -22,7 +22,13 @@ from fieldcal.solve.latitude import EarthVertical
 from fieldcal.solve.magnified import magnified
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.reliability import WrongAngles
-from fieldcal.solve.warnings import closure_chi2, doubts, left_open, not_levelled
+from fieldcal.solve.warnings import (
+    closure_chi2,
+    contradicted,
+    doubts,
+    left_open,
+    not_levelled,
+)
 
 UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
 UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
@@ -59,13 +65,15 @@ def calibration(
         raise NotObservable(
             "these positions determine nothing: " + "; ".join(filter(None, sentences))
         )
+    of_acc = any(map(_is_acc, names))
     odd = [
         *senseless(names, found.values, sigma, observations.nominal),
         *elsewhere(_named(found.contradicted, observations)),
         *_wrong_latitude(found, observations),
+        *contradicted(observations, found, of_acc),
     ]
     sentences += doubts(method, observations, found)
-    fit = found.acc if any(map(_is_acc, names)) else found.gyr
+    fit = found.acc if of_acc else found.gyr
     info = _info(method, observations, asked, found)
     info |= {"borrowed": told.to_json()} if told else {}
     info |= {"cross_coupling_left_out": worst.to_json()} if worst else {}
@@ -79,7 +87,7 @@ def calibration(
         dof=fit.dof,
         rms=found.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
-        good=not odd and not fit.contradicts,
+        good=not odd,
         info=info,
     )
 

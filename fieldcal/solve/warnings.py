@@ -12,6 +12,7 @@ import numpy as np
 from fieldcal.calibration import Method
 from fieldcal.calibration.names import AXES, ParameterName, group_of
 from fieldcal.core.gravity import gravity
+from fieldcal.core.samples import CHANNELS
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
@@ -154,6 +155,32 @@ def doubts(method: Method, observations: Observations, found: Estimated) -> list
     doubt = DoubtfulPosition.of(observations, found.bad)
     few, scattered = _few(method, found), _scattered(found)
     return [*few, doubt.sentence if doubt else "", *scattered]
+
+
+def contradicted(
+    observations: Observations, found: Estimated, of_acc: bool
+) -> list[str]:
+    """A fit of forces, or of rates, in which the model is at fault, not the noise."""
+    fit, first = (found.acc, 0) if of_acc else (found.gyr, 3)
+    if not fit.contradicts:
+        return []
+    what = "forces" if of_acc else "rates"
+    says = (
+        f"the {what} in these positions contradict each other: χ² = {fit.chi2:.0f} with"
+        f" {fit.dof} degree{'s' if fit.dof > 1 else ''} of freedom, and chance does not"
+        " do that"
+    )
+    if (far := fit.furthest) is None:
+        return [says]
+    unit = CHANNEL_UNITS[first].replace("^2", "²")
+    length = f"the length of the {what[:-1]}"
+    along = CHANNELS[first + far.axis] if far.axis >= 0 else length
+    return [
+        f"{says}; furthest from what the others predict is"
+        f" {observations.positions[far.window].name}, {along} by {far.off:+.2g} ±"
+        f" {far.sigma:.1g} {unit}: take that position again, or ask fieldcal diagnose"
+        " what is left out"
+    ]
 
 
 def _few(method: Method, found: Estimated) -> list[str]:

@@ -12,7 +12,7 @@ from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
-from fieldcal.solve import agreement
+from fieldcal.solve import agreement, solve
 from fieldcal.solve.estimation import Estimated, estimated
 from fieldcal.solve.given import Wanted, seen_by
 from fieldcal.solve.observations import Index
@@ -60,6 +60,16 @@ class Explicit:
         shared = self.stated[np.ix_(rows, rest)]
         foretold = shared @ np.linalg.solve(self.stated[np.ix_(rest, rest)], off)
         return np.asarray(self.y[rows] - self.design[rows] @ x - foretold)
+
+    def unsure(self, rows: Index) -> Array:
+        """Covariance of these residuals."""
+        rest = np.setdiff1d(np.arange(len(self.y)), rows)
+        s, shared = self.stated[np.ix_(rest, rest)], self.stated[np.ix_(rows, rest)]
+        a = self.design[rest]
+        inner = a.T @ np.linalg.solve(s, a) + np.diag(WIDE**-2.0)
+        free = self.design[rows] - shared @ np.linalg.solve(s, a)
+        own = self.stated[np.ix_(rows, rows)] - shared @ np.linalg.solve(s, shared.T)
+        return np.asarray(own + free @ np.linalg.solve(inner, free.T))
 
 
 def explicit(places: tuple[Position, ...], u: Array, degrees: float = 0.0) -> Explicit:
@@ -112,6 +122,35 @@ def test_what_is_left_out_is_foretold_by_the_others(degrees: float) -> None:
     expected = np.sqrt(np.average(off**2, weights=weight))
     assert one.left_out == pytest.approx(expected, rel=2e-3)
     assert one.left_out > 1.1 * one.rms
+
+
+@pytest.mark.parametrize("seed", [2, 5, 9])
+def test_the_furthest_is_the_largest_residual_by_what_it_was_foretold_to(
+    seed: int,
+) -> None:
+    u = noisy(PLACES, seed)
+    plain = explicit(PLACES, u, 0.02)
+    rows = [3 * i + np.arange(3) for i in range(len(PLACES))]
+    off = np.array([plain.without(r) for r in rows])
+    sd = np.sqrt([np.diag(plain.unsure(r)) for r in rows])
+    i, c = divmod(int(np.argmax(np.abs(off) / sd)), 3)
+    far = found(PLACES, u, 0.02).acc.furthest
+    assert far is not None and (far.window, far.axis) == (i, c)
+    assert far.off == pytest.approx(off[i, c], rel=5e-3)
+    assert far.sigma == pytest.approx(sd[i, c], rel=0.1)
+
+
+def test_forces_that_contradict_each_other_are_why_it_is_bad() -> None:
+    """Two angles wrong: the first sentence says so, and where most of it is."""
+    u = noisy(PLACES, 1)
+    u[1, 0] += 0.9
+    u[4, 2] -= 0.7
+    seen = observe(PLACES, u)
+    seen.covariance[:, range(3), range(3)] = SIZE**2
+    result = solve(seen, tilt="none")
+    assert not result.good
+    assert "contradict each other" in result.warnings[0]
+    assert f"{PLACES[1].name}, ax by +" in result.warnings[0]
 
 
 def test_residuals_are_what_the_estimate_leaves() -> None:

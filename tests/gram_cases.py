@@ -109,7 +109,7 @@ def turn(rng: np.random.Generator, width: int) -> TurnRows:
     draw = rng.standard_normal
     return TurnRows(
         (0, 1), draw(2), at, draw((2, 6)), rng.uniform(1, 4, 2),
-        rng.uniform(0, 1, (2, 3)), draw(3), draw((3, 6)),
+        rng.uniform(0, 1, (2, 6)), draw(3), draw((3, 6)),
     )  # fmt: skip
 
 
@@ -123,7 +123,7 @@ def beside(windows: Dense, turns: list[TurnRows], tau: Array) -> Dense:
         y += [one.closure, one.way]
         design.append(whole)
         white += [1 / np.sqrt(one.info), np.ones(len(one.way))]
-        ends = np.sqrt(tau[CLOSURE] ** 2 + one.bent**2 @ tau[:3] ** 2)
+        ends = np.sqrt(tau[CLOSURE] ** 2 + one.bent**2 @ tau[:6] ** 2)
         spread += [ends, np.zeros(len(one.way))]
     n, sd = len(windows.y), np.concatenate(white)
     cov = np.diag(sd**2)

@@ -150,7 +150,7 @@ def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, 
     at = all_[there]
     out.off[i, :some], out.info[i, :some] = turn.closure, turn.info
     out.means[i, :some, at] = turn.design[:, there].T
-    out.bent[i, :some, :3] = turn.bent
+    out.bent[i, :some] = turn.bent
     if not len(turn.way):
         return 0.0, 0
     design = turn.way_design[:, there]

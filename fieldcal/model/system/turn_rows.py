@@ -45,7 +45,8 @@ class TurnRows:
     columns : (k,) of the dictionary
     design : (s, k) of the closure
     info : (s,) information, 1/rad^2
-    bent : (s, 3) by what it is off for accelerometers that are each off at both ends
+    bent : (s, 6) by what it is off for accelerometers that are each off at both ends,
+        and for gyroscopes that are each off on the way
     way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
 
     """
@@ -143,6 +144,8 @@ class Turns:
         closure = basis @ seen + close @ values[index]
         off = [(basis @ bent) ** 2 for bent in loose.values()]
         bent = np.sqrt(sum(off, np.zeros((len(basis), 3))))
+        drift = np.abs(basis @ turn.weights(state.scale[3:]).sum(axis=1))
+        bent = np.hstack([bent, drift])
         way: Array = np.zeros(0)
         design: Array = np.zeros((0, len(index)))
         if self.known is not None:

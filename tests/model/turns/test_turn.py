@@ -288,6 +288,18 @@ def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
     assert abs(ended[0] - (2 * SPACING_S)) < 0.7
 
 
+def test_a_gyroscope_that_is_off_on_the_way_bends_a_turn_as_its_bias_does() -> None:
+    """Biases that wander from window to window are not those of the way either."""
+    one = ride("gyro_scale")
+    d = one.inference.dictionary
+    for turn in one.turns:
+        whole = np.zeros((len(turn.closure), d.width))
+        whole[:, turn.columns] = turn.design
+        drift = np.abs(whole[:, d.bias + np.arange(3, 6)])
+        assert drift.max() > 1.0, "s, as long as the way"
+        np.testing.assert_allclose(turn.bent[:, 3:], drift, rtol=1e-6, atol=1e-9)
+
+
 def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     """Without known angles a closure begins and ends at the forces that are seen."""
     block, windows = recorded()

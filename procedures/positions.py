@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import WIDE, Position
-from fieldcal.evaluation.observations import angle_setting, observations
+from fieldcal.evaluation.observations import angle_setting, observations, squareness
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
 from fieldcal.session.description import Description
@@ -24,6 +24,9 @@ def plan(
     held = yield from hold_each(about.positions, seconds, sigma)
     seen = observations(about, list(held.values()), list(held))
     found = solve(
-        seen, level_sigma_deg=about.level_deg, angle_sigma_deg=angle_setting(about)
+        seen,
+        level_sigma_deg=about.level_deg,
+        angle_sigma_deg=angle_setting(about),
+        square_sigma=squareness(about),
     )
     return with_skipped_positions(found, about.positions, held)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -149,15 +149,15 @@ def _besides(
     """Further positions of the ladder, the best one after the other."""
     tilts = [g for g in ("angle_offset", "base_tilt") if g in found.groups]
     names = parameters(*(tilts or ["angle_offset"]))
-    held, angle = list(had), _angle(found)
-    before = _expected(names, held, about, sigma, angle)
+    held, known = list(had), _Known.of(found, sigma)
+    before = _expected(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     chosen: list[Position] = []
     for _ in range(MOST):
         ratios = []
         candidates = [Position.deg(a, b) for a, b in ladder(about.positions)]
         for one in candidates:
-            then = _expected(names, [*held, *chosen, one], about, sigma, angle)
+            then = _expected(names, [*held, *chosen, one], about, known)
             ratios.append(_worst(names, over, before, then, allowed))
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
@@ -201,27 +201,40 @@ def _worst(
     return max(parts)
 
 
-def _angle(found: Calibration) -> float:
-    """How well angles are set, rad."""
-    return float(np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0)))
+class _Known(NamedTuple):
+    """What is known before: error of a mean, m/s^2, angles, rad, square axes."""
+
+    sigma: float
+    angle: float
+    square: float
+
+    @classmethod
+    def of(cls, found: Calibration, sigma: float) -> _Known:
+        """As a result was made with."""
+        angle = np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0))
+        return cls(sigma, float(angle), float(found.info.get("square_sigma") or 0.0))
 
 
 def _expected(
     names: Sequence[str],
     positions: Sequence[Position],
     about: Description,
-    sigma: float,
-    angle: float,
+    known: _Known,
 ) -> Array:
     """Sigma of each parameter, (k,), by (1); infinite where not determined."""
-    j = design(names, positions, about.gravity, about.mounting)
+    coupled = parameters("cross_coupling") if known.square else ()
+    every = [*names, *(name for name in coupled if name not in names)]
+    j = design(every, positions, about.gravity, about.mounting)
     t = np.stack(
         [_force_slopes(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))],
         axis=2,
     )
-    r = sigma**2 * np.eye(3) + angle**2 * t @ t.transpose(0, 2, 1)
-    whitened = np.linalg.solve(np.linalg.cholesky(r), j)
-    return sigma_of(whitened.reshape(-1, len(names)))  # (1)
+    r = known.sigma**2 * np.eye(3) + known.angle**2 * t @ t.transpose(0, 2, 1)
+    whitened = np.linalg.solve(np.linalg.cholesky(r), j).reshape(-1, len(every))
+    if known.square:
+        before = np.eye(len(every))[len(names) :] / known.square
+        whitened = np.vstack([whitened, before])
+    return sigma_of(whitened)[: len(names)]  # (1)
 
 
 def _force_slopes(

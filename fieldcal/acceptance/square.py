@@ -1,32 +1,27 @@
 """Whether a result relies on axes that are square.
 
-Cross-coupling that is not estimated is taken as zero. Unfavourable positions magnify
-what the device has of it, beyond every stated uncertainty and unseen: nothing in the
-recording contradicts it. Whoever decides has to know what is relied on.
+Cross-coupling that is not estimated is what the factory left, and hardly anything in
+few positions would contradict more of it. Whoever decides has to know what is relied
+on.
 """
 
 from __future__ import annotations
 
-from fieldcal.acceptance.check import Check, shown_unit
-from fieldcal.calibration import COMPONENTS, Calibration
-from fieldcal.calibration.limits import GradeLimits
-from fieldcal.calibration.names import group_of
+from fieldcal.acceptance.check import Check
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.session.description import Description
 
 
-def relies_on_square_axes(found: Calibration, limits: GradeLimits) -> list[Check]:
-    """What cross-coupling may be at most, where positions magnify it."""
-    told = found.info.get("cross_coupling_left_out")
-    if not told:
+def relies_on_square_axes(found: Calibration, about: Description) -> list[Check]:
+    """How square the axes were taken to be, if cross-coupling was not estimated."""
+    square = float(found.info.get("square_sigma") or 0.0)
+    if not square or not any(sensor_of(group_of(n)) == "acc" for n in found.names):
         return []
-    name, group = str(told["parameter"]), group_of(str(told["parameter"]))
-    limit = limits.sigma(group)
-    if limit is None:
-        return []
-    most = 100 * limit / float(told["moved_by_one"])
-    unit = shown_unit(COMPONENTS[group][1])
+    whose = "as stated" if about.squareness else "as usual for the grade"
     says = (
-        f"this relies on axes that are square to ± {most:.2g} %: cross-coupling is"
-        f" taken as zero, and so much of it moves {name} by {limit:.2g}{unit}, its"
-        " limit; estimate it from nine positions or more (--cross)"
+        f"this relies on axes that are square to ± {100 * square:.2g} %, {whose}; each"
+        " ± includes it. An uncalibrated device has more: estimate cross-coupling from"
+        " nine positions or more (--cross)"
     )
-    return [Check("cross-coupling", None, says, most / 100, None, "1")]
+    return [Check("cross-coupling", None, says)]

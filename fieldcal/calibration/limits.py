@@ -41,6 +41,7 @@ class GradeLimits:
     verification_residual: float
     verification_chance: float
     angle_setting_deg: float
+    squareness: float
     temperature_min_c: float
     temperature_max_c: float
     temperature_span_k: float

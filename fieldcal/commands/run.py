@@ -46,6 +46,7 @@ EXAMPLE = """\
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
+    "squareness",
 )
 
 INTERRUPTED = 130

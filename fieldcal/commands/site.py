@@ -23,6 +23,13 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     add("--station", metavar="NAME", help="test station, for fieldcal lot")
     add("--operator", metavar="NAME", help="operator, for fieldcal lot")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
+    add(
+        "--squareness",
+        type=float,
+        metavar="X",
+        help="cross-coupling left in the device, 1σ of each coefficient (default: the"
+        " grade's)",
+    )
     add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
@@ -53,6 +60,7 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "serial": args.serial,
             "lot": args.lot,
             "grade": args.grade,
+            "squareness": args.squareness,
         },
         "site": {
             "station": args.station,

@@ -56,6 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         add(option, type=float, metavar="DEG", help=what)
     add(
+        "--squareness",
+        type=float,
+        metavar="X",
+        help="cross-coupling left in the device, 1σ of each coefficient; else the"
+        " grade's",
+    )
+    add(
         "--lot",
         action="append",
         default=[],
@@ -120,6 +127,7 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles,
+        square_sigma=args.squareness,
         lot=_lot(args, session) if args.lot else None,
     )
 

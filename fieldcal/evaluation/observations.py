@@ -63,6 +63,13 @@ def angle_setting(about: Description) -> float:
     return limits.read(about.grade).angle_setting_deg
 
 
+def squareness(about: Description) -> float:
+    """How square the accelerometers' axes are; the grade's where it is not stated."""
+    if about.squareness is not None:
+        return about.squareness
+    return limits.read(about.grade).squareness
+
+
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:
     """The calibration with the device it belongs to and the software that made it."""
     origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}

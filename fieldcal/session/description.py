@@ -50,6 +50,8 @@ class Description:
     level_deg : how level the base was made, one sigma about each level axis; None where
         not stated
     angle_setting_deg : how well each position's angles are set, likewise
+    squareness : one sigma of each coefficient of the accelerometers' cross-coupling
+        that is left in the device, likewise
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each key of `units.NOMINAL`: what a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
@@ -71,6 +73,7 @@ class Description:
     under_way: UnderWay
     level_deg: float | None
     angle_setting_deg: float | None
+    squareness: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
     gauge: Gauge
@@ -246,6 +249,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         under_way=moving.level if grade == "tactical" else moving,
         level_deg=level,
         angle_setting_deg=_known(site.get("angle_setting_deg")),
+        squareness=_known(device.get("squareness")),
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
         gauge=gauge,

@@ -60,6 +60,7 @@ def solve(
     angle_sigma_deg: float = 0.0,
     recorded: Recorded | None = None,
     lot: LotPrior | None = None,
+    square_sigma: float = 0.0,
 ) -> Calibration:
     """Estimate the calibration.
 
@@ -78,6 +79,8 @@ def solve(
         axis
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
+    square_sigma : how square the axes of the accelerometers are, where cross-coupling
+        is not estimated
     lot : what the unit's lot says of its parameters, which the result then has in it
         unless the unit is odd
 
@@ -98,7 +101,7 @@ def solve(
     """
     asked = Asked(
         method, tilt, cross, as_printed,
-        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot,
+        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot, square_sigma,
     )  # fmt: skip
     if as_printed:
         return printed.solve(observations, asked)
@@ -214,13 +217,15 @@ class _Session:
         sees_earth = (
             observations.grade == "navigation" and observations.latitude is not None
         )
+        crossed = self.asked.cross or self.method == "least_squares"
         wanted = Wanted(
             tilt,
-            cross=self.asked.cross or self.method == "least_squares",
+            cross=crossed,
             gyro_cross=table or turned,
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
             angles_deg=self.asked.angles_deg,
+            square=0.0 if crossed else self.asked.square,
             earth=self.unknown,
             turned=turned,
             lot=self.asked.lot,

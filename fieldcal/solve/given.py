@@ -52,6 +52,8 @@ class Wanted:
     gyr_scale : whether the scale factor of the gyroscopes is
     level_deg : how level the base is, about each level axis; None if it is not stated
     angles_deg : how well each angle is set
+    square : how square the axes of the accelerometers are, if cross-coupling is not
+        estimated
     earth : (3,) rad/s, what is not known of the Earth's rate in base axes
     turned : whether turns between positions were recorded
     lot : what the unit's lot says of its parameters; None where nobody asks it
@@ -64,6 +66,7 @@ class Wanted:
     gyr_scale: bool = False
     level_deg: float | None = None
     angles_deg: float = 0.0
+    square: float = 0.0
     earth: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turned: bool = False
     lot: LotPrior | None = None
@@ -154,6 +157,8 @@ class Given(Dictionary):
             yield self._estimated(w.tilt, known=w.level_deg)
         if w.cross:
             yield self._estimated("cross_coupling", turned=not oriented)
+        if w.square and self.x.f.any():
+            yield self._square(w.square, turned=not oriented)
         if w.gyro_cross:
             yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
@@ -197,6 +202,14 @@ class Given(Dictionary):
         group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
                       fixed=fixed)  # fmt: skip
         return _given_cause(group)
+
+    def _square(self, sigma: float, turned: bool) -> Cause:
+        """What axes are off from square: cross-coupling that nobody asked for."""
+        cause = self._estimated("cross_coupling", turned, known=sigma)
+        (group,) = cause.variants
+        return _given_cause(
+            Group("square", "acc", group.columns, group.typical, fixed=1.0)
+        )
 
     def _earth(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""

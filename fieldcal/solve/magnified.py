@@ -36,6 +36,7 @@ class Magnified:
     name, unit : of the parameter
     moved : 1 sigma for a coefficient of one
     times : the same over gravity for a bias, over one for a scale factor
+    square : cross-coupling that the set counts with, 1 sigma
 
     """
 
@@ -43,24 +44,23 @@ class Magnified:
     unit: str
     moved: float
     times: float
+    square: float
 
     @property
     def sentence(self) -> str:
         """What it costs and what to do."""
         moved = f"{self.moved / 1000:.2g} {self.unit}".removesuffix(" 1")
         return (
-            "cross-coupling is taken as zero, and these positions magnify its effect"
-            f" {self.times:.1f} times: each 0.1 % moves {self.name} by {moved}, which"
+            f"cross-coupling {self._beyond}is taken as zero, and these positions"
+            f" magnify its effect {self.times:.1f} times: each 0.1 % moves {self.name}"
+            f" by {moved}, which"
             " the uncertainties do not include; hold each axis up and down, or estimate"
             " cross-coupling (--cross) from nine positions or more"
         )
 
-    def to_json(self) -> dict[str, str | float]:
-        """Key `cross_coupling_left_out` of a result."""
-        return {
-            "parameter": self.name, "moved_by_one": self.moved, "unit": self.unit,
-            "times": self.times,
-        }  # fmt: skip
+    @property
+    def _beyond(self) -> str:
+        return f"beyond ± {100 * self.square:.2g} % " if self.square else ""
 
 
 def magnified(found: Estimated) -> Magnified | None:
@@ -79,7 +79,8 @@ def magnified(found: Estimated) -> Magnified | None:
         if parameter.sensor == "acc":
             moved = float(added[given.names.index(name)])
             times = moved / (1.0 if parameter.is_scale else G0)
-            every.append(Magnified(name, GROUPS[parameter.group][2], moved, times))
+            unit, square = GROUPS[parameter.group][2], given.wanted.square
+            every.append(Magnified(name, unit, moved, times, square))
     worst = max(every, key=lambda m: m.times, default=None)
     return worst if worst and worst.times > 1 else None
 

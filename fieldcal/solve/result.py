@@ -76,7 +76,6 @@ def calibration(
     fit = found.acc if of_acc else found.gyr
     info = _info(method, observations, asked, found)
     info |= {"borrowed": told.to_json()} if told else {}
-    info |= {"cross_coupling_left_out": worst.to_json()} if worst else {}
     return Calibration(
         method=method,
         names=names,
@@ -152,6 +151,7 @@ def _info(
         "bad_position": [round(float(p), 4) for p in found.bad],
         "extra_scatter": scatter_of(found.found, (0, 1, 2)),
         "angle_sigma_deg": asked.angles_deg,
+        "square_sigma": found.given.wanted.square,
     }
     if doubt := DoubtfulPosition.of(observations, found.bad):
         out["doubtful_position"] = doubt.to_json()

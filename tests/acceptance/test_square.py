@@ -1,50 +1,70 @@
-"""What a decision says of cross-coupling that a result leaves out."""
+"""What a decision says of cross-coupling that was not estimated."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from observed import observe
 
 from fieldcal.acceptance.square import relies_on_square_axes
-from fieldcal.calibration import Calibration, limits
-from fieldcal.core.positions import SIX_FACES, TWO, Position, forces
+from fieldcal.calibration import Calibration
+from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
+from fieldcal.core.samples import Array
+from fieldcal.session import description
 from fieldcal.solve import solve
 
-TACTICAL = limits.read("tactical")
+ABOUT = description.parse({"format": 1})
 G = 9.81
+NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
 
 
-def found(positions: tuple[Position, ...]) -> Calibration:
-    return solve(observe(positions, forces(positions, G), sigma=1e-4))
+def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibration:
+    seen = observe(positions, forces(positions, G), sigma=1e-4)
+    return solve(seen, tilt="none", square_sigma=square)
 
 
-def test_a_small_ladder_relies_on_axes_so_square_that_its_limit_holds() -> None:
-    result = found(TWO)
-    told = result.info["cross_coupling_left_out"]
-    (check,) = relies_on_square_axes(result, TACTICAL)
-    limit = TACTICAL.sigma(told["parameter"].split(".")[0])
-    assert check.ok is None and limit is not None and told["times"] > 1
-    assert check.value == pytest.approx(limit / told["moved_by_one"])
-    assert f"square to ± {100 * limit / told['moved_by_one']:.2g} %" in check.says
-    assert f"moves {told['parameter']} by {limit:.2g}" in check.says
+@pytest.mark.parametrize(
+    ("stated", "says"), [(None, "as usual for the grade"), (3e-4, "as stated")]
+)
+def test_it_says_how_square_axes_were_taken_to_be(
+    stated: float | None, says: str
+) -> None:
+    about = replace(ABOUT, squareness=stated)
+    (check,) = relies_on_square_axes(found(3e-4), about)
+    assert check.ok is None and f"square to ± 0.03 %, {says}" in check.says
 
 
-def test_faces_up_and_down_rely_on_nothing() -> None:
-    result = found(SIX_FACES)
-    assert "cross_coupling_left_out" not in result.info
-    assert relies_on_square_axes(result, TACTICAL) == []
+def test_cross_coupling_that_is_estimated_is_relied_on_by_nothing() -> None:
+    result = solve(observe(NINE, forces(NINE, G)), cross=True, square_sigma=3e-4)
+    assert relies_on_square_axes(result, ABOUT) == []
+    assert relies_on_square_axes(found(0.0), ABOUT) == []
 
 
-def test_cross_coupling_that_is_estimated_is_not_left_out() -> None:
-    nine = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
-    result = solve(observe(nine, forces(nine, G), sigma=1e-4), cross=True)
-    assert relies_on_square_axes(result, TACTICAL) == []
+def test_faces_have_of_it_what_each_bias_takes_in() -> None:
+    """Between faces up and down along each axis a bias has no part of it at all."""
+    plain, square = found(0.0), found(5e-4)
+    assert square.info["square_sigma"] == 5e-4
+    for group in ("acc_bias", "acc_scale"):
+        np.testing.assert_allclose(
+            square.vector(group)[1], plain.vector(group)[1], rtol=0.02
+        )
 
 
-def test_what_has_no_limit_is_not_held_against_one() -> None:
-    result = found(TWO)
-    told = result.info["cross_coupling_left_out"] | {"parameter": "base_tilt.about_x"}
-    other = replace(result, info={**result.info, "cross_coupling_left_out": told})
-    assert relies_on_square_axes(other, TACTICAL) == []
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
+    """Devices of that squareness, drawn: a plain estimate is far off, this one not."""
+    rng = np.random.default_rng(seed)
+    off: list[Array] = []
+    plain: list[Array] = []
+    for _ in range(25):
+        mixing = np.eye(3) + rng.normal(0, 5e-4, (3, 3)) * (1 - np.eye(3))
+        seen = observe(FIVE, forces(FIVE, G) @ mixing.T, sigma=1e-4)
+        for square, pulls in ((5e-4, off), (0.0, plain)):
+            result = solve(seen, tilt="none", square_sigma=square)
+            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+                value, sigma = result.vector(group)
+                pulls.append((value - true) / sigma)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
+    assert np.sqrt(np.mean(np.square(plain))) > 3

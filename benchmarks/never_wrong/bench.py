@@ -52,6 +52,10 @@ MOUNTINGS = (
 )
 
 
+SQUARE = 5e-4
+"""One sigma of each cross-coupling coefficient that a factory leaves, 0.03 deg."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """What is there, and what is written down of it.
@@ -69,6 +73,8 @@ class Bench:
     rate : samples a second
     mounting : of the device
     acc_bias, acc_scale, gyr_bias, gyr_scale : (3,) of the device
+    coupled : (2, 3, 3) what an axis of either sensor sees of another's input, 0 of its
+        own
     acc_noise, gyr_noise : rms of a sample
     grain : what accelerations are rounded to, m/s^2; 0 for none
     imported : whether angles are unknown, and the session is no recalibration
@@ -92,6 +98,7 @@ class Bench:
     acc_scale: Floats
     gyr_bias: Floats
     gyr_scale: Floats
+    coupled: Floats
     acc_noise: float
     gyr_noise: float
     grain: float
@@ -177,6 +184,7 @@ def drawn(rng: np.random.Generator) -> Bench:
         acc_scale=1 + rng.normal(0, 5e-3, 3),
         gyr_bias=rng.normal(0, 5e-3, 3),
         gyr_scale=1 + rng.normal(0, 5e-3, 3),
+        coupled=rng.normal(0, SQUARE, (2, 3, 3)) * (1 - np.eye(3)),
         acc_noise=acc_noise,
         gyr_noise=acc_noise * float(rng.uniform(0.05, 0.3)),
         grain=float(rng.choice([0.0, 0.0, 1e-3, 9.80665 / 4096])),
@@ -241,6 +249,7 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
     w += about_z * speed[:, :1]
     f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
+    f, w = f + f @ bench.coupled[0].T, w + w @ bench.coupled[1].T
     acc = bench.acc_bias + bench.acc_scale * f + rng.normal(0, bench.acc_noise, f.shape)
     gyr = bench.gyr_bias + bench.gyr_scale * w + rng.normal(0, bench.gyr_noise, w.shape)
     if bench.grain:

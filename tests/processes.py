@@ -25,8 +25,9 @@ HANGS = 600.0
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 RUN, SIM = [*FIELDCAL, "run"], [*FIELDCAL, "sim"]
 TWO_POSITION = [*RUN, "two_position", "--headless", "--level=0.001", "--angles=0.001"]
-TWO_POSITION += ["--no-report"]
-"""Two positions on a base that is level, set exactly; no operator, and no report."""
+TWO_POSITION += ["--squareness=1e-5", "--no-report"]
+"""Two positions on a base that is level, set exactly, of a device with square axes; no
+operator, and no report."""
 
 
 def steady(folder: Path) -> list[str]:

@@ -31,6 +31,9 @@ from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.marks import ADDED
 from fieldcal.session.recorder import Recorder
 
+ALIKE = ("grade", "squareness")
+"""What is said of the device that is led holds for the further ones as well."""
+
 BATCHES = 1 << 17
 """Batches whose times are kept: more than an hour."""
 
@@ -205,11 +208,11 @@ def record_companions(
         others = []
         for number, (url, serial) in enumerate(further.items(), 2):
             driver = stack.enter_context(open_driver(url))
-            device = {"name": f"device {number}", "address": url}
+            device: dict[str, Any] = {"name": f"device {number}", "address": url}
             if serial:
                 device["serial"] = serial
-            if grade := about.get("device", {}).get("grade"):
-                device["grade"] = grade
+            lead = about.get("device", {})
+            device |= {key: lead[key] for key in ALIKE if key in lead}
             folder = recorder.folder / f"device-{number}"
             known = (folder / DESCRIPTION).exists()
             tables = None if known else {**about, "device": device}

@@ -60,7 +60,8 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
     plain: list[Array] = []
     for _ in range(25):
         mixing = np.eye(3) + rng.normal(0, 5e-4, (3, 3)) * (1 - np.eye(3))
-        seen = observe(FIVE, forces(FIVE, G) @ mixing.T, sigma=1e-4)
+        mean = forces(FIVE, G) @ mixing.T + rng.normal(0, 1e-4, (len(FIVE), 3))
+        seen = observe(FIVE, mean, sigma=1e-4)
         for square, pulls in ((5e-4, off), (0.0, plain)):
             result = solve(seen, tilt="none", square_sigma=square)
             for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):

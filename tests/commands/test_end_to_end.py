@@ -72,7 +72,7 @@ def test_a_level_base_is_enough_for_two_positions(
         ["run", "two_position", "--headless"]
         + [f"--virtual={shlex.join(steady(tmp_path))}", "--no-report", "--json"]
         + ["-o", str(tmp_path / "s"), "--level=0.001", "--angles=0.001"]
-        + ["--speed", "60"]
+        + ["--speed", "60", "--squareness", "1e-5"]
     )
     out, err = capsys.readouterr()
     assert code == 0, err
@@ -91,7 +91,7 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     code = main(
         ["run", "two_position", "--headless", f"--virtual={virtual}", "--json"]
         + ["--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"]
-        + ["--speed", "60"]
+        + ["--speed", "60", "--squareness", "1e-5"]
     )
     out, err = capsys.readouterr()
     assert code == 1, err

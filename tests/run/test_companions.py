@@ -34,6 +34,7 @@ def led(
     run = [*RUN, "--headless", "--json", *options]
     if "--resume" not in options:
         run += ["two_position", "--level=0.001", "--angles=0.001"]
+        run += ["--squareness=1e-5"]
         run += ["--seconds=12", "--latitude=50.45"]
     for url in urls:
         run += ["--device", url]
@@ -126,7 +127,7 @@ def check(
             found = written["parameters"][group]
             off = np.subtract(found["value"], truth[group])
             assert np.abs(off / np.array(found["sigma"])).max() < 4.5, (folder, group)
-        assert written["decision"]["go"] == good
+        assert written["decision"]["go"] == good, written["decision"]["reasons"]
         session = Session.open(folder)
         assert not session.warnings and (np.diff(session.block.t) > 0).all()
         if folder != sessions[0]:

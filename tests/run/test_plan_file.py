@@ -163,6 +163,7 @@ def run(folder: Path, device: VirtualMover, fails: str, junit: Path, *more: str)
     call = script(folder, CALLER.format(control=device.control, fails=fails))
     mover = {"kind": "command", "command": call, "timeout_s": 30.0}
     tables = {
+        "device": {"squareness": 1e-5},
         "site": {
             "latitude_deg": 50.45,
             "height_m": 170.0,

@@ -37,7 +37,7 @@ RARE = (
         "gyr_lsb",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
-    *("lot", "station", "operator"),
+    *("lot", "station", "operator", "squareness"),
 )
 
 EXAMPLE = """\

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 RARE = (
     *("name", "serial", "lot", "station", "operator"),
-    *("grade", "gravity", "mounting"),
+    *("grade", "gravity", "mounting", "squareness"),
 )
 
 EXAMPLE = """\

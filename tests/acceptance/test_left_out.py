@@ -44,7 +44,7 @@ def test_what_is_known_no_better_than_of_any_unit_is_not_determined(
     found = json.loads((folder / "result.json").read_text())
     sigma = found["parameters"]["acc_scale"]["sigma"]
     assert all(s is not None for s in sigma) and max(sigma) > 0.01
-    (says,) = [w for w in found["warnings"] if "were left out, and without" in w]
+    (says,) = [w for w in found["warnings"] if "were left out; without" in w]
     assert "acc_scale.z" in says
 
 

@@ -135,7 +135,7 @@ def test_a_recorded_session_is_taken_through_a_procedure_again(
 ) -> None:
     """The arrivals in it are of long ago; they are the clock while it plays."""
     run = ["run", "two_position", "--headless", "--no-report", "--level=0.001"]
-    run += ["--angles=0.001", "--latitude=45"]
+    run += ["--angles=0.001", "--squareness=1e-5", "--latitude=45"]
     virtual = ["--virtual=--can slcan", "--speed", "20", "-o", str(tmp_path / "first")]
     assert main([*run, *virtual, "--seconds=12"]) == 0
     url = f"replay:{tmp_path / 'first'}?speed=20"

@@ -28,7 +28,7 @@ def fit(**known: Any) -> SimpleNamespace:
 
 def estimated(**known: Any) -> Estimated:
     """An estimate of which only what is asked for is known."""
-    wanted = SimpleNamespace(turned=False, gyr_scale=True, level_deg=None)
+    wanted = SimpleNamespace(turned=False, gyr_scale=True, level_deg=None, square=0)
     given = SimpleNamespace(
         wanted=wanted, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
     )

@@ -174,7 +174,8 @@ def _app(server: PageServer) -> Starlette:
 
     async def wish(request: Request) -> Response:
         given = await _object(request)
-        if given is None or given.get("wish") not in OFFERED:
+        wished = None if given is None else given.get("wish")
+        if given is None or not isinstance(wished, str) or wished not in OFFERED:
             return JSONResponse({"error": "client and wish are wanted"}, 400)
         if not server.buttons.press(given["client"], given["wish"]):
             return JSONResponse({"error": "somebody else has the buttons"}, 409)

@@ -97,7 +97,7 @@ def decide(
         *_odd_positions(found, verification.ok is True),
         *_turns(found, limits),
         *_angles(found, about, limits, circumstances),
-        *relies_on_square_axes(found, about),
+        *relies_on_square_axes(found, about, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
         *_level(found, about),

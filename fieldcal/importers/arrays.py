@@ -34,7 +34,7 @@ from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.gzip_stream import head, on_disk
 from fieldcal.importing.heading import Heading
 from fieldcal.importing.matlab_objects import holds_objects, object_tables
-from fieldcal.importing.paired_tables import Pairing, pairing
+from fieldcal.importing.paired_tables import ArrayPairing, pairing
 from fieldcal.importing.said_rate import rate_of, scalars
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
@@ -67,7 +67,7 @@ class ArrayFile(ColumnRecording):
     """Numbers that stand alone in it, by name."""
     _objects: Mapping[str, ArrayTable] = {}
     """Tables of MATLAB in an HDF5 file, which another reader gives."""
-    _pairing: tuple[Pairing | None] | None = None
+    _pairing: tuple[ArrayPairing | None] | None = None
     """How its arrays go together, so that it is found once."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""

@@ -43,7 +43,7 @@ class Clocked(NamedTuple):
     t: Array
 
 
-class Pairing(NamedTuple):
+class ArrayPairing(NamedTuple):
     """How the arrays of a file go together.
 
     Attributes
@@ -86,7 +86,7 @@ class Pairing(NamedTuple):
         return ArrayTable((len(rows), len(kept)), read, table.unit)
 
 
-def pairing(tables: Mapping[str, ArrayTable]) -> Pairing | None:
+def pairing(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
     """How arrays of sensors go together that have times of their own.
 
     None where they have the same, or where no names and no times tell.
@@ -115,7 +115,7 @@ def pairing(tables: Mapping[str, ArrayTable]) -> Pairing | None:
         name for name, table in tables.items()
         if name not in rows and (name in clocks or table.shape[0] != len(acc.t))
     )  # fmt: skip
-    return Pairing(rows, inside, dropped, tuple(says))
+    return ArrayPairing(rows, inside, dropped, tuple(says))
 
 
 def _apart(one: Clocked, other: Clocked) -> bool:

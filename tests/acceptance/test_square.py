@@ -9,12 +9,13 @@ import pytest
 from observed import observe
 
 from fieldcal.acceptance.square import relies_on_square_axes
-from fieldcal.calibration import Calibration
+from fieldcal.calibration import Calibration, limits
 from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
 from fieldcal.core.samples import Array
 from fieldcal.session import description
 from fieldcal.solve import solve
 
+TACTICAL = limits.read("tactical")
 ABOUT = description.parse({"format": 1})
 G = 9.81
 NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
@@ -26,20 +27,26 @@ def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibra
 
 
 @pytest.mark.parametrize(
-    ("stated", "says"), [(None, "as usual for the grade"), (3e-4, "as stated")]
+    ("square", "stated", "says"),
+    [
+        (5e-4, None, "0.05 %, as usual for the grade"),
+        (5e-4, 5e-4, "0.05 %, as stated"),
+        (3e-4, None, "0.03 %, as stated"),
+    ],
 )
 def test_it_says_how_square_axes_were_taken_to_be(
-    stated: float | None, says: str
+    square: float, stated: float | None, says: str
 ) -> None:
+    """It may be stated in session.toml, or to `solve` alone."""
     about = replace(ABOUT, squareness=stated)
-    (check,) = relies_on_square_axes(found(3e-4), about)
-    assert check.ok is None and f"square to ± 0.03 %, {says}" in check.says
+    (check,) = relies_on_square_axes(found(square), about, TACTICAL)
+    assert check.ok is None and f"square to ± {says}" in check.says
 
 
 def test_cross_coupling_that_is_estimated_is_relied_on_by_nothing() -> None:
     result = solve(observe(NINE, forces(NINE, G)), cross=True, square_sigma=3e-4)
-    assert relies_on_square_axes(result, ABOUT) == []
-    assert relies_on_square_axes(found(0.0), ABOUT) == []
+    assert relies_on_square_axes(result, ABOUT, TACTICAL) == []
+    assert relies_on_square_axes(found(0.0), ABOUT, TACTICAL) == []
 
 
 def test_faces_have_of_it_what_each_bias_takes_in() -> None:

@@ -195,7 +195,8 @@ def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:
         (over,) = heading("bare" if head == "units" else head, columns)
         pairs = zip(named, over, strict=True)
         named = [f"{n}={name}" for n, name in pairs if n in channels]
-    return {
+    zero = log.said["zero"]
+    return ({"--acc-zero": ["--acc-zero", f"{zero:g}"]} if zero else {}) | {
         "--acc-unit": _option("acc", str(log.said["acc"])),
         "--gyr-unit": _option("gyr", str(log.said["gyr"])),
         "--time-unit": ["--time-unit", str(log.said["time"])],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -38,6 +39,14 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     )
     add("--acc-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
+    add(
+        "--acc-zero",
+        type=_three,
+        default=(),
+        metavar="X,Y,Z",
+        help="numbers of the file at no acceleration, such as 32768,32768,32768;"
+        " one for all three axes if they are alike",
+    )
     add("--temp-unit", default="", help="degC, cdegC, K, count, none")
     add("--temp-lsb", type=float, default=1.0, metavar="N", help="counts in 1 K")
     add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
@@ -65,4 +74,22 @@ def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
         args.temp_lsb,
         args.temp_zero,
         reversed=frozenset(name.removeprefix("-") for name in other_way),
+        acc_zero=args.acc_zero,
     )
+
+
+def _three(text: str) -> tuple[float, ...]:
+    """Read one number for each axis, or one for all.
+
+    >>> _three("33000"), _three("1,2.5,-3")
+    ((33000.0, 33000.0, 33000.0), (1.0, 2.5, -3.0))
+    """
+    try:
+        numbers = tuple(float(one) for one in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (1, 3) or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} cannot be: write one number or three, such as 33000,32900,33100"
+        )
+    return numbers * (3 // len(numbers))

@@ -35,6 +35,7 @@ RARE = (
         "separator",
         "acc_lsb",
         "gyr_lsb",
+        "acc_zero",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
     *("lot", "station", "operator", "squareness"),

@@ -179,6 +179,7 @@ def notes(wanted: ReadOptions) -> dict[str, object]:
     return {
         "acc_unit": wanted.acc_unit or "m/s^2",
         "acc_lsb": wanted.acc_lsb,
+        "acc_zero": list(wanted.acc_zero),
         "gyr_unit": wanted.gyr_unit or "rad/s",
         "gyr_lsb": wanted.gyr_lsb,
         "time_unit": wanted.time_unit or "s",

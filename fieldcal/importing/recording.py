@@ -98,6 +98,7 @@ class ReadOptions:
     separator, skip : of text files
     acc_unit, gyr_unit, time_unit : of the file; "" is not said, and SI
     acc_lsb, gyr_lsb : counts in one unit, for raw counts
+    acc_zero : x y z of the file's numbers at no acceleration; () is not said
     temp_unit : of the file; "" is not said, and degC
     temp_lsb, temp_zero : counts in 1 K, and deg C at count 0
     options : as in a device's address, ``name=value&name=value``
@@ -127,11 +128,18 @@ class ReadOptions:
     reversed: frozenset[str] = frozenset()
     batch: RowBatch | None = None
     usual: str = ""
+    acc_zero: tuple[float, ...] = ()
 
     @property
     def acc_scale(self) -> float:
         """SI units (or counts, volts) in one of the file's."""
         return _unit(self.acc_unit or "m/s^2", FORCE_UNITS) / self.acc_lsb
+
+    @property
+    def zero(self) -> Array:
+        """The file's numbers at no acceleration, (3,), of the axes that are taken."""
+        signs = [-1.0 if f"a{axis}" in self.reversed else 1.0 for axis in "xyz"]
+        return np.multiply(signs, self.acc_zero or 0.0)
 
     @property
     def gyr_scale(self) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.importing.gravity_size import Gravity
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.scales import GYR_SCALES, USUAL_COUNTS, Scale, about
 
 
@@ -18,6 +20,17 @@ def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
         f"--{kind}-unit {unit} --{kind}-lsb {about(lsb)} (about so many counts in one"
         f" {unit}; its data sheet says the number)",
         f"--{kind}-unit {unit}, if it is so",
+    ]
+
+
+def zero_elsewhere(said: ReadOptions, gravity: Gravity) -> list[str]:
+    """What to paste where rests in one direction cannot show the zero of counts."""
+    if gravity.round or said.acc_zero:
+        return []
+    return [
+        "--acc-zero X,Y,Z (the file's numbers at no acceleration, where that is not 0;"
+        " the data sheet says them, and a recording with rests in all directions shows"
+        " them)"
     ]
 
 

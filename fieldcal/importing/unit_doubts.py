@@ -13,6 +13,7 @@ from fieldcal.importing.gravity_size import Gravity, gravity_in
 from fieldcal.importing.rate_size import rate_in, turns_said
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.scales import ACC_SCALES, GYR_SCALES, Scale, about
+from fieldcal.importing.unit_answers import zero_elsewhere
 from fieldcal.session.units import UNSCALED
 
 FAR = 0.25
@@ -81,7 +82,18 @@ class SaidUnits:
             )
         fits = _within(gravity.size / self._said.acc_scale, ACC_SCALES)
         shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"
+        self._ask_zero(gravity, shows)
         return self._contradict("a", shows, "--acc-unit", fits)
+
+    def _ask_zero(self, gravity: Gravity, shows: str) -> None:
+        """Ask where the zero of counts lies whose size the user says."""
+        unit, lsb = self._unit("a"), self._said.acc_lsb
+        zero = zero_elsewhere(self._said, gravity)
+        if lsb != 1 and "a" not in self._said.named and zero:
+            raise InputError(
+                f"{self._name}: {lsb:g} counts in a {unit} as you say, but {shows}: add"
+                f" {zero[0]} or --acc-zero 0,0,0, if it is so"
+            )
 
     def _of_rates(self, block: Block, gravity: Gravity) -> list[str]:
         if not self._has_size("g"):
@@ -121,8 +133,7 @@ class SaidUnits:
         """Ask about a unit of the file's; of the user's only say what is odd."""
         unit = self._unit(kind)
         if kind not in self._said.named:
-            zero = "; rests in several orientations show whether zero lies elsewhere"
-            return [f"{unit} as you say, but {shows}{zero if kind == 'a' else ''}"]
+            return [f"{unit} as you say, but {shows}"]
         answers = [other] if other else []
         answers += [f"{option} {one}" for one in fits if one != unit]
         answers.append(f"{option} {unit}, if it is so")

@@ -31,7 +31,12 @@ from fieldcal.importing.scales import (
 )
 from fieldcal.importing.thermometers import temperature_counts, temperature_fits
 from fieldcal.importing.time_units import step_of, unit_taken
-from fieldcal.importing.unit_answers import answers, as_written, other_rates
+from fieldcal.importing.unit_answers import (
+    answers,
+    as_written,
+    other_rates,
+    zero_elsewhere,
+)
 from fieldcal.importing.unit_doubts import SaidUnits, hold_own_units
 
 ROWS = 1 << 17
@@ -144,14 +149,18 @@ class _Guess:
             unit, why = unit_taken(name, block.t)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
-        gravity = gravity_in(block.acc)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
+        self._zero = said.acc_scale * said.zero
+        written, block = block.acc, replace(block, acc=block.acc - self._zero)
+        gravity = gravity_in(block.acc)
         self._step = step_of(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
-            self._acceleration(gravity, block.acc)
+            self._acceleration(gravity, written)
         elif gravity and said.acc_lsb != 1:
             gravity = with_length(block.acc, G0) or gravity
+        if said.acc_zero:
+            self._lies_at(self._zero)
         if gravity and self.said.acc_lsb != 1:
             self._offset(gravity)
         if not said.gyr_unit and said.gyr_lsb == 1:
@@ -176,6 +185,7 @@ class _Guess:
         return wanted
 
     def _acceleration(self, gravity: Gravity, acc: Array) -> None:
+        said = self.said
         fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = as_written(fits, acc)
         if not fits and self._step:
@@ -195,7 +205,7 @@ class _Guess:
             self._ask(
                 f"{shows}, which is gravity in"
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("acc", fits, "g", gravity.size),
+                answers("acc", fits, "g", gravity.size) + zero_elsewhere(said, gravity),
             )
         if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
             self.found["acceleration"] = f"{fits[0]}: {shows}"
@@ -203,10 +213,15 @@ class _Guess:
 
     def _offset(self, gravity: Gravity) -> None:
         if (np.abs(gravity.offset) > OFFSET * gravity.size).any():
-            counts = gravity.offset / self._read.acc_scale
+            counts = self._lies_at(self._zero + gravity.offset)
             reads = " ".join(f"{number:.5g}" for number in counts)
-            self.acc_bias = [round(b * self.said.acc_scale, 4) for b in counts]
             self.found["acc_bias"] = f"{reads} counts: the sphere lies about it"
+
+    def _lies_at(self, zero: Array) -> Array:
+        """Take a zero, as read, for the nominal bias; return it as the file has it."""
+        counts: Array = zero / self._read.acc_scale
+        self.acc_bias = [round(b * self.said.acc_scale, 4) for b in counts]
+        return counts
 
     def _rates(self, block: Block, gravity: Gravity | None) -> None:
         gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]

@@ -255,3 +255,61 @@ def test_zeros_in_the_middle_of_16_bits_are_no_gravity(
     path = write(tmp_path, rows, heading=COLUMNS)
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
     assert "no usual unit" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("lsb", [256, 2048, 16384])
+@pytest.mark.parametrize("reversed_axis", [False, True])
+def test_a_zero_elsewhere_is_asked_for_and_taken(
+    tmp_path: Path,
+    lsb: int,
+    reversed_axis: bool,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rng = np.random.default_rng(lsb)
+    force = np.array([1.2, -3.4, 9.1]) + rng.normal(0, 0.02, (500, 3))
+    zero = np.array([33000.0, 32900.0, 33100.0])
+    signs = np.array([1, 1, -1 if reversed_axis else 1])
+    rows = np.zeros((500, 7))
+    rows[:, 0] = np.arange(500) / 50
+    rows[:, 1:4] = np.round(force * signs * lsb / G + zero)
+    path, out = write(tmp_path, rows), tmp_path / "out"
+    names = COLUMNS.replace("az", "-az") if reversed_axis else COLUMNS
+    call = ["import", str(path), "-o", str(out), "--columns", names]
+    call += ["--gyr-unit", "rad/s"]
+    where = ["--acc-zero", "33000,32900,33100"]
+    size = ["--acc-unit", "g", "--acc-lsb", str(lsb)]
+    for said in ([], size):
+        assert main(call + said) == 2
+        asked = capsys.readouterr().err
+        assert "--acc-zero X,Y,Z" in asked and asked.count("\n") == 1
+        assert not out.exists()
+    # where zero lies tells the size as well
+    for n, said in enumerate((where, where + size)):
+        folder = tmp_path / f"out{n}"
+        assert main([*call, "-o", str(folder), *said]) == 0
+        session = Session.open(folder)
+        found = session.block.acc - session.nominal["acc_bias"]
+        np.testing.assert_allclose(found, force, atol=1.01 * G / lsb)
+        assert "acc_bias" not in session.about.raw.get("guessed", {})
+
+
+def test_a_zero_that_is_said_to_be_at_0_is_believed(tmp_path: Path) -> None:
+    rows = np.tile([0.0, 40.0, 60.0, 2048.0 * 1.5, 0, 0, 0], (500, 1))
+    rows[:, 0] = np.arange(500) / 50
+    rows[:, 1:4] += np.random.default_rng(1).integers(-3, 4, (500, 3))
+    path, out = write(tmp_path, rows), tmp_path / "out"
+    call = ["import", str(path), "-o", str(out), "--columns", COLUMNS]
+    call += ["--gyr-unit", "rad/s", "--acc-unit", "g", "--acc-lsb", "2048"]
+    assert main(call) == 2
+    assert main([*call, "--acc-zero", "0"]) == 0
+    assert Session.open(out).nominal["acc_bias"] == pytest.approx(np.zeros(3))
+
+
+@pytest.mark.parametrize("text", ["", "1,2", "x", "nan,0,0", "1,2,3,4"])
+def test_a_zero_that_is_no_zero_is_refused(
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, turned(1, 50.0))
+    with pytest.raises(SystemExit, match="2"):
+        main(["import", str(path), f"--acc-zero={text}"])
+    assert "write one number or three" in capsys.readouterr().err

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.rounding import visible_steps
 from fieldcal.windows.sums import channels, finest, warmth
-from fieldcal.windows.trend import line
+from fieldcal.windows.trend import lines
 
 CELL = 0.1
 """Length of a cell, s."""
@@ -105,7 +105,7 @@ class CellTable:
         trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
         if (trust == 1.0).all():
             return means
-        laid = line(hold_last(means))
+        laid = lines(hold_last(means))
         steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
         return steady
 

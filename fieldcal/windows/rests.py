@@ -31,7 +31,7 @@ _FLIPS = 0.6
 """Part of a step of a coarse output that means of cells spread by when it flips."""
 
 _LONGEST = 36_000
-"""Cells of the longest stretch, an hour: a longer rest is several of them."""
+"""Cells of the longest run, an hour: a longer rest is looked at in several."""
 
 _PART = 4096
 """Spans looked at together: all of them at once would take ten times their memory."""

@@ -74,7 +74,7 @@ def _why(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
         return f"a pause of {steps[paused[0]]:.3g} s"
     if len(beyond) < round(BEYOND / CELL):
         return "the recording ends" if side > 0 else "the recording begins"
-    return "it is cut, for it changes slowly or an hour is over"
+    return "it is cut, for it changes slowly"
 
 
 def _motion(near: Array, inside: CellTable, origin: Array) -> str:

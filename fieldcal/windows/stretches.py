@@ -21,6 +21,9 @@ from fieldcal.windows.verdict import judge
 FEWEST = 3
 """Stretches below which rests may all have been too short for the usual margin."""
 
+SEAM = 2 * CELL
+"""Time that two parts of one rest are apart, s, if nothing was cut off them."""
+
 _CLEARLY = 0.98
 """Ratio of departure to what is allowed that the sums of a recording must keep."""
 
@@ -30,8 +33,7 @@ def still_stretches(
 ) -> list[tuple[float, float]]:
     """Find where the device was still, (start, end) in s of device time, in order.
 
-    Every stretch lasts `min_seconds`, at least 1 s, an hour at most, and passes
-    `average`.
+    Every stretch lasts `min_seconds`, at least 1 s, and passes `average`.
     """
 
     def between(start: float, end: float) -> list[Block]:
@@ -68,7 +70,8 @@ def still_stretches_of_file(
     shortest = max(1.0, min_seconds)
     runs = at_rest(rows, StillnessLimits().noise)
     middles = [(r.first + SPAN // 2, r.last - 1 + SPAN // 2) for r in runs]
-    found = _passing_of(rows, origin, between, middles, shortest)
+    goes_on = [i > 0 and runs[i - 1].last == r.first for i, r in enumerate(runs)]
+    found = _joined(_passing_of(rows, origin, between, middles, shortest), goes_on)
     if len(found) >= FEWEST or len(runs) < FEWEST:
         return found
     # rests may all be short: then all that their spans saw, less a cell at each end
@@ -77,7 +80,7 @@ def still_stretches_of_file(
     whole = [
         (r.first + 1, min(e, n)) for r, e, n in zip(runs, ends, nexts, strict=True)
     ]
-    short = _passing_of(rows, origin, between, whole, shortest)
+    short = _joined(_passing_of(rows, origin, between, whole, shortest), goes_on)
     return short if len(short) >= FEWEST else found
 
 
@@ -87,17 +90,36 @@ def _passing_of(
     between: Between,
     stretches: Sequence[tuple[int, int]],
     shortest: float,
-) -> list[tuple[float, float]]:
-    """What passes of stretches of cells [first, last)."""
-    found: list[tuple[float, float]] = []
+) -> list[list[tuple[float, float]]]:
+    """What passes of each stretch of cells [first, last)."""
+    found: list[list[tuple[float, float]]] = []
     for first, last in stretches:
         cells = table_of(rows[first : last + 1], origin)
         if clear := _clear(table_of(rows[first:last], origin), shortest):
-            found.append(clear)
+            found.append([clear])
         elif len(cells):
             start, end = float(cells.times[0]), float(cells.times[-1])
-            found += _passing(between, start, end, shortest)
+            found.append(_passing(between, start, end, shortest))
+        else:
+            found.append([])
     return found
+
+
+def _joined(
+    found: Sequence[Sequence[tuple[float, float]]], goes_on: Sequence[bool]
+) -> list[tuple[float, float]]:
+    """Stretches in order, those that only a seam divides as one.
+
+    `goes_on` tells of each part of the recording whether the rest of the part before
+    does: a long one is looked at in parts.
+    """
+    out: list[tuple[float, float]] = []
+    for some, same in zip(found, goes_on, strict=True):
+        rest = list(some)
+        if same and out and rest and rest[0][0] - out[-1][1] < SEAM:
+            out[-1] = (out[-1][0], rest.pop(0)[1])
+        out += rest
+    return out
 
 
 def why_none(rows: CellRows, origin: Array) -> str:

@@ -22,10 +22,11 @@ from fieldcal.windows.disturbance import (
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.quiet import QuietNoise, quiet
 from fieldcal.windows.rounding import most_scatter, of_mean
-from fieldcal.windows.trend import line
+from fieldcal.windows.trend import lines
 
-THRESHOLD = 5.8
-"""Departure over its spread that noise alone does not reach in a long window."""
+THRESHOLD, LONG = 5.8, 600
+"""Departure over its spread that noise alone does not reach in a window of so many
+cells, a minute."""
 
 EARLY = 8.0
 """The threshold is twice as high in a window this long, s, for lack of data."""
@@ -115,9 +116,9 @@ def judge(
         return Verdict(_beyond_noise(cells, scatter, limits), 0.0, before)
     means = cells.steady[:m]
     noise = quiet(means, before)
-    allowed = THRESHOLD * (1 + (EARLY / (CELL * noise.cells)) ** 2)
+    allowed = _threshold(m) * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
-    laid = line(means, cells.resolution / np.maximum(_number(cells), 1.0))
+    laid = lines(means, cells.resolution / np.maximum(_number(cells), 1.0))
     least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
     tests = _tests(cells, means, laid, noise, _least_spreads(cells, least))
     worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
@@ -129,6 +130,14 @@ def judge(
         float(max(recent) / allowed),
         noise,
     )
+
+
+def _threshold(cells: int) -> float:
+    """`THRESHOLD` in a window of so many cells: of more, the largest by chance is more.
+
+    The largest of n normal deviates grows as sqrt(2 ln n).
+    """
+    return float(np.sqrt(THRESHOLD**2 + 2 * np.log(max(1.0, cells / LONG))))
 
 
 def _tests(

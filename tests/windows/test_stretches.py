@@ -330,15 +330,29 @@ def test_rests_whose_samples_are_asked_for_are_all_found() -> None:
     np.testing.assert_allclose(found, still_stretches(block, 3.0), atol=0.15)
 
 
-def test_a_rest_of_hours_is_several_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rest_of_hours_is_one_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rest_module, "_LONGEST", 100)
     monkeypatch.setattr(rest_module, "_PART", 64)
     rng = np.random.default_rng(5)
     acc = [0, 0, 9.81] + rng.normal(0, 0.03, (4000, 3))
-    found = still_stretches(Block.of(np.arange(4000) / 100, acc))
-    assert 4 <= len(found) <= 8
-    assert max(end - start for start, end in found) <= 10.1
-    assert sum(end - start for start, end in found) > 34
+    ((start, end),) = still_stretches(Block.of(np.arange(4000) / 100, acc))
+    assert (start, end) == (0.5, np.nextafter(39.49, 40.0))
+    # a step is where one stretch ends, wherever the parts of it are
+    for at in (1700, 2040, 2055):
+        stepped = acc + np.where(np.arange(4000)[:, None] < at, 0.0, [0.3, 0, 0])
+        found = still_stretches(Block.of(np.arange(4000) / 100, stepped))
+        assert any(abs(end - at / 100) < 1.1 for _, end in found)
+        assert not any(start < at / 100 - 0.1 < end - 0.2 for start, end in found)
+
+
+def test_a_device_that_warms_up_for_hours_is_at_rest_all_the_time() -> None:
+    rng = np.random.default_rng(11)
+    t = np.arange(72_000) / 10
+    acc = [0, 0, 9.81] + rng.normal(0, 0.005, (len(t), 3))
+    acc[:, 0] += 0.02 * np.exp(-t / 900)
+    gyr = rng.normal(0, 0.001, (len(t), 3)) + 0.001 * np.exp(-t / 900)[:, None]
+    ((start, end),) = still_stretches(Block.of(t, acc, gyr))
+    assert start < 1.0 and end > t[-1] - 1.0
 
 
 def test_stretches_begin_at_a_sample_and_end_behind_one(long: Block) -> None:

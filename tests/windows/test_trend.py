@@ -6,26 +6,26 @@ import numpy as np
 import pytest
 from scipy.stats import theilslopes
 
-from fieldcal.windows.trend import line
+from fieldcal.windows.trend import lines
 
 
 @pytest.mark.parametrize("m", [24, 25, 100, 600])
 def test_a_straight_line_is_itself(m: int) -> None:
     values = np.arange(m)[:, None] * [0.5, -2.0, 0.0] + [3.0, 0.0, 1.0]
-    np.testing.assert_allclose(line(values), values, atol=1e-9)
+    np.testing.assert_allclose(lines(values), values, atol=1e-9)
 
 
 @pytest.mark.parametrize("m", [1, 7, 23])
 def test_of_few_values_it_is_their_median(m: int) -> None:
     values = np.random.default_rng(m).normal(size=(m, 2)) + np.arange(m)[:, None]
     expected = np.broadcast_to(np.median(values, axis=0), (m, 2))
-    np.testing.assert_array_equal(line(values), expected)
+    np.testing.assert_array_equal(lines(values), expected)
 
 
 @pytest.mark.parametrize("m", [120, 131])
 def test_it_is_that_of_theil_through_twelve_medians(m: int) -> None:
     values = np.random.default_rng(m).normal(size=(m, 2)) + np.arange(m)[:, None] / 30
-    found = line(values)
+    found = lines(values)
     assert found.shape == (m, 2)
     size = m // 12
     for channel in range(2):
@@ -41,7 +41,7 @@ def test_a_disturbance_of_a_sixth_does_not_turn_it(at: int) -> None:
     truth = np.arange(120)[:, None] * [0.01, -0.02]
     values = truth.copy()
     values[at : at + 20] += 7.0
-    np.testing.assert_allclose(line(values), truth, atol=1e-9)
+    np.testing.assert_allclose(lines(values), truth, atol=1e-9)
 
 
 @pytest.mark.parametrize("noise", [0.4, 0.6, 0.9])
@@ -49,15 +49,30 @@ def test_of_rounded_values_it_is_no_step_of_theirs(noise: float) -> None:
     drawn = np.random.default_rng(6).normal(size=(1200, 40))
     middles = np.linspace(-0.5, 0.5, 40)
     values = np.round(middles + noise * drawn)
-    off, plain = line(values, np.ones(40)) - middles, line(values) - middles
+    off, plain = lines(values, np.ones(40)) - middles, lines(values) - middles
     assert off.std() < 0.12 and off.std() < 0.5 * plain.std()
     # a slope is as that of values which are not rounded
     rising = np.arange(1200)[:, None] * 0.002
-    found = line(np.round(rising + middles + noise * drawn), np.ones(40))
+    found = lines(np.round(rising + middles + noise * drawn), np.ones(40))
     assert (found - rising - middles).std() < 0.12
 
 
 def test_of_fine_values_the_step_says_nothing() -> None:
     values = np.random.default_rng(7).normal(size=(240, 3))
-    fine = line(values, np.full(3, 1e-9))
-    np.testing.assert_allclose(fine, line(values), atol=1e-8)
+    fine = lines(values, np.full(3, 1e-9))
+    np.testing.assert_allclose(fine, lines(values), atol=1e-8)
+
+
+def test_what_settles_over_hours_is_near_its_lines() -> None:
+    t = np.arange(72_000) / 10
+    for tau in (300.0, 1200.0, 4000.0):
+        course = np.exp(-t / tau)[:, None]
+        straight = np.polyfit(t, course[:, 0], 1)
+        assert np.abs(lines(course) - course).max() < 0.02
+        assert np.abs(np.polyval(straight, t) - course[:, 0]).max() > 0.1
+
+
+def test_each_section_has_the_line_of_its_own_values() -> None:
+    values = np.random.default_rng(8).normal(size=(3600, 2))
+    parts = [lines(values[a : a + 1200]) for a in (0, 1200, 2400)]
+    np.testing.assert_array_equal(lines(values), np.concatenate(parts))

@@ -10,7 +10,7 @@ from fieldcal.windows import StillnessLimits, average
 from fieldcal.windows.cells import Cells, CellTable
 from fieldcal.windows.disturbance import Least, pushes, shakes, steps
 from fieldcal.windows.quiet import QuietNoise, quiet
-from fieldcal.windows.trend import line
+from fieldcal.windows.trend import lines
 from fieldcal.windows.verdict import Departure, Verdict, judge
 from windows.signals import HOME, UNIT, block_of, white
 
@@ -82,7 +82,7 @@ def test_a_drift_is_told_by_its_change_over_the_window() -> None:
     # a change is allowed for by the limit and by what the noise can pretend
     cells = table(block_of(x, start=100.0))
     longest = quiet(cells.means).allan[-1, 1]
-    laid = line(cells.means)[:, 1]
+    laid = lines(cells.means)[:, 1]
     assert worst.size == pytest.approx(laid[-1] - laid[0], rel=1e-9)
     assert worst.noise == pytest.approx(longest)
     assert worst.ratio == pytest.approx(worst.size / (0.1 + 5.8 * longest))
@@ -153,7 +153,7 @@ def test_the_ratio_is_the_largest_departure_over_what_is_allowed(n: int) -> None
     noise, means = quiet(cells.means), cells.means
     least = Least(np.zeros(6), np.zeros(6), np.ones(6))
     tests = [
-        *pushes(means - line(means), noise, least),
+        *pushes(means - lines(means), noise, least),
         *steps(means, noise, least),
         *shakes(cells.short, cells.steps, least),
     ]

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.causes import columns, smooth
+from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.causes.effect_causes import at_points, of_effects
 from fieldcal.model.causes.known import KnownRows
-from fieldcal.model.causes.random_causes import flicker, of_chance
+from fieldcal.model.causes.random_causes import flicker_of_few, of_chance
 from fieldcal.model.causes.unknown_causes import of_no_effect
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
@@ -101,8 +101,8 @@ class Dictionary(ColumnTable):
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
-        if len(self.held) < FEW < len(x):
-            self.always += flicker(self, np.full(6, smooth.WAVES))
+        if wander.series is not None:
+            self.always += flicker_of_few(self, wander.series)
         self.causes: list[Cause] = list(self._causes())
 
     def plain(self) -> Dictionary:

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.samples import CHANNELS, Index
+from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import columns_of, detents
+from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -24,7 +25,7 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
         if isinstance(effect, Scatter) and effect.applies(table.x):
             yield from _of_scatter(table, effect, oriented)
     if len(table.held) >= FEW:  # of fewer, it is always there
-        for group in flicker(table, table.wander.modes):
+        for group in _flicker(table):
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     if len(table.held) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
@@ -105,20 +106,41 @@ def _walks(
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
 
-def flicker(table: ColumnTable, modes: Index) -> Iterator[Group]:
+def _flicker(table: ColumnTable) -> Iterator[Group]:
     """Flicker of each triad: bias noise with equal power in every octave.
 
-    The variance of cosine k is proportional to 1/k. `modes` (6,) has the number of
-    cosines of each channel.
+    The variance of cosine k is proportional to 1/k.
     """
-    sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
-    if len(table.held) < FEW:  # it is all the instability that they have
-        sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
+    modes = table.wander.modes
+    cosines = [table.wave(c, modes[c]) for c in range(6)]
     shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
+    sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
+    yield from _of_triads(table, cosines, shape, sizes)
+
+
+def flicker_of_few(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
+    """The same of few windows, which have no other instability."""
+    many = len(series.sizes)
+    first = table.course("flicker", lambda x: series.at(x.t), many, True)
+    at = first + np.arange(6 * many).reshape(6, many)
+    sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
+    yield from _of_triads(table, list(at), series.sizes, sizes)
+
+
+def _of_triads(
+    table: ColumnTable,
+    terms: Sequence[Index],
+    shape: Array,
+    sizes: tuple[float, float],
+) -> Iterator[Group]:
+    """Flicker of each triad by the columns of each channel and the shape of its power.
+
+    `sizes` is what is typical of accelerometers and gyroscopes, SI.
+    """
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]
         if at:
+            columns = np.concatenate([terms[c] for c in at])
             size = sizes[part == "gyr"]
-            columns = np.concatenate([table.wave(c, modes[c]) for c in at])
-            wide = [shape[: modes[c]] * size * table.unit[c] for c in at]
+            wide = [shape[: len(terms[c])] * size * table.unit[c] for c in at]
             yield Group("flicker", part, columns, np.concatenate(wide), random=True)

@@ -26,13 +26,15 @@ Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
+from fieldcal.model.causes.cause import FEW
+from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander_sizes import sizes
 from fieldcal.model.rows.reduce import Rows
 
@@ -54,6 +56,8 @@ class Wander:
     share : (6,) probability that it is flicker if it is either
     modes : (6,) cosines of it that rows see, at least those of a smooth course
     length : s that these are drawn over
+    series : flicker of few windows, where it is always there; None of more
+    beside : (n, 6) variance that this leaves of each row
 
     """
 
@@ -62,6 +66,8 @@ class Wander:
     share: Array
     modes: Index
     length: float
+    series: FlickerSeries | None = None
+    beside: Array | None = None
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
@@ -73,7 +79,12 @@ class Wander:
         modes = np.clip(MORE * resolved, smooth.WAVES, priors.MOST_WAVES).astype(
             np.intp
         )
-        return cls(speed, flicker, share, modes, length)
+        out = cls(speed, flicker, share, modes, length)
+        if not len(np.unique(rows.x.position)) < FEW < len(rows.x):
+            return out
+        series = FlickerSeries.of(rows.x.t, rows.length)
+        typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3) * unit
+        return replace(out, series=series, beside=series.left(rows.y, rows.sd, typical))
 
     @classmethod
     def none(cls) -> Wander:
@@ -82,9 +93,11 @@ class Wander:
         return cls(nothing, nothing, nothing, np.full(6, smooth.WAVES), 0.0)
 
     def left(self, length: Array, channel: int) -> Array:
-        """Variance that its cosines leave of means over some lengths, (n,)."""
+        """Variance that its cosines leave of the means of all rows, of length (n,)."""
         q, a, count = self._of_channel(channel)
         walks: Array = q**2 * _left_of_walk(self.length, length, count)
+        if self.beside is not None:
+            return walks + self.beside[:, channel]
         if not a:
             return walks
         # rows are of few lengths, but for the rounding of their times

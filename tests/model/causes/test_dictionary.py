@@ -16,6 +16,7 @@ from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import only
@@ -25,13 +26,17 @@ UNIT = np.array([2.0, 2.0, 4.0, 10.0, 10.0, 20.0])
 
 
 def made(
-    x: Experience, channels: tuple[int, ...] = tuple(range(6)), turns: bool = False
+    x: Experience,
+    channels: tuple[int, ...] = tuple(range(6)),
+    turns: bool = False,
+    wander: Wander | None = None,
 ) -> Dictionary:
     """A dictionary of outputs that are not in SI."""
     held = len(np.unique(x.position))
     used = np.tile(np.isin(np.arange(6), channels), (len(x), 1))
     since, common = np.array([x.since_turn]), np.zeros((held, 6))
-    return Dictionary(x, used, since, common, UNIT, turns, Wander.none())
+    wander = wander or Wander.none()
+    return Dictionary(x, used, since, common, UNIT, turns, wander)
 
 
 def first(places: int, rows: int = 3, **known: Any) -> Experience:
@@ -113,20 +118,28 @@ def test_instability_is_typical_of_each_output(turns: bool) -> None:
 
 
 def test_of_few_windows_instability_is_within_them() -> None:
-    groups = always(made(first(2), (0, 2, 3, 4, 5)))
-    one = groups["flicker", "acc"]
-    k = np.arange(1, smooth.WAVES + 1)
-    shape = 1e-3 / np.sqrt(k)
+    x = first(2, rows=30)
+    rows = rows_of(x, np.hstack([x.f, x.w]))
+    wander = Wander.of(rows, UNIT)
+    series = FlickerSeries.of(x.t, rows.length)
+    assert wander.series is not None
+    np.testing.assert_array_equal(wander.series.terms, series.terms)
+    d = made(x, (0, 2, 3, 4, 5), wander=wander)
+    groups = always(d)
+    one, k = groups["flicker", "acc"], len(series.sizes)
+    shape = 1e-3 * series.sizes
     np.testing.assert_allclose(one.typical, np.concatenate([2.0 * shape, 4.0 * shape]))
-    assert len(groups["flicker", "gyr"].columns) == 3 * smooth.WAVES
-    np.testing.assert_allclose(groups["flicker", "gyr"].typical[:2],
-                               3e-4 / np.sqrt([1, 2]))  # fmt: skip
+    np.testing.assert_allclose(groups["flicker", "gyr"].typical[:k],
+                               3e-4 * series.sizes)  # fmt: skip
+    assert len(groups["flicker", "gyr"].columns) == 3 * k
     assert not one.in_state and one.fixed is None
-    assert ("flicker", "acc") not in always(made(first(3)))
-    assert ("flicker", "acc") not in always(made(first(2, rows=1)))
-    d = made(first(2))
-    np.testing.assert_array_equal(always(d)["flicker", "acc"].columns[:3],
-                                  d.waves + np.arange(3))  # fmt: skip
+    at = one.columns[:k]
+    (first_at,) = (n for n, b in d.bases if b.name == "flicker")
+    np.testing.assert_array_equal(at, first_at + np.arange(k))
+    others = first(3, rows=30), first(2, rows=1)
+    for y in others:
+        few = rows_of(y, np.hstack([y.f, y.w]))
+        assert Wander.of(few, UNIT).series is None
 
 
 def test_a_prediction_has_bias_and_scale_factor_alone() -> None:

@@ -1,0 +1,117 @@
+"""Flicker in the means of a few windows, as a series of principal components.
+
+Rows of a long window are much longer at its end than at its beginning, and flicker is
+in all of them: no even cosines of the time describe it. The means of flicker with the
+one-sided power 1 / 2 over the frequency, over intervals [a, b] and [c, d], have the
+covariance, but for a constant that a bias takes in,
+
+    C = -1/2 [H(b - c) - H(a - c) - H(b - d) + H(a - d)] / ((b - a) (d - c))        (1)
+
+with H(x) = x^2 (ln|x| / 2 - 3 / 4), whose second derivative is ln|x|. Its largest
+eigenvectors are the series. What they leave of a row is noise, nearly white. Its size a
+is told by what the rows y, of white noise D, have besides the series: with Q the other
+eigenvectors, of the variances v,
+
+    Q^T y ~ N(0, a^2 diag(v) + Q^T D Q)                                             (2)
+
+Source: Mandelbrot and Van Ness 1968 for the covariance of increments; Karhunen-Loeve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.model import priors
+
+FEWEST, MOST = 40, 80
+"""Terms of a series, half as many as there are rows."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlickerSeries:
+    """Flicker of size one in the means of some rows.
+
+    Attributes
+    ----------
+    t : (n,) s, the middle of each row, in order
+    terms : (n, k) of about size one
+    sizes : (k,) standard deviation of the coefficient of each
+    others : (n, m) eigenvectors besides
+    variances : (m,) of their coefficients
+
+    """
+
+    t: Array
+    terms: Array
+    sizes: Array
+    others: Array
+    variances: Array
+
+    @classmethod
+    def of(cls, t: Array, length: Array) -> FlickerSeries:
+        """Of means about instants t over some lengths, (n,) s each."""
+        whole = _covariance(t - length / 2, t + length / 2)
+        whole = whole - whole.mean(axis=0)
+        whole = whole - whole.mean(axis=1)[:, None]
+        variance, along = np.linalg.eigh(whole)
+        order = np.argsort(variance)[:0:-1]  # one is the mean's
+        variance, along = np.maximum(variance[order], 0.0), along[:, order]
+        k, even = int(np.clip(len(t) // 2, FEWEST, MOST)), np.sqrt(len(t) / 2)
+        return cls(
+            t, along[:, :k] * even, np.sqrt(variance[:k]) / even, along[:, k:],
+            variance[k:],
+        )  # fmt: skip
+
+    def at(self, t: Array) -> Array:
+        """The terms at other instants (m,) as well, (m, k)."""
+        return np.column_stack([np.interp(t, self.t, one) for one in self.terms.T])
+
+    def left(self, y: Array, sd: Array, typical: Array) -> Array:
+        """Variance that the terms leave of each row of some channels, (n, c).
+
+        Parameters
+        ----------
+        y, sd : (n, c) means and their white noise; nan where nothing was measured
+        typical : (c,) size of flicker
+
+        """
+        unit = self.others**2 @ self.variances
+        known = np.isfinite(y) & np.isfinite(sd)
+        size = np.zeros(y.shape[1])
+        for c in np.flatnonzero(known.all(axis=0) & (len(self.variances) > 0)):
+            size[c] = self._size(y[:, c], sd[:, c], typical[c])
+        return np.outer(unit, (size * typical) ** 2)
+
+    def _size(self, y: Array, sd: Array, typical: float) -> float:
+        """The likeliest of `priors.SIZES` and 0 of what adds to white noise, by (2)."""
+        half = np.linalg.cholesky(self.others.T @ (self.others * sd[:, None] ** 2))
+        white = np.linalg.solve(half, np.diag(typical * np.sqrt(self.variances)))
+        flicker, axes = np.linalg.eigh(white @ white.T)
+        power = (axes.T @ np.linalg.solve(half, self.others.T @ y)) ** 2
+        sizes = np.append(0.0, priors.SIZES)
+        variance = 1 + np.outer(sizes**2, np.maximum(flicker, 0.0))
+        score = -0.5 * (power / variance + np.log(variance)).sum(axis=1)
+        return float(sizes[np.argmax(score)])
+
+
+def _covariance(start: Array, end: Array) -> Array:
+    """Covariance of the means over intervals, (n, n), by (1)."""
+    length = end - start
+    apart = (
+        _integrated(np.subtract.outer(end, start))
+        - _integrated(np.subtract.outer(start, start))
+        - _integrated(np.subtract.outer(end, end))
+        + _integrated(np.subtract.outer(start, end))
+    )
+    out: Array = -0.5 * apart / np.outer(length, length)  # (1)
+    return out
+
+
+def _integrated(x: Array) -> Array:
+    """H(x), whose second derivative is ln|x|."""
+    size = np.maximum(np.abs(x), 1e-12)
+    out: Array = x**2 * (np.log(size) / 2 - 0.75)
+    return out

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import TWO, Position
-from fieldcal.evaluation.observations import angle_setting, observations, squareness
+from fieldcal.evaluation.observations import angle_setting, factory_errors, observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
 from fieldcal.session.description import Description
@@ -30,6 +30,6 @@ def plan(
         method="two_position",
         level_sigma_deg=about.level_deg,
         angle_sigma_deg=angle_setting(about),
-        square_sigma=squareness(about),
+        factory=factory_errors(about),
     )
     return with_skipped_positions(found, about.positions, held)

@@ -5,7 +5,7 @@ device is turned by alpha about z and then by beta about the turned x, and
 
     U = b + K (A f_0),   f_0 = (0, -g, 0);   W = c + L (A w_0 + turning)
 
-in procedure axes, put into the device's by its mounting.
+in procedure axes, put into the device's by its mounting, with what `Device` adds.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from benchmarks.never_wrong.device import Device
 
 Floats = NDArray[np.float64]
 
@@ -52,10 +54,6 @@ MOUNTINGS = (
 )
 
 
-SQUARE = 5e-4
-"""One sigma of each cross-coupling coefficient that a factory leaves, 0.03 deg."""
-
-
 @dataclass(frozen=True)
 class Bench:
     """What is there, and what is written down of it.
@@ -73,8 +71,7 @@ class Bench:
     rate : samples a second
     mounting : of the device
     acc_bias, acc_scale, gyr_bias, gyr_scale : (3,) of the device
-    coupled : (2, 3, 3) what an axis of either sensor sees of another's input, 0 of its
-        own
+    device : what else it has
     acc_noise, gyr_noise : rms of a sample
     grain : what accelerations are rounded to, m/s^2; 0 for none
     imported : whether angles are unknown, and the session is no recalibration
@@ -98,7 +95,7 @@ class Bench:
     acc_scale: Floats
     gyr_bias: Floats
     gyr_scale: Floats
-    coupled: Floats
+    device: Device
     acc_noise: float
     gyr_noise: float
     grain: float
@@ -133,9 +130,10 @@ class Bench:
 
     @property
     def truth(self) -> dict[str, float]:
-        """Parameters of the device by full name."""
+        """Parameters of the device by full name, at the end of the last position."""
+        come = self.device.come_to(float(self.windows[-1, 1]))
         return {
-            f"{group}.{axis}": float(getattr(self, group)[i])
+            f"{group}.{axis}": float((getattr(self, group) + come.get(group, 0.0))[i])
             for group in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
             for i, axis in enumerate("xyz")
         }
@@ -184,7 +182,7 @@ def drawn(rng: np.random.Generator) -> Bench:
         acc_scale=1 + rng.normal(0, 5e-3, 3),
         gyr_bias=rng.normal(0, 5e-3, 3),
         gyr_scale=1 + rng.normal(0, 5e-3, 3),
-        coupled=rng.normal(0, SQUARE, (2, 3, 3)) * (1 - np.eye(3)),
+        device=Device.drawn(rng),
         acc_noise=acc_noise,
         gyr_noise=acc_noise * float(rng.uniform(0.05, 0.3)),
         grain=float(rng.choice([0.0, 0.0, 1e-3, 9.80665 / 4096])),
@@ -249,9 +247,11 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
     w += about_z * speed[:, :1]
     f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
-    f, w = f + f @ bench.coupled[0].T, w + w @ bench.coupled[1].T
-    acc = bench.acc_bias + bench.acc_scale * f + rng.normal(0, bench.acc_noise, f.shape)
-    gyr = bench.gyr_bias + bench.gyr_scale * w + rng.normal(0, bench.gyr_noise, w.shape)
+    acc, gyr = bench.device.adds(t, f, w)
+    acc += bench.acc_bias + bench.acc_scale * f
+    gyr += bench.gyr_bias + bench.gyr_scale * w
+    acc += rng.normal(0, bench.acc_noise, f.shape)
+    gyr += rng.normal(0, bench.gyr_noise, w.shape)
     if bench.grain:
         acc = np.round(acc / bench.grain) * bench.grain
     return Samples(t, acc, gyr)

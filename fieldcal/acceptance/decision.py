@@ -17,12 +17,12 @@ from fieldcal.acceptance.angles import REMEDY, stated, unwitnessed
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
+from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
 from fieldcal.acceptance.level import level_missing, tilt_is_found
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
-from fieldcal.acceptance.square import relies_on_square_axes
 from fieldcal.acceptance.turned import turns_disagree
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
@@ -95,9 +95,10 @@ def decide(
     checks = [
         _fit(found, limits),
         *_odd_positions(found, verification.ok is True),
+        *_gyroscopes(found, limits),
         *_turns(found, limits),
         *_angles(found, about, limits, circumstances),
-        *relies_on_square_axes(found, about, limits),
+        *relies_on_factory(found, about, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
         *_level(found, about),
@@ -164,18 +165,41 @@ def _fit(found: Calibration, limits: GradeLimits) -> Check:
         return Check("fit", False, "the estimate is bad: " + _first(found))
     if found.dof <= 0 or not np.isfinite(found.chi2):
         return Check("fit", None, "no degree of freedom is left to check the fit")
-    chance = chi2_tail(found.chi2, found.dof)
+    return _agreement("fit", "positions", found.chi2, found.dof, found, limits)
+
+
+def _gyroscopes(found: Calibration, limits: GradeLimits) -> list[Check]:
+    """Whether the gyroscopes' means agree, where others measured beside them."""
+    gyr = found.info.get("gyroscopes", {})
+    chi2, dof = float(gyr.get("chi2", 0.0)), int(gyr.get("dof", 0))
+    if dof <= 0 or "acc_bias" not in found.groups:
+        return []
+    what = "gyroscopes at rest"
+    return [_agreement("gyroscopes", what, chi2, dof, found, limits, "gyr")]
+
+
+def _agreement(
+    name: str,
+    what: str,
+    chi2: float,
+    dof: int,
+    found: Calibration,
+    limits: GradeLimits,
+    sensor: str = "acc",
+) -> Check:
+    """Whether means of a sensor agree, or by how little they do not."""
+    chance = chi2_tail(chi2, dof)
     agree = chance >= limits.fit_chance
     word = "agree" if agree else "do not agree"
     says = (
-        f"the positions {word} with each other: χ² = {found.chi2:.1f} with"
-        f" {found.dof} degrees of freedom, probability {chance:.2g}, required"
+        f"the {what} {word} with each other: χ² = {chi2:.1f} with"
+        f" {dof} degrees of freedom, probability {chance:.2g}, required"
         f" {limits.fit_chance:.2g}"
     )
-    if not agree and (small := harmless(found, limits)):
+    if not agree and (small := harmless(found, limits, sensor)):
         says += f"; {small}"
         agree = True
-    return Check("fit", agree, says, chance, limits.fit_chance, "1")
+    return Check(name, agree, says, chance, limits.fit_chance, "1")
 
 
 def _odd_positions(found: Calibration, verified: bool) -> list[Check]:

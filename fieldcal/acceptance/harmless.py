@@ -6,8 +6,8 @@ of a bias that the grade allows,
 
     sqrt(s^2 + r^2) < 1.005 s   if   r <= s / 10                                   (1)
 
-so such a scatter does not matter. This is true of scatter only: if a single window may
-be wrong, chi-squared decides.
+so such a scatter does not matter, of accelerometers as of gyroscopes. This is true of
+scatter only: if a single window may be wrong, chi-squared decides.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ SHARE = 0.1
 """Largest r over s, (1)."""
 
 
-def harmless(found: Calibration, limits: GradeLimits) -> str:
+def harmless(found: Calibration, limits: GradeLimits, sensor: str = "acc") -> str:
     """Why a misfit does not matter, as part of a sentence; empty if it may matter."""
-    scatter = found.info.get("extra_scatter")
+    of = found.info if sensor == "acc" else found.info["gyroscopes"]
+    scatter, unit = of.get("extra_scatter"), "m/s²" if sensor == "acc" else "rad/s"
     doubt = max(found.info.get("bad_position", ()), default=0.0)
-    most = SHARE * limits.acc_bias_sigma
+    most = SHARE * (limits.sigma(f"{sensor}_bias") or 0.0)
     if scatter is None or not 0 < scatter <= most or doubt >= thresholds.SUSPECT:
         return ""
     return (
-        f"that is a scatter of {scatter:.2g} m/s², which the uncertainties include;"
-        f" below {most:.2g} m/s² it does not matter for navigation"
+        f"that is a scatter of {scatter:.2g} {unit}, which the uncertainties include;"
+        f" below {most:.2g} {unit} it does not matter for navigation"
     )

@@ -19,10 +19,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fieldcal.acceptance.factory import counted
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.calibration.wording import title
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import Position, forces, ladder
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
@@ -202,17 +204,17 @@ def _worst(
 
 
 class _Known(NamedTuple):
-    """What is known before: error of a mean, m/s^2, angles, rad, square axes."""
+    """What is known before: error of a mean, m/s^2, angles, rad, the factory's."""
 
     sigma: float
     angle: float
-    square: float
+    factory: FactoryErrors
 
     @classmethod
     def of(cls, found: Calibration, sigma: float) -> _Known:
         """As a result was made with."""
         angle = np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0))
-        return cls(sigma, float(angle), float(found.info.get("square_sigma") or 0.0))
+        return cls(sigma, float(angle), counted(found))
 
 
 def _expected(
@@ -222,8 +224,9 @@ def _expected(
     known: _Known,
 ) -> Array:
     """Sigma of each parameter, (k,), by (1); infinite where not determined."""
-    coupled = parameters("cross_coupling") if known.square else ()
-    every = [*names, *(name for name in coupled if name not in names)]
+    left = {name: size for name, size in known.factory.by_effect.items() if size}
+    more = [name for name in parameters(*left) if name not in names]
+    every = [*names, *more]
     j = design(every, positions, about.gravity, about.mounting)
     t = np.stack(
         [_force_slopes(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))],
@@ -231,9 +234,9 @@ def _expected(
     )
     r = known.sigma**2 * np.eye(3) + known.angle**2 * t @ t.transpose(0, 2, 1)
     whitened = np.linalg.solve(np.linalg.cholesky(r), j).reshape(-1, len(every))
-    if known.square:
-        before = np.eye(len(every))[len(names) :] / known.square
-        whitened = np.vstack([whitened, before])
+    sizes = np.array([left[group_of(name)] for name in more])
+    before = np.eye(len(every))[len(names) :] / sizes[:, None]
+    whitened = np.vstack([whitened, before])
     return sigma_of(whitened)[: len(names)]  # (1)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
+from fieldcal.core.factory import FactoryErrors
 
 DEFAULTS = "limits.toml"
 
@@ -42,12 +43,19 @@ class GradeLimits:
     verification_chance: float
     angle_setting_deg: float
     squareness: float
+    quadratic: float
+    g_sensitivity: float
     temperature_min_c: float
     temperature_max_c: float
     temperature_span_k: float
     temperature_rate_k_min: float
     lost_share: float
     bad_share: float
+
+    @property
+    def factory(self) -> FactoryErrors:
+        """What the factory leaves of errors that are not estimated."""
+        return FactoryErrors(self.squareness, self.quadratic, self.g_sensitivity)
 
     def sigma(self, group: str) -> float | None:
         """Largest uncertainty of a group's parameters; None where none is set."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.commands.import_columns import add_columns, said_of_columns
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
+from fieldcal.core.factory import FACTORY
 from fieldcal.core.gravity import G0
 from fieldcal.core.shown import one_line
 
@@ -38,7 +39,7 @@ RARE = (
         "acc_zero",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
-    *("lot", "station", "operator", "squareness"),
+    *("lot", "station", "operator", *FACTORY),
 )
 
 EXAMPLE = """\

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError, PlanError
+from fieldcal.core.factory import FACTORY
 
 if TYPE_CHECKING:
     from fieldcal.core.positions import Position
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 RARE = (
     *("name", "serial", "lot", "station", "operator"),
-    *("grade", "gravity", "mounting", "squareness"),
+    *("grade", "gravity", "mounting", *FACTORY),
 )
 
 EXAMPLE = """\

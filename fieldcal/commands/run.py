@@ -26,6 +26,7 @@ from fieldcal.commands.run_waits import (
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.factory import FACTORY
 from fieldcal.core.plugins import names
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ EXAMPLE = """\
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
-    "squareness",
+    *FACTORY,
 )
 
 INTERRUPTED = 130

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fieldcal.commands.several import StoreSeveral
+from fieldcal.core.factory import FACTORY
 
 
 def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
@@ -23,13 +24,7 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     add("--station", metavar="NAME", help="test station, for fieldcal lot")
     add("--operator", metavar="NAME", help="operator, for fieldcal lot")
     add("--grade", choices=("tactical", "navigation"), help="default: tactical")
-    add(
-        "--squareness",
-        type=float,
-        metavar="X",
-        help="cross-coupling left in the device, 1σ of each coefficient (default: the"
-        " grade's)",
-    )
+    add_factory(group)
     add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
@@ -39,6 +34,17 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
         help="procedure axis x, y, z is device axis ... (default: +x,+y,+z; z-up unit:"
         " +x,-z,+y)",
     )
+
+
+def add_factory(parser: argparse._ActionsContainer) -> None:
+    """Declare the options of what the factory left in the device."""
+    for name, what in (
+        ("squareness", "cross-coupling left in the device, 1σ of each coefficient"),
+        ("quadratic", "K2 of its accelerometers, 1σ of each, 1/(m/s^2)"),
+        ("g_sensitivity", "g-sensitivity of its gyroscopes, 1σ, (rad/s)/(m/s^2)"),
+    ):
+        option, says = f"--{name.replace('_', '-')}", f"{what} (default: the grade's)"
+        parser.add_argument(option, type=float, metavar="X", help=says)
 
 
 def site_tables(args: argparse.Namespace, name: str) -> dict[str, Any]:
@@ -60,7 +66,7 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "serial": args.serial,
             "lot": args.lot,
             "grade": args.grade,
-            "squareness": args.squareness,
+            **{name: getattr(args, name) for name in FACTORY},
         },
         "site": {
             "station": args.station,

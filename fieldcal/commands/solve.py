@@ -9,9 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldcal.commands.site import add_factory
+from fieldcal.core.factory import FACTORY
+
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.lot_prior import LotPrior
+    from fieldcal.core.factory import FactoryErrors
     from fieldcal.evaluation.observations import Rests
     from fieldcal.session.folder import Session
 
@@ -55,13 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
         add(option, type=float, metavar="DEG", help=what)
-    add(
-        "--squareness",
-        type=float,
-        metavar="X",
-        help="cross-coupling left in the device, 1σ of each coefficient; else the"
-        " grade's",
-    )
+    add_factory(parser)
     add(
         "--lot",
         action="append",
@@ -127,9 +125,18 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles,
-        square_sigma=args.squareness,
+        factory=_factory(args, session),
         lot=_lot(args, session) if args.lot else None,
     )
+
+
+def _factory(args: argparse.Namespace, session: Session) -> FactoryErrors:
+    """What the options say of it, else what session.toml or the grade does."""
+    from fieldcal.evaluation.observations import factory_errors
+
+    said = {name: getattr(args, name) for name in FACTORY}
+    given = {name: value for name, value in said.items() if value is not None}
+    return factory_errors(replace(session.about, **given))
 
 
 def _lot(args: argparse.Namespace, session: Session) -> LotPrior:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
+from fieldcal.core.factory import FACTORY, FactoryErrors
 from fieldcal.core.samples import ACC, GYR, Block, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
@@ -63,11 +64,15 @@ def angle_setting(about: Description) -> float:
     return limits.read(about.grade).angle_setting_deg
 
 
-def squareness(about: Description) -> float:
-    """How square the accelerometers' axes are; the grade's where it is not stated."""
-    if about.squareness is not None:
-        return about.squareness
-    return limits.read(about.grade).squareness
+def factory_errors(about: Description) -> FactoryErrors:
+    """What the factory left in the device; the grade's where it is not stated."""
+    usual = limits.read(about.grade)
+    return FactoryErrors(
+        *(
+            getattr(usual, name) if (said := getattr(about, name)) is None else said
+            for name in FACTORY
+        )
+    )
 
 
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:

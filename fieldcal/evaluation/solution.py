@@ -27,9 +27,9 @@ from fieldcal.evaluation.not_carried import (
 from fieldcal.evaluation.observations import (
     Rests,
     angle_setting,
+    factory_errors,
     grain_of,
     observations,
-    squareness,
     with_provenance,
 )
 from fieldcal.evaluation.rounding_mode import (
@@ -182,8 +182,7 @@ def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
         asked["level_sigma_deg"] = about.level_deg
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
-    if asked.get("square_sigma") is None:
-        asked["square_sigma"] = squareness(about)
+    asked.setdefault("factory", factory_errors(about))
     printed = bool(asked.get("as_printed"))
     shown = None if printed else laid.explanation
     notes = [] if printed else laid.unexamined

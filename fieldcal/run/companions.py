@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.factory import FACTORY
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.run.link_marks import LinkMarks
@@ -31,7 +32,7 @@ from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.marks import ADDED
 from fieldcal.session.recorder import Recorder
 
-ALIKE = ("grade", "squareness")
+ALIKE = ("grade", *FACTORY)
 """What is said of the device that is led holds for the further ones as well."""
 
 BATCHES = 1 << 17

@@ -19,6 +19,7 @@ import numpy as np
 from fieldcal.calibration import Gauge
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.factory import FACTORY
 from fieldcal.core.frames import earth_rate_home, force_home, mounting_matrix
 from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import Position
@@ -52,6 +53,7 @@ class Description:
     angle_setting_deg : how well each position's angles are set, likewise
     squareness : one sigma of each coefficient of the accelerometers' cross-coupling
         that is left in the device, likewise
+    quadratic, g_sensitivity : the same of `FactoryErrors`, SI units
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each key of `units.NOMINAL`: what a simulation starts from
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
@@ -74,6 +76,8 @@ class Description:
     level_deg: float | None
     angle_setting_deg: float | None
     squareness: float | None
+    quadratic: float | None
+    g_sensitivity: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
     gauge: Gauge
@@ -249,7 +253,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         under_way=moving.level if grade == "tactical" else moving,
         level_deg=level,
         angle_setting_deg=_known(site.get("angle_setting_deg")),
-        squareness=_known(device.get("squareness")),
+        **{name: _known(device.get(name)) for name in FACTORY},
         axes=tuple(axes),
         nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
         gauge=gauge,

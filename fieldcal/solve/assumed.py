@@ -11,6 +11,7 @@ import numpy as np
 from fieldcal.calibration import Method
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.sentences import join
 from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
@@ -31,8 +32,8 @@ class Asked:
     level_deg, heading_deg : how level the base is, how well z points north; None where
         nobody said
     angles_deg : how well each position's angles are set
-    square : how square the axes of the accelerometers are
     lot : what the unit's lot says of it; None where it is not asked
+    factory : what the factory left of errors that are not estimated
 
     """
 
@@ -44,7 +45,7 @@ class Asked:
     heading_deg: float | None = None
     angles_deg: float = 0.0
     lot: LotPrior | None = None
-    square: float = 0.0
+    factory: FactoryErrors = FactoryErrors()
 
     def __post_init__(self) -> None:
         if self.method not in METHODS or self.tilt not in TILTS:
@@ -54,11 +55,6 @@ class Asked:
             )
         if self.lot is not None and self.as_printed:
             raise InputError("printed formulas know of no lot: leave one of them out")
-        if not 0 <= self.square < 1:
-            raise InputError(
-                f"squareness {self.square:g} is none: give the 1σ of a cross-coupling"
-                " coefficient, such as 5e-4"
-            )
         _refuse_none((self.level_deg, self.heading_deg, self.angles_deg))
 
     def method_for(self, observations: Observations) -> Method:

@@ -21,6 +21,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.sentences import join
 from fieldcal.model import priors, thresholds
@@ -60,7 +61,7 @@ def solve(
     angle_sigma_deg: float = 0.0,
     recorded: Recorded | None = None,
     lot: LotPrior | None = None,
-    square_sigma: float = 0.0,
+    factory: FactoryErrors | None = None,
 ) -> Calibration:
     """Estimate the calibration.
 
@@ -79,8 +80,7 @@ def solve(
         axis
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
-    square_sigma : how square the axes of the accelerometers are, where cross-coupling
-        is not estimated
+    factory : what the factory left of errors that are not estimated; nothing if None
     lot : what the unit's lot says of its parameters, which the result then has in it
         unless the unit is odd
 
@@ -101,7 +101,8 @@ def solve(
     """
     asked = Asked(
         method, tilt, cross, as_printed,
-        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot, square_sigma,
+        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot,
+        factory or FactoryErrors(),
     )  # fmt: skip
     if as_printed:
         return printed.solve(observations, asked)
@@ -225,7 +226,7 @@ class _Session:
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
             angles_deg=self.asked.angles_deg,
-            square=0.0 if crossed else self.asked.square,
+            factory=self.asked.factory,
             earth=self.unknown,
             turned=turned,
             lot=self.asked.lot,

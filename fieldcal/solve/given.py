@@ -18,6 +18,7 @@ import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import ParameterName, group_of
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.core.under_way import UnderWay
@@ -52,8 +53,7 @@ class Wanted:
     gyr_scale : whether the scale factor of the gyroscopes is
     level_deg : how level the base is, about each level axis; None if it is not stated
     angles_deg : how well each angle is set
-    square : how square the axes of the accelerometers are, if cross-coupling is not
-        estimated
+    factory : what the factory left of errors, where they are not estimated
     earth : (3,) rad/s, what is not known of the Earth's rate in base axes
     turned : whether turns between positions were recorded
     lot : what the unit's lot says of its parameters; None where nobody asks it
@@ -66,7 +66,7 @@ class Wanted:
     gyr_scale: bool = False
     level_deg: float | None = None
     angles_deg: float = 0.0
-    square: float = 0.0
+    factory: FactoryErrors = FactoryErrors()
     earth: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turned: bool = False
     lot: LotPrior | None = None
@@ -157,8 +157,7 @@ class Given(Dictionary):
             yield self._estimated(w.tilt, known=w.level_deg)
         if w.cross:
             yield self._estimated("cross_coupling", turned=not oriented)
-        if w.square and self.x.f.any():
-            yield self._square(w.square, turned=not oriented)
+        yield from self._factory(turned=not oriented)
         if w.gyro_cross:
             yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
@@ -203,13 +202,17 @@ class Given(Dictionary):
                       fixed=fixed)  # fmt: skip
         return _given_cause(group)
 
-    def _square(self, sigma: float, turned: bool) -> Cause:
-        """What axes are off from square: cross-coupling that nobody asked for."""
-        cause = self._estimated("cross_coupling", turned, known=sigma)
-        (group,) = cause.variants
-        return _given_cause(
-            Group("square", "acc", group.columns, group.typical, fixed=1.0)
-        )
+    def _factory(self, turned: bool) -> Iterator[Cause]:
+        """What the factory left of errors that nobody asked for."""
+        if not self.x.f.any():
+            return
+        for name, size in self.wanted.factory.by_effect.items():
+            if size and not (name == "cross_coupling" and self.wanted.cross):
+                (group,) = self._estimated(name, turned, known=size).variants
+                sizes = size * units_of(self, catalogue()[name])[list(group.params)]
+                yield _given_cause(
+                    Group("factory", name, group.columns, sizes, fixed=1.0)
+                )
 
     def _earth(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""

@@ -79,7 +79,8 @@ def magnified(found: Estimated) -> Magnified | None:
         if parameter.sensor == "acc":
             moved = float(added[given.names.index(name)])
             times = moved / (1.0 if parameter.is_scale else G0)
-            unit, square = GROUPS[parameter.group][2], given.wanted.square
+            unit = GROUPS[parameter.group][2]
+            square = given.wanted.factory.cross_coupling
             every.append(Magnified(name, unit, moved, times, square))
     worst = max(every, key=lambda m: m.times, default=None)
     return worst if worst and worst.times > 1 else None

@@ -139,6 +139,7 @@ def _info(
 ) -> dict[str, Any]:
     known = observations.temperature[np.isfinite(observations.temperature)]
     latitude = observations.latitude
+    wanted = found.given.wanted
     out: dict[str, Any] = {
         "conditions": {
             "positions": len(observations),
@@ -151,7 +152,9 @@ def _info(
         "bad_position": [round(float(p), 4) for p in found.bad],
         "extra_scatter": scatter_of(found.found, (0, 1, 2)),
         "angle_sigma_deg": asked.angles_deg,
-        "square_sigma": found.given.wanted.square,
+        "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
+        "quadratic_sigma": wanted.factory.quadratic,
+        "g_sensitivity_sigma": wanted.factory.g_sensitivity,
     }
     if doubt := DoubtfulPosition.of(observations, found.bad):
         out["doubtful_position"] = doubt.to_json()

@@ -93,6 +93,23 @@ def test_a_fit_that_disagrees_with_itself_is_no_go() -> None:
     assert "do not agree" in decided(odd).reasons[0]
 
 
+@pytest.mark.parametrize(
+    ("chi2", "scatter", "go"),
+    [(269.0, 6e-5, False), (269.0, 1.4e-5, True), (9.0, 6e-5, True)],
+)
+def test_gyroscopes_that_disagree_are_no_go_where_it_matters(
+    chi2: float, scatter: float, go: bool
+) -> None:
+    """A tenth of the 1.5e-4 rad/s that a bias is allowed does not."""
+    seen = {"chi2": chi2, "dof": 7, "unit": "rad/s", "extra_scatter": scatter}
+    found = calibration()
+    made = decided(replace(found, info={**found.info, "gyroscopes": seen}))
+    assert made.go is go
+    if not go:
+        (reason,) = made.reasons
+        assert "the gyroscopes at rest do not agree" in reason and "269.0" in reason
+
+
 def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read() -> (
     None
 ):

@@ -1,0 +1,70 @@
+"""What a result relies on that the factory made: errors that are not estimated.
+
+Hardly anything in few positions would contradict more of them than are usual. Whoever
+decides has to know what is relied on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fieldcal.acceptance.check import Check
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.gravity import G0
+from fieldcal.session.description import Description
+
+DEG_H = 4.84813681e-6
+"""rad/s of one degree an hour."""
+
+
+def counted(found: Calibration) -> FactoryErrors:
+    """What a result was made with, of its information."""
+    keys = ("square_sigma", "quadratic_sigma", "g_sensitivity_sigma")
+    return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
+
+
+def relies_on_factory(
+    found: Calibration, about: Description, limits: GradeLimits
+) -> list[Check]:
+    """How large errors were taken to be that were not estimated."""
+    return list(_checks(found, about, limits))
+
+
+def _checks(
+    found: Calibration, about: Description, limits: GradeLimits
+) -> Iterator[Check]:
+    left, usual = counted(found), limits.factory
+    measured = {sensor_of(group_of(n)) for n in found.names}
+
+    def whose(said: float | None, size: float, grade: float) -> str:
+        stated = said is not None or size != grade
+        return "as stated" if stated else "as usual for the grade"
+
+    if left.cross_coupling and "acc" in measured:
+        by = whose(about.squareness, left.cross_coupling, usual.cross_coupling)
+        says = (
+            f"this relies on axes that are square to ± {100 * left.cross_coupling:.2g}"
+            f" %, {by}; each ± includes it. An uncalibrated device has more: estimate"
+            " cross-coupling from nine positions or more (--cross)"
+        )
+        yield Check("cross-coupling", None, says)
+    if left.quadratic and "acc" in measured:
+        by = whose(about.quadratic, left.quadratic, usual.quadratic)
+        size = 1e3 * left.quadratic * G0
+        says = (
+            f"this relies on accelerometers that are linear: K2 is 0 ± {size:.2g}"
+            f" mg/g², {by} (--quadratic); each ± includes it"
+        )
+        yield Check("linearity", None, says)
+    if left.g_sensitivity and "gyr" in measured:
+        by = whose(about.g_sensitivity, left.g_sensitivity, usual.g_sensitivity)
+        size = left.g_sensitivity * G0 / DEG_H
+        says = (
+            f"this relies on gyroscopes that feel 0 ± {size:.2g} deg/h per g, {by}"
+            " (--g-sensitivity); each ± includes it. Where a data sheet states more,"
+            " state it, and hold each axis up and down"
+        )
+        yield Check("g-sensitivity", None, says)

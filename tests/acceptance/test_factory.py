@@ -1,0 +1,120 @@
+"""What a factory leaves of errors is in every uncertainty, and the decision says it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from observed import observe
+
+from fieldcal.acceptance.factory import relies_on_factory
+from fieldcal.calibration import Calibration, limits
+from fieldcal.core.errors import InputError
+from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
+from fieldcal.core.samples import Array
+from fieldcal.session import description
+from fieldcal.solve import solve
+
+TACTICAL = limits.read("tactical")
+ABOUT = description.parse({"format": 1})
+G = 9.81
+NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
+
+
+def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibration:
+    seen = observe(positions, forces(positions, G), sigma=1e-4)
+    return solve(seen, tilt="none", factory=FactoryErrors(square))
+
+
+@pytest.mark.parametrize(
+    ("square", "stated", "says"),
+    [
+        (5e-4, None, "0.05 %, as usual for the grade"),
+        (5e-4, 5e-4, "0.05 %, as stated"),
+        (3e-4, None, "0.03 %, as stated"),
+    ],
+)
+def test_it_says_how_square_axes_were_taken_to_be(
+    square: float, stated: float | None, says: str
+) -> None:
+    """It may be stated in session.toml, or to `solve` alone."""
+    about = replace(ABOUT, squareness=stated)
+    (check,) = relies_on_factory(found(square), about, TACTICAL)
+    assert check.ok is None and f"square to ± {says}" in check.says
+
+
+def test_cross_coupling_that_is_estimated_is_relied_on_by_nothing() -> None:
+    result = solve(
+        observe(NINE, forces(NINE, G)), cross=True, factory=FactoryErrors(3e-4)
+    )
+    assert relies_on_factory(result, ABOUT, TACTICAL) == []
+    assert relies_on_factory(found(0.0), ABOUT, TACTICAL) == []
+
+
+def test_faces_have_of_it_what_each_bias_takes_in() -> None:
+    """Between faces up and down along each axis a bias has no part of it at all."""
+    plain, square = found(0.0), found(5e-4)
+    assert square.info["square_sigma"] == 5e-4
+    for group in ("acc_bias", "acc_scale"):
+        np.testing.assert_allclose(
+            square.vector(group)[1], plain.vector(group)[1], rtol=0.02
+        )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
+    """Devices of that squareness, drawn: a plain estimate is far off, this one not."""
+    rng = np.random.default_rng(seed)
+    off: list[Array] = []
+    plain: list[Array] = []
+    for _ in range(25):
+        mixing = np.eye(3) + rng.normal(0, 5e-4, (3, 3)) * (1 - np.eye(3))
+        mean = forces(FIVE, G) @ mixing.T + rng.normal(0, 1e-4, (len(FIVE), 3))
+        seen = observe(FIVE, mean, sigma=1e-4)
+        for square, pulls in ((5e-4, off), (0.0, plain)):
+            result = solve(seen, tilt="none", factory=FactoryErrors(square))
+            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+                value, sigma = result.vector(group)
+                pulls.append((value - true) / sigma)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
+    assert np.sqrt(np.mean(np.square(plain))) > 3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
+    """Of devices with K2 the plain estimate is far off, this one not; f^2 by hand."""
+    rng = np.random.default_rng(seed)
+    off: list[Array] = []
+    plain: list[Array] = []
+    for _ in range(25):
+        force = forces(FIVE, G)
+        bent = rng.normal(0, 2e-5, 3) * force * force
+        mean = force + bent + rng.normal(0, 1e-4, (len(FIVE), 3))
+        seen = observe(FIVE, mean, sigma=1e-4)
+        for left, pulls in ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain)):
+            result = solve(seen, tilt="none", factory=left)
+            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+                value, sigma = result.vector(group)
+                pulls.append((value - true) / sigma)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
+    assert np.sqrt(np.mean(np.square(plain))) > 2
+
+
+def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
+    """At home g12 turns a bias by g12 g, and nothing of small angles tells it apart."""
+    felt, level = 2.5e-6, (Position.deg(0, 0), Position.deg(1, 0), Position.deg(0, 1))
+    seen = observe(level, forces(level, G), gyr=np.zeros((3, 3)))
+    plain = solve(seen, tilt="none").vector("gyr_bias")[1]
+    result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=felt))
+    more = np.sqrt(result.vector("gyr_bias")[1] ** 2 - plain**2)
+    np.testing.assert_allclose(more, felt * G, rtol=0.02)
+    checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
+    assert "5.1 deg/h per g, as usual for the grade" in checks["g-sensitivity"].says
+
+
+@pytest.mark.parametrize("left", [{"quadratic": -1e-5}, {"g_sensitivity": 0.3}])
+def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
+    with pytest.raises(InputError, match="SI units"):
+        FactoryErrors(**left)

@@ -11,6 +11,7 @@ import pytest
 from observed import GYR_BIAS, observe, outputs
 
 from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.solve import observations, result, solve
 from fieldcal.solve.assumed import Asked
@@ -28,7 +29,10 @@ def fit(**known: Any) -> SimpleNamespace:
 
 def estimated(**known: Any) -> Estimated:
     """An estimate of which only what is asked for is known."""
-    wanted = SimpleNamespace(turned=False, gyr_scale=True, level_deg=None, square=0)
+    wanted = SimpleNamespace(
+        turned=False, gyr_scale=True, level_deg=None, cross=False,
+        factory=FactoryErrors(),
+    )  # fmt: skip
     given = SimpleNamespace(
         wanted=wanted, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
     )

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.grade import GRADES, Grade
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.motion import mounting_axes
 from fieldcal.sim_device.vocabulary import check_together
 
 Triad = tuple[float, float, float]
-Grade = Literal["tactical", "navigation"]
 
 ZERO: Triad = (0.0, 0.0, 0.0)
 ONE: Triad = (1.0, 1.0, 1.0)
@@ -240,10 +240,9 @@ def _check_numbers(profile: Profile) -> None:
         for number in value if isinstance(value, tuple) else (value,):
             if number is not None and not (math.isfinite(number) and number >= 0):
                 raise InputError(f"[noise] {name} = {number:g} must be 0 or more")
-    if profile.device.grade not in ("tactical", "navigation"):
+    if profile.device.grade not in GRADES:
         raise InputError(
-            f"[device] grade = {profile.device.grade!r} is neither tactical nor "
-            "navigation"
+            f"[device] grade = {profile.device.grade!r} is none of {', '.join(GRADES)}"
         )
     times = [t for t, _ in profile.temperature.points]
     if any(b <= a for a, b in zip(times, times[1:], strict=False)):

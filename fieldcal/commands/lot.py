@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldcal.core.grade import GRADES
 from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="Q",
         help="expected share of false alarms among odd units (default: 0.05)",
     )
-    add("--grade", choices=("tactical", "navigation"), default="tactical",
+    add("--grade", choices=GRADES, default="tactical",
         help="grade of the tolerances (default: tactical)")  # fmt: skip
     add("--limits", type=Path, metavar="FILE", help="tolerances of your own")
     add("--history", metavar="FILE", help="use this store")

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.grade import GRADES
 
 if TYPE_CHECKING:
     from fieldcal.sim_device.line_faults import LineFaults
@@ -134,7 +135,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         help="seed of all noise (default: 1)",
     )
     add("--rate", type=float, metavar="HZ", help="samples a second")
-    add("--grade", choices=("tactical", "navigation"))
+    add("--grade", choices=GRADES)
     add("--latitude", type=float, metavar="DEG")
     add("--height", type=float, metavar="M", help="above the ellipsoid")
     add("--gravity", type=float, metavar="M/S^2", help="replaces the WGS84 value")

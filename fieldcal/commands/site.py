@@ -8,6 +8,7 @@ from typing import Any
 
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.core.factory import FACTORY
+from fieldcal.core.grade import GRADES
 
 
 def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
@@ -23,7 +24,7 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     add("--lot", metavar="NAME", help="production lot, for fieldcal lot")
     add("--station", metavar="NAME", help="test station, for fieldcal lot")
     add("--operator", metavar="NAME", help="operator, for fieldcal lot")
-    add("--grade", choices=("tactical", "navigation"), help="default: tactical")
+    add("--grade", choices=GRADES, help="default: tactical")
     add_factory(group)
     add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")

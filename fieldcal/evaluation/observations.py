@@ -52,7 +52,7 @@ def observations(
         latitude=about.latitude,
         under_way=about.under_way,
         mounting=about.mounting,
-        grade="navigation" if about.grade == "navigation" else "tactical",
+        grade=about.grade,
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
     )
 

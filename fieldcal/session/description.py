@@ -21,6 +21,7 @@ from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.factory import FACTORY
 from fieldcal.core.frames import earth_rate_home, force_home, mounting_matrix
+from fieldcal.core.grade import Grade
 from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
@@ -40,7 +41,8 @@ class Description:
     Attributes
     ----------
     device : name, serial and whatever else [device] holds
-    grade : "tactical", or "navigation" when the gyroscopes see the Earth rate
+    grade : "consumer", "tactical", or "navigation" when the gyroscopes see the Earth
+        rate
     rate_hz : nominal sampling rate, None where unknown
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
@@ -65,7 +67,7 @@ class Description:
     """
 
     device: Mapping[str, Any]
-    grade: str
+    grade: Grade
     rate_hz: float | None
     units: Mapping[str, str]
     limits: Mapping[str, float]
@@ -235,10 +237,10 @@ def parse(raw: Mapping[str, Any]) -> Description:
     mounting_matrix(axes)
     nominal = nominal_of(raw.get("nominal", {}))
     gauge = gauge_of(units, nominal)
-    grade = device.get("grade", "tactical")
+    grade: Grade = device.get("grade", "tactical")
     moving = UnderWay.at(*_velocity(site), float(np.deg2rad(latitude)), height)
     level = _known(site.get("level_deg"))
-    if grade == "tactical" and level is not None:
+    if grade != "navigation" and level is not None:
         level = float(np.hypot(level, np.rad2deg(moving.lean)))
     return Description(
         device=device,
@@ -250,7 +252,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         height_m=height,
         gravity=float(site.get("gravity") or gravity(latitude, height))
         - float(moving.force[1]),
-        under_way=moving.level if grade == "tactical" else moving,
+        under_way=moving if grade == "navigation" else moving.level,
         level_deg=level,
         angle_setting_deg=_known(site.get("angle_setting_deg")),
         **{name: _known(device.get(name)) for name in FACTORY},

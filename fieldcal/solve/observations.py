@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
 from fieldcal.core.errors import InputError
+from fieldcal.core.grade import Grade
 from fieldcal.core.positions import Position, angles, forces, rates
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
 from fieldcal.core.under_way import UnderWay
 from fieldcal.windows import Average
 
-Grade = Literal["tactical", "navigation"]
 Index = NDArray[np.integer[Any]]
 Mask = NDArray[np.bool_]
 SINGULAR = 1e-6

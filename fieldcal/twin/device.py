@@ -90,7 +90,7 @@ def device(
         device=Identity(
             f"twin of {name or 'a device'}",
             serial or "SIM-1",
-            "navigation" if about.grade == "navigation" else "tactical",
+            about.grade,
         ),
         sampling=Sampling(float(f"{rate_of(source.block):.9g}")),
         site=Site(

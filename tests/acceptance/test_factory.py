@@ -14,6 +14,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
 from fieldcal.core.samples import Array
+from fieldcal.evaluation.observations import factory_errors
 from fieldcal.session import description
 from fieldcal.solve import solve
 
@@ -118,3 +119,39 @@ def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
 def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
     with pytest.raises(InputError, match="SI units"):
         FactoryErrors(**left)
+
+
+@pytest.mark.parametrize(
+    ("device", "left"),
+    [
+        ({}, (5e-4, 2e-5, 2.5e-6)),
+        ({"grade": "consumer"}, (1e-2, 2.5e-4, 9e-5)),
+        ({"grade": "consumer", "quadratic": 1e-5}, (1e-2, 1e-5, 9e-5)),
+        ({"squareness": 1e-4, "g_sensitivity": 1e-7}, (1e-4, 2e-5, 1e-7)),
+    ],
+)
+def test_the_grade_says_what_nobody_states(
+    device: dict[str, object], left: tuple[float, float, float]
+) -> None:
+    about = description.parse({"format": 1, "device": device})
+    assert factory_errors(about) == FactoryErrors(*left)
+
+
+def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
+    """A percent of cross-coupling, and 0.5 % of 2 g off a line, both by hand."""
+    rng = np.random.default_rng(7)
+    off: list[Array] = []
+    plain: list[Array] = []
+    for _ in range(30):
+        force = forces(FIVE, G)
+        mixing = np.eye(3) + rng.normal(0, 1e-2, (3, 3)) * (1 - np.eye(3))
+        mean = force @ mixing.T + rng.normal(0, 2.5e-4, 3) * force * force
+        seen = observe(FIVE, mean + rng.normal(0, 1e-3, mean.shape), sigma=1e-3)
+        for grade, pulls in (("consumer", off), ("tactical", plain)):
+            left = limits.read(grade).factory
+            result = solve(seen, tilt="none", factory=left)
+            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+                value, sigma = result.vector(group)
+                pulls.append((value - true) / sigma)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
+    assert np.sqrt(np.mean(np.square(plain))) > 3

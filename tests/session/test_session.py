@@ -187,7 +187,7 @@ def test_windows_of_a_live_session_stand_in_its_marks(tmp_path: Path) -> None:
             "[nominal]\nacc_bias = [1, 2]",
             "[nominal] acc_bias = [1, 2] cannot be",
         ),
-        ("[device]\ngrade = 'toy'", 'write "tactical" or "navigation"'),
+        ("[device]\ngrade = 'toy'", 'write "consumer", "tactical" or "navigation"'),
         ("[model]\neffects = 'base_tilt'", "list of ids"),
         (
             "[[position]]\nalpha_deg = 1",

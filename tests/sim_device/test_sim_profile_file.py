@@ -130,7 +130,7 @@ def test_a_file_says_only_what_differs(tmp_path: Path) -> None:
         ("[sampling]\nrate_hz = true\n", "must be a number"),
         ("[truth]\nacc_bias = [1, nan, 2]\n", "must be a number"),
         ("[device]\nname = 3\n", "must be text"),
-        ("[device]\ngrade = 'toy'\n", "neither tactical nor"),
+        ("[device]\ngrade = 'toy'\n", "none of consumer, tactical, navigation"),
         ("[site]\nlatitude_deg = 100\n", "latitude"),
         ("[frame]\nmounting = ['+x', '+y']\n", "must be like"),
         ("[frame]\nmounting = ['+x', '+y', '-z']\n", "left-handed"),

@@ -29,9 +29,9 @@ ASYMMETRY = 5e-5
 CUBIC = 2e-7
 """Of K3, 1/(m/s^2)^2: half as much off a straight line at 10 g as K2."""
 
-FELT = 2.5e-6
-"""Of each g-sensitivity of the gyroscopes, (rad/s)/(m/s^2): 5 deg/h per g, as units
-state that are compensated for it."""
+FELT = 9e-6
+"""Of each g-sensitivity of the gyroscopes, (rad/s)/(m/s^2): 0.005 deg/s per g, half of
+what units state."""
 
 WARM_ACC, WARM_SCALE, WARM_GYR = 1e-3, 3e-5, 1e-5
 """Of temperature coefficients: 0.1 mg/K, 30 ppm/K, 2 deg/h/K."""

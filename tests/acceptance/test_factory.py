@@ -105,14 +105,14 @@ def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
 
 def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
     """At home g12 turns a bias by g12 g, and nothing of small angles tells it apart."""
-    felt, level = 2.5e-6, (Position.deg(0, 0), Position.deg(1, 0), Position.deg(0, 1))
+    felt, level = 9e-6, (Position.deg(0, 0), Position.deg(1, 0), Position.deg(0, 1))
     seen = observe(level, forces(level, G), gyr=np.zeros((3, 3)))
     plain = solve(seen, tilt="none").vector("gyr_bias")[1]
     result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=felt))
     more = np.sqrt(result.vector("gyr_bias")[1] ** 2 - plain**2)
     np.testing.assert_allclose(more, felt * G, rtol=0.02)
     checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
-    assert "5.1 deg/h per g, as usual for the grade" in checks["g-sensitivity"].says
+    assert "18 deg/h per g, as usual for the grade" in checks["g-sensitivity"].says
 
 
 @pytest.mark.parametrize("left", [{"quadratic": -1e-5}, {"g_sensitivity": 0.3}])
@@ -124,7 +124,7 @@ def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
 @pytest.mark.parametrize(
     ("device", "left"),
     [
-        ({}, (5e-4, 2e-5, 2.5e-6)),
+        ({}, (5e-4, 2e-5, 9e-6)),
         ({"grade": "consumer"}, (1e-2, 2.5e-4, 9e-5)),
         ({"grade": "consumer", "quadratic": 1e-5}, (1e-2, 1e-5, 9e-5)),
         ({"squareness": 1e-4, "g_sensitivity": 1e-7}, (1e-4, 2e-5, 1e-7)),

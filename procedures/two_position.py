@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import TWO, Position
-from fieldcal.evaluation.observations import angle_setting, factory_errors, observations
+from fieldcal.evaluation.observations import angle_setting, observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
 from fieldcal.session.description import Description
+from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 
 POSITIONS: tuple[Position, ...] = TWO

@@ -132,7 +132,7 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
 
 def _factory(args: argparse.Namespace, session: Session) -> FactoryErrors:
     """What the options say of it, else what session.toml or the grade does."""
-    from fieldcal.evaluation.observations import factory_errors
+    from fieldcal.session.factory import factory_errors
 
     said = {name: getattr(args, name) for name in FACTORY}
     given = {name: value for name, value in said.items() if value is not None}

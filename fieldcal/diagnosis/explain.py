@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +13,9 @@ from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.effect_causes import of_size
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import HeldOut, in_question, turns_held_out
@@ -32,6 +35,7 @@ from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
+from fieldcal.session.factory import factory_errors
 
 
 @dataclass(frozen=True)
@@ -163,6 +167,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
         rows.x, rows.used, origins(source, rows), common, unit, turned,
         Wander.of(rows, unit),
     )  # fmt: skip
+    dictionary.unfitted = tuple(_factory(dictionary, about, prepared))
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
     # what sways is taken out of windows and closures; on the way it shakes
@@ -170,6 +175,17 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(WindowSystem(rows, dictionary), nominal, turns)
+
+
+def _factory(
+    dictionary: Dictionary, about: Description, prepared: Prepared
+) -> Iterator[Group]:
+    """What the factory left, but for what the simulation has already."""
+    known = {term.effect.id for term in prepared.known}
+    turned = not dictionary.x.oriented.any()
+    for name, size in factory_errors(about).by_effect.items():
+        if size and name not in known and dictionary.x.f.any():
+            yield of_size(dictionary, name, size, turned)
 
 
 def nominal_of(about: Description, places: int, prepared: Prepared) -> State:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
-from fieldcal.core.factory import FACTORY, FactoryErrors
 from fieldcal.core.samples import ACC, GYR, Block, Grain
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
@@ -62,17 +61,6 @@ def angle_setting(about: Description) -> float:
     if about.angle_setting_deg is not None:
         return about.angle_setting_deg
     return limits.read(about.grade).angle_setting_deg
-
-
-def factory_errors(about: Description) -> FactoryErrors:
-    """What the factory left in the device; the grade's where it is not stated."""
-    usual = limits.read(about.grade)
-    return FactoryErrors(
-        *(
-            getattr(usual, name) if (said := getattr(about, name)) is None else said
-            for name in FACTORY
-        )
-    )
 
 
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:

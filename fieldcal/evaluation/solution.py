@@ -27,7 +27,6 @@ from fieldcal.evaluation.not_carried import (
 from fieldcal.evaluation.observations import (
     Rests,
     angle_setting,
-    factory_errors,
     grain_of,
     observations,
     with_provenance,
@@ -39,6 +38,7 @@ from fieldcal.evaluation.rounding_mode import (
 )
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
+from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded

@@ -29,7 +29,7 @@ from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import effect_columns, units_of
+from fieldcal.model.causes.effect_causes import effect_columns, of_size, units_of
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
@@ -208,11 +208,7 @@ class Given(Dictionary):
             return
         for name, size in self.wanted.factory.by_effect.items():
             if size and not (name == "cross_coupling" and self.wanted.cross):
-                (group,) = self._estimated(name, turned, known=size).variants
-                sizes = size * units_of(self, catalogue()[name])[list(group.params)]
-                yield _given_cause(
-                    Group("factory", name, group.columns, sizes, fixed=1.0)
-                )
+                yield _given_cause(of_size(self, name, size, turned))
 
     def _earth(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""

@@ -14,8 +14,8 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import factory_errors
 from fieldcal.session import description
+from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 
 TACTICAL = limits.read("tactical")

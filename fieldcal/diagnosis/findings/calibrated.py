@@ -44,13 +44,15 @@ def calibrated(
     if one is not explanation.best.set:
         found = reported(explanation.posterior.search, one)
     at = _columns(explanation)
-    return _named(explanation, at, *of_columns([(found, 1.0)], at))
+    left = explanation.dictionary.unfitted
+    return _named(explanation, at, *of_columns([(found, 1.0)], at, left))
 
 
 def averaged(explanation: Explanation) -> dict[str, tuple[float, float, float]]:
     """The same over all sets that count."""
     at = _columns(explanation)
-    return _named(explanation, at, *of_columns(explanation.average.sets, at))
+    left = explanation.dictionary.unfitted
+    return _named(explanation, at, *of_columns(explanation.average.sets, at, left))
 
 
 def _columns(explanation: Explanation) -> Index:

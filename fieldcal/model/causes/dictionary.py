@@ -77,10 +77,13 @@ class Dictionary(ColumnTable):
     Attributes
     ----------
     known : what is known of columns from elsewhere; None where nothing is
+    unfitted : effects, each named by `part`, that may be in the device although a set
+        has them not: numbers are less certain for them
 
     """
 
     known: KnownRows | None = None
+    unfitted: tuple[Group, ...] = ()
 
     def __init__(
         self,

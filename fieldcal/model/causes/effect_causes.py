@@ -40,6 +40,28 @@ def _of_effect(
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
+def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
+    """An effect of the catalogue whose coefficients have a known size, SI, (1 sigma).
+
+    Those that a turn of the whole device makes of others are left out if it is `turned`
+    as nobody knows.
+
+    Raises
+    ------
+    TypeError
+        If the effect has no equation.
+
+    """
+    effect = catalogue()[name]
+    if not isinstance(effect, Motion | Sensor):
+        raise TypeError(f"{name} has no equation")
+    some = [j for j, p in enumerate(effect.params)
+            if not (turned and p.name in effect.turned_into)]  # fmt: skip
+    at = effect_columns(table, effect, [({}, 0)])[0][some]
+    wide = size * units_of(table, effect)[some]
+    return Group("factory", name, at, wide, fixed=1.0)
+
+
 def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:
     """The group of an effect at other points of its shape, with columns of its own."""
     effect = group.effect

@@ -7,8 +7,13 @@ weight w_s,
     mean = sum_s w_s mean_s
     cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
 
-A parameter that a set does not have is 0 in it. Source: J. Hoeting and others, Bayesian
-model averaging: a tutorial, 1999, (1) to (3).
+A parameter that a set does not have is 0 in it. An effect x that may be in the device
+and is not in the set, of the covariance Q, moves the estimate by -C_s G_sx x, so that
+
+    C_s + C_s G_sx Q G_xs C_s                                                       (2)
+
+stands for C_s. Sources: J. Hoeting and others, Bayesian model averaging: a tutorial,
+1999, (1) to (3); Schmidt 1966, on considered parameters, (2).
 """
 
 from __future__ import annotations
@@ -82,7 +87,7 @@ class ModelAverage:
             wanted = [at.get(p, -1) for p in group.params or group.columns]
             return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
 
-        return averaged(there, places)
+        return averaged(there, places, self.posterior.search.dictionary.unfitted)
 
 
 def _group_in(one: Set, member: Member) -> Group:
@@ -92,16 +97,20 @@ def _group_in(one: Set, member: Member) -> Group:
 
 
 def of_columns(
-    sets: Sequence[tuple[Set, float]], columns: Index
+    sets: Sequence[tuple[Set, float]], columns: Index, unfitted: Sequence[Group] = ()
 ) -> tuple[Array, Array]:
     """Mean (k,) and covariance (k, k) of columns over weighed sets."""
-    return averaged(
-        sets, lambda s: [np.flatnonzero(s.state.columns == c) for c in columns]
-    )
+
+    def places(one: Set) -> list[Index]:
+        return [np.flatnonzero(one.state.columns == c) for c in columns]
+
+    return averaged(sets, places, unfitted)
 
 
-def averaged(sets: Sequence[tuple[Set, float]], places: Places) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1)."""
+def averaged(
+    sets: Sequence[tuple[Set, float]], places: Places, unfitted: Sequence[Group] = ()
+) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1), (2)."""
     means, covs = [], []
     for one, _ in sets:
         at = places(one)
@@ -110,6 +119,12 @@ def averaged(sets: Sequence[tuple[Set, float]], places: Places) -> tuple[Array, 
             row[some] = 1.0
         means.append(pick @ one.state.estimate)
         covs.append(pick @ one.state.inverse @ pick.T)
+        names = {cause.name for cause, _ in one.members}
+        for group in unfitted:
+            if group.part not in names:
+                shared = one.state.rows.matrix(one.state.columns, group.columns)
+                moved = pick @ one.state.inverse @ shared * group.typical
+                covs[-1] += moved @ moved.T  # (2)
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     mean: Array = weight @ np.array(means)

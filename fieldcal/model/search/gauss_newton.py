@@ -56,7 +56,7 @@ class GaussNewton:
         """Columns of a set, and the turns of unknown orientations."""
         d = self.dictionary
         wanted = np.zeros(d.width, dtype=bool)
-        for group in [*d.always, *(g for _, g in members)]:
+        for group in [*d.always, *d.unfitted, *(g for _, g in members)]:
             wanted[group.columns] = True
         if d.free.any():
             wanted[d.rotations] = True

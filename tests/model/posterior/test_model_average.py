@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
+from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.mixture import KEPT
 from fieldcal.model.posterior.model_average import ModelAverage, averaged, of_columns
@@ -69,6 +71,36 @@ def test_what_a_set_was_not_given_makes_its_numbers_uncertain() -> None:
     own = of_columns([(average.best[0], 1.0)], BIAS)[1]
     whole = of_columns(average.sets, BIAS)[1]
     assert whole[1, 1] > 2.0 * own[1, 1]
+
+
+def test_what_is_in_no_set_moves_numbers_by_as_much_as_they_are_less_certain() -> None:
+    """Against estimates from rows that have it, of which nobody knows that they do."""
+    value = np.array([3e-5, 2e-5, -3e-5])
+    (cause, group), rng = (QUADRATIC, QUADRATIC.variants[0]), np.random.default_rng(9)
+    off = SESSION.noise(rng) + SESSION.design[:, :, group.columns] @ value
+    left = ASYMMETRY.variants[0]
+    left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 1e-2))
+    there = SESSION.search(off).evaluated(((cause, group),))
+    plain = of_columns([(there, 1.0)], BIAS)
+    mean, cov = of_columns([(there, 1.0)], BIAS, [left])
+    moved = []
+    for column, size in zip(left.columns, left.typical, strict=True):
+        other = SESSION.search(off + SESSION.design[:, :, column] * size)
+        again = Eliminated.of(
+            other.weighed(there.sizes.instability),
+            there.state.columns,
+            there.state.sizes,
+        )
+        at = [int(np.flatnonzero(there.state.columns == c)[0]) for c in BIAS]
+        moved.append((again.estimate - there.state.estimate)[at])
+    np.testing.assert_allclose(mean, plain[0])
+    expected = plain[1] + np.array(moved).T @ np.array(moved)
+    np.testing.assert_allclose(cov, expected, rtol=1e-6)
+    assert cov[0, 0] > 1.1 * plain[1][0, 0]
+    # a set that has it knows it
+    has = SESSION.search(off).evaluated(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    known = of_columns([(has, 1.0)], BIAS, [left])[1]
+    np.testing.assert_array_equal(known, of_columns([(has, 1.0)], BIAS)[1])
 
 
 def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:

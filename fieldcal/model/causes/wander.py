@@ -92,12 +92,15 @@ class Wander:
         nothing = np.zeros(6)
         return cls(nothing, nothing, nothing, np.full(6, smooth.WAVES), 0.0)
 
+    def left_of_rows(self, length: Array, channel: int) -> Array:
+        """Variance that cosines and series leave of all rows of the windows, (n,)."""
+        out = self.left(length, channel)
+        return out if self.beside is None else out + self.beside[:, channel]
+
     def left(self, length: Array, channel: int) -> Array:
-        """Variance that its cosines leave of the means of all rows, of length (n,)."""
+        """Variance that its cosines leave of means over some lengths, (n,)."""
         q, a, count = self._of_channel(channel)
         walks: Array = q**2 * _left_of_walk(self.length, length, count)
-        if self.beside is not None:
-            return walks + self.beside[:, channel]
         if not a:
             return walks
         # rows are of few lengths, but for the rounding of their times

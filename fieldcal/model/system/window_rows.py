@@ -78,7 +78,7 @@ class WindowSystem(System):
         """One channel's rows, whitened."""
         rows, d = self.rows, self.dictionary
         use = np.flatnonzero(rows.used[:, c])
-        left = d.wander.left(rows.length, c)[use]
+        left = d.wander.left_of_rows(rows.length, c)[use]
         weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
         design = np.hstack([table[use] for _, table in parts]) * weight[:, None]
         columns = np.concatenate([at for at, _ in parts])

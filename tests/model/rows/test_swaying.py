@@ -17,6 +17,7 @@ from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import Laid, solved
 from fieldcal.model.rows.swaying import swaying
 from fieldcal.session import description
+from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
@@ -71,6 +72,7 @@ def fitted(session: Session) -> Calibration:
         recorded=laid.recorded(True),
         level_sigma_deg=LEVEL["level_deg"],
         angle_sigma_deg=LEVEL["angle_setting_deg"],
+        factory=factory_errors(session.about),
     )
 
 

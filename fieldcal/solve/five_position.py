@@ -1,4 +1,4 @@
-"""Accelerometers and the tilt of the base from five or more known positions.
+"""Accelerometers and the offset of the joints from five or more known positions.
 
 The outputs are expanded in known functions of the angles, (17) (24); their
 coefficients come from least squares, (20) (26), and the parameters from them, per axis.
@@ -15,16 +15,10 @@ joint offset (15):  f = g (-S(a+a0), -C(a+a0) C(b+b0), +C(a+a0) S(b+b0))
     b0 = -atan(C2y / C1y), atan(C1z / C2z)                                    (28) (32)
     k g = sqrt(sum C^2) with the sign of the leading coefficient         (22) (30) (34)
 
-tilted base:  f = A(a, b) g n,  n = (-Sa0, -Ca0 Cb0, Ca0 Sb0), a0 about z, b0 about x
-
-    Ux = C0 + C1 Sa + C2 Ca               C1, C2 = k11 g (n_y, n_x)
-    Uy = C0 + C1 CaCb + C2 Sb + C3 SaCb   C1, C2, C3 = k22 g (n_y, n_z, -n_x)
-    Uz = C0 + C1 CaSb + C2 Cb + C3 SaSb   C1, C2, C3 = k33 g (-n_y, n_z, n_x)
-
-The three values of a0 and two (three) of b0 are combined by their covariance. Print and
-what holds: (17) both coefficients need the minus; (22), (30), (34) lose the sign of k;
-(23) is inverted; (24) is missing, and with (5) the signs of z. U in m/s^2, procedure
-axes inside, device axes outside. Source: Avrutov and Pozniak 2023.
+The three values of a0 and two of b0 are combined by their covariance. Print and what
+holds: (17) both coefficients need the minus; (22), (30), (34) lose the sign of k; (23)
+is inverted; (24) is missing, and with (5) the signs of z. U in m/s^2, procedure axes
+inside, device axes outside. Source: Avrutov and Pozniak 2023.
 """
 
 from __future__ import annotations
@@ -34,10 +28,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from fieldcal.core.errors import InputError, NotObservable
+from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
 from fieldcal.solve.closed import Closed
-from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import determined
 
@@ -59,7 +52,6 @@ class AxisEstimates:
     values : (q,) m/s^2, 1, degrees
     gain : (q, n, 3) derivative by the means in procedure axes
     covariance : (q, q)
-    missing : axes, "x", "y" or "z", that these positions do not determine
 
     """
 
@@ -67,30 +59,29 @@ class AxisEstimates:
     values: Array
     gain: Array
     covariance: Array
-    missing: tuple[str, ...]
 
 
 def axis_estimates(
-    observations: Observations, tilt: Tilt = "angle_offset", as_printed: bool = False
+    observations: Observations, as_printed: bool = False
 ) -> AxisEstimates:
-    """Bias, scale factor and tilt from each axis, (20)-(23), (26)-(34).
+    """Bias, scale factor and offset from each axis, (20)-(23), (26)-(34).
 
     Parameters
     ----------
     observations : n positions with known angles
-    tilt : "angle_offset" as in the print, or "base_tilt"
     as_printed : take (22), (23), (30), (34) as printed, to compare
 
+    Raises
+    ------
+    NotObservable
+        If no axis is determined.
+
     """
-    if as_printed and tilt != "angle_offset":
-        raise InputError("the print has the tilt only as an offset of the angles")
     p = observations.mounting
     outputs = observations.mean[:, ACC] @ p.T
     noise = p @ observations.covariance[:, ACC, ACC] @ p.T
-    tables = expansion(observations, tilt)
+    tables = expansion(observations)
     usable = [bool(determined(f)[0].all()) for f in tables]
-    if tilt == "base_tilt":
-        usable[0] &= usable[1]
     if not any(usable):
         raise NotObservable(
             f"{len(observations)} positions separate bias, scale factor and tilt on "
@@ -105,56 +96,40 @@ def axis_estimates(
     coefficients = np.einsum("knc,nc->k", by_output, outputs)
     limits = np.cumsum([0, *(len(r) for r in rows)])
     names, values, slope = _differentiated(
-        coefficients, limits, tilt, observations.gravity, as_printed
+        coefficients, limits, observations.gravity, as_printed
     )
     gain = np.tensordot(slope, by_output, axes=1)
     covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
-    missing = tuple(x for x, ok in zip("xyz", usable, strict=True) if not ok)
-    return AxisEstimates(names, values, gain, covariance, missing)
+    return AxisEstimates(names, values, gain, covariance)
 
 
-def five_position(
-    observations: Observations, tilt: Tilt = "angle_offset", as_printed: bool = False
-) -> Closed:
-    """Bias, scale factor and tilt of the accelerometers from five positions or more.
+def five_position(observations: Observations, as_printed: bool = False) -> Closed:
+    """Bias, scale factor and offset of the joints from five positions or more.
 
-    Parameters as in `axis_estimates`.
-
-    Raises
-    ------
-    NotObservable
-        If no axis is determined.
-
+    Parameters and errors as of `axis_estimates`.
     """
-    each = axis_estimates(observations, tilt, as_printed)
-    pick, names = _parameter_rows(each, tilt, observations.mounting)
+    each = axis_estimates(observations, as_printed)
+    pick, names = _parameter_rows(each, observations.mounting)
     return Closed(names, pick @ each.values, pick @ each.covariance @ pick.T)
 
 
-def expansion(observations: Observations, tilt: Tilt) -> tuple[Array, Array, Array]:
-    """Functions of the angles that each axis is expanded in, (n, 3 to 5) each."""
+def expansion(observations: Observations) -> tuple[Array, Array, Array]:
+    """Functions of the angles that each axis is expanded in, (n, 3 or 5) each."""
     a, b = observations.angles
     sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
     one = np.ones_like(a)
     x = np.stack([one, sa, ca], axis=1)  # (17)
-    if tilt == "base_tilt":
-        y = np.stack([one, ca * cb, sb, sa * cb], axis=1)
-        z = np.stack([one, ca * sb, cb, sa * sb], axis=1)
-        return x, y, z
     yz = np.stack([one, ca * cb, ca * sb, sa * cb, sa * sb], axis=1)  # (24)
     return x, yz, yz
 
 
 def _differentiated(
-    c: Array, limits: Array, tilt: Tilt, g: float, as_printed: bool
+    c: Array, limits: Array, g: float, as_printed: bool
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Parameters from all coefficients, and their derivatives by them."""
     stepped = np.vstack([c + 0j, c + 1j * STEP * np.eye(len(c))]).T
     x, y, z = (stepped[i:j] for i, j in pairwise(limits))
-    if tilt == "base_tilt":
-        found = _of_base(x, y, z, g)
-    else:
-        found = _of_offset(x, y, z, g, as_printed)
+    found = _of_offset(x, y, z, g, as_printed)
     table = np.stack(list(found.values()))
     return tuple(found), table[:, 0].real, table[:, 1:].imag / STEP
 
@@ -177,27 +152,6 @@ def _of_offset(x: Array, y: Array, z: Array, g: float, as_printed: bool) -> Foun
     return out
 
 
-def _of_base(x: Array, y: Array, z: Array, g: float) -> Found:
-    """Parameters of each axis on a tilted base; k g n stands in the coefficients."""
-    out: Found = {}
-    if len(x):
-        # of n the x axis sees n_x and n_y only; what of it is n_z, the y axis says
-        level = 1 - y[2] ** 2 / (y[1:] ** 2).sum(axis=0)
-        out["x.bias"] = x[0]
-        norm = np.sqrt((x[1] ** 2 + x[2] ** 2) / level)
-        out["x.scale"] = -np.sign(x[1][0].real) * norm / g
-        cosine = np.cos(np.arctan(-y[2] / y[1]))
-        out["x.alpha0_deg"] = np.arctan(x[2] / x[1] * cosine) / RAD
-    for axis, c in (("y", y), ("z", z)):
-        if len(c):
-            n = (-c[3], c[1], c[2]) if axis == "y" else (c[3], -c[1], c[2])
-            beta0 = np.arctan(-n[2] / n[1])
-            out |= _axis(axis, c, -n[1], g, False)
-            out[f"{axis}.alpha0_deg"] = np.arctan(n[0] / n[1] * np.cos(beta0)) / RAD
-            out[f"{axis}.beta0_deg"] = beta0 / RAD
-    return out
-
-
 def _axis(axis: str, c: Array, lead: Array, g: float, as_printed: bool) -> Found:
     """Bias (21) (27) (31) and scale factor (22) (30) (34) of an axis."""
     sign = 1.0 if as_printed else np.sign(lead[0].real)
@@ -206,7 +160,7 @@ def _axis(axis: str, c: Array, lead: Array, g: float, as_printed: bool) -> Found
 
 
 def _parameter_rows(
-    each: AxisEstimates, tilt: Tilt, mounting: Array
+    each: AxisEstimates, mounting: Array
 ) -> tuple[Array, tuple[str, ...]]:
     """Rows that turn the axes' estimates into parameters of the device, (p, q).
 
@@ -223,13 +177,11 @@ def _parameter_rows(
                 sign = mounting[axis, device] if group == "bias" else 1.0
                 full = f"acc_{group}.{'xyz'[device]}"
                 picked[full] = sign * units[each.names.index(name)]
-    parts = {"alpha0_deg": "about_z_deg", "beta0_deg": "about_x_deg"}
-    for part in parts if tilt == "angle_offset" else reversed(parts):
+    for part in ("alpha0_deg", "beta0_deg"):
         rows = [i for i, n in enumerate(each.names) if n.endswith(part)]
         if rows:
             weight = np.linalg.solve(
                 each.covariance[np.ix_(rows, rows)], np.ones(len(rows))
             )
-            name = part if tilt == "angle_offset" else parts[part]
-            picked[f"{tilt}.{name}"] = weight @ units[rows] / weight.sum()
+            picked[f"angle_offset.{part}"] = weight @ units[rows] / weight.sum()
     return np.array(list(picked.values())), tuple(picked)

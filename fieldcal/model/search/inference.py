@@ -15,7 +15,6 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.search.proportion import in_proportion
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import SETTLED, Search
@@ -57,15 +56,6 @@ class Inferred:
     values: Array
     turned: Sequence[TurnRows]
     contradicted: tuple[tuple[int, int], ...]
-
-    @property
-    def about_itself(self) -> float:
-        """Weight of the best set about its own state, ln, the way not looked at."""
-        own = GaussNewton(self.inference.system, self.inference.nominal)
-        own.turns = self.inference.turns
-        gram = own.gram(self.state, self.values, None)
-        search = Search(own.dictionary, gram)
-        return search.evaluated(self.best.members, self.best.sizes).score
 
 
 class Inference(Refinement):

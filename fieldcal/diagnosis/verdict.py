@@ -192,7 +192,7 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
     if one.name in catalogue() and catalogue()[one.name].like_calibration:
         return True
     others = explanation.posterior.probability(one.aliases, one.triads)
-    return others > thresholds.OPEN
+    return others > thresholds.MENTIONED
 
 
 def _probability(explanation: Explanation, verdict: Verdict) -> float:

@@ -7,6 +7,8 @@ beside each search.
 
 from __future__ import annotations
 
+import math
+
 # -- what is said of causes
 
 NAMED = 0.5
@@ -16,31 +18,24 @@ SAME = 4.6
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100
 to 1, beyond which nobody would ask."""
 
-OPEN = 0.1
-"""Probability of what may stand in its place from which a cause is ambiguous."""
-
 DETERMINED = 0.3
 """Largest part of its variance before the rows that a parameter that is told may
 keep."""
 
-SHOWN_BY_WINDOWS = 12.0
-"""Decrease of the weighted squares from which a cause shows in the windows."""
+STANDS_OUT = 3.5
+"""Standard deviations from which a position, a parameter in a sentence, or the windows
+with a cause stand out: one in two thousand by chance, and there are hundreds."""
 
-IN_CHANNEL = 25.0
+DECIDES = 5.0
+"""Standard deviations from which something is beyond doubt: the channel that a mismatch
+is in, an instant that cannot have been, two causes at one position."""
+
+IN_CHANNEL = DECIDES**2
 """Squares that a channel has to lose for the mismatch to be in it."""
 
 IN_CHANNEL_PART = 0.03
 """The same as part of the most that any channel loses: less is a trace of what is
 elsewhere."""
-
-STANDS_OUT = 3.5
-"""Standard deviations from which a position stands out."""
-
-DECIDES = 5.0
-"""Difference in white noise of a window's mean that decides."""
-
-SHOWS_EARTH = 6.9
-"""Rise of ln Z by the Earth's rate from which the rows show it: 1000 to 1."""
 
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
@@ -53,6 +48,9 @@ LINE = 4.0
 
 LINE_BY_CHANCE = 1e-3
 """Probability that a line is said where there is none, over all frequencies."""
+
+SHOWS_EARTH = -math.log(LINE_BY_CHANCE)
+"""Rise of ln Z by the Earth's rate from which the rows show it, as of a line."""
 
 ONE_LINE = 0.65
 """Part of the energy at a frequency that one amplitude and phase must take to be a
@@ -71,9 +69,6 @@ NOT_HELD_DEG = 10.0
 TAKES_LITTLE = 2.0
 """Rise of ln L by a cause that takes next to nothing: two parameters of noise do."""
 
-IN_PARAGRAPH = 3.0
-"""Standard deviations from which the paragraph names a parameter."""
-
 # -- what is said of a calibration
 
 BETTER_TILT = 3.0
@@ -83,7 +78,8 @@ BEYOND_NOISE = 0.01
 """Probability of a larger chi2 from which the scatter counts as beyond the noise."""
 
 MENTIONED = 0.1
-"""Probability from which a cause is named in a sentence."""
+"""Probability from which a cause is named in a sentence, and from which what may stand
+in the place of another makes that ambiguous."""
 
 WRONG_MODEL = 9.0
 """chi2 per degree of freedom from which the model, not the noise, is at fault."""
@@ -113,13 +109,12 @@ MOVED = 1.0
 as moved."""
 
 LOOKED_AT = 0.01
-"""Probability below which an explanation is not looked at: it moves no interval."""
-
-DOUBTED = 0.02
-"""Probability that a window is bad below which it moves no interval."""
+"""Probability below which an explanation, or that a window is bad, is not looked at: it
+moves no interval."""
 
 SUSPECT = 0.1
 """Probability that a window is bad from which it is reported."""
 
-CERTAIN = 0.99
-"""The same from which it has no weight left."""
+CERTAIN = 1 - LOOKED_AT
+"""Probability from which something is taken as sure: a window that is bad has no weight
+left, and no digits are told."""

@@ -62,7 +62,7 @@ def averaged_over(
         only = _at_the_end(given, likeliest, nominal)
         return Parameters(*only, np.zeros(len(only[0])))
     search = Search(given, gram)
-    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > thresholds.DOUBTED)
+    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
     for one in given.explanations:
         for same in variants(search, given.asked, one):
             there = likeliest

@@ -50,7 +50,7 @@ class Removed:
 def in_turns(lost: Removed) -> bool:
     """Whether windows lose nothing with a cause, or less than turns do."""
     windows = float(np.nan_to_num(lost.squares).max())
-    return windows < thresholds.SHOWN_BY_WINDOWS or windows < lost.turned
+    return windows < max(thresholds.STANDS_OUT**2, lost.turned)
 
 
 def rms_of(values: Array) -> float:

@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import Sensor
-
-POSSIBLE = 25.0
-"""Squares by which S may exceed the least one for an instant to be possible: what is
-five standard deviations off is not."""
 
 
 def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
@@ -72,7 +69,9 @@ def _possible(
     """Between what instants it can have been, s, by S before each row."""
     span = explanation.rows.span
     near = int(np.searchsorted(explanation.rows.x.t, at))
-    some = np.append(np.flatnonzero(squares < squares.min() + POSSIBLE), near)
+    some = np.append(
+        np.flatnonzero(squares < squares.min() + thresholds.IN_CHANNEL), near
+    )
     first, last = max(int(some.min()) - 1, 0), min(int(some.max()), len(span) - 1)
     return float(span[first, 0]), float(span[last, 1])
 

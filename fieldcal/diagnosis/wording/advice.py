@@ -16,15 +16,12 @@ from fieldcal.diagnosis.wording.deciding_position import (
     deciding_position,
     extent,
 )
-from fieldcal.diagnosis.wording.paragraph import off_by
+from fieldcal.diagnosis.wording.paragraph import MOST, off_by
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
 LESS_THAN = 3
 """Positions below which none can be held out."""
-
-MOST = 6
-"""Positions that a sentence names."""
 
 
 def advice(

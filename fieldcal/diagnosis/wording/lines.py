@@ -15,9 +15,6 @@ from fieldcal.physics.effect import Chain, Line, Scatter
 UNITS = frozenset({"hz", "ppm", "seconds", "relative"})
 """Names of parameters that tell nothing but their unit."""
 
-SURE = 0.99
-"""Probability above which no digits are told."""
-
 TREATED = {
     "mend": "nothing: corrected",
     "mask": "nothing: left out",
@@ -62,7 +59,11 @@ def size(parameters: Mapping[str, Quantity]) -> str:
         return "not known"
     told = [n for n, q in parameters.items() if q.unit != "s"] or list(parameters)
     name = max(told, key=lambda n: _significance(parameters[n]))
-    clear = sum(_significance(q) > 3 for n, q in parameters.items() if n != name)
+    clear = sum(
+        _significance(q) > thresholds.STANDS_OUT
+        for n, q in parameters.items()
+        if n != name
+    )
     more = f" (+{clear})" if clear else ""
     called = "" if name in UNITS else name.removesuffix("_deg").removesuffix("_s")
     return f"{called} {pretty_quantity(parameters[name])}{more}".lstrip()
@@ -109,7 +110,9 @@ def of_verdict(verdict: str, probability: float, named: int) -> str:
     >>> of_verdict("left_out", 0.51, 3)
     'probability 0.51 for all of it together'
     """
-    together = named > 1 and verdict != "consistent" and probability <= SURE
+    together = (
+        named > 1 and verdict != "consistent" and probability <= thresholds.CERTAIN
+    )
     told = f"probability {format_probability(probability)}"
     return f"{told} for all of it together" if together else told
 
@@ -122,4 +125,5 @@ def format_probability(probability: float) -> str:
     """
     if not math.isfinite(probability):
         return "not known"
-    return f"above {SURE}" if probability > SURE else f"{probability:.2f}"
+    sure = thresholds.CERTAIN
+    return f"above {sure}" if probability > sure else f"{probability:.2f}"

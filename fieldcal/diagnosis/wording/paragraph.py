@@ -20,10 +20,7 @@ EACH = 3
 """Number of times up to which an effect is named each time."""
 
 MOST = 6
-"""Places that the paragraph names."""
-
-SHOWN_PLACES = 6
-"""Positions that it names of one place."""
+"""Places that a paragraph names, and positions that a sentence does."""
 
 
 def with_uncertainty(quantity: Quantity) -> str:
@@ -51,7 +48,7 @@ def named(found: FoundEffect) -> str:
         if (
             isinstance(q.value, str)
             or not q.sigma
-            or abs(q.value) > thresholds.IN_PARAGRAPH * q.sigma
+            or abs(q.value) > thresholds.STANDS_OUT * q.sigma
         ):
             parts.append(f"{name} = {with_uncertainty(q)}")
     return f"{found.id} ({', '.join(parts)})" if parts else found.id
@@ -128,7 +125,7 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
 
 
 def _where(m: Mismatch) -> str:
-    return f"{listed(m.positions, SHOWN_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
+    return f"{listed(m.positions, MOST)}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 
 def _is_random(found: FoundEffect) -> bool:

@@ -21,7 +21,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT
 from fieldcal.model.search.offers import Offer
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.selection import OTHERWISE, Search
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class Posterior:
                         if o.member[0].name == name), default=own)  # fmt: skip
         for offer in offers:
             cause = offer.member[0]
-            if cause.name == name or self._bare(less, offer) < predicted - FAR:
+            if cause.name == name or self._bare(less, offer) < predicted - OTHERWISE:
                 continue
             if (near := near + 1) > LOOKED_AT:
                 break
@@ -216,6 +216,3 @@ def _fades(group: Group) -> bool:
 
 LOOKED_AT = 8
 """Causes that are tried in the place of one: further ones are worse."""
-
-FAR = 6.0
-"""How far behind in evidence an offer may be predicted to be looked at, ln."""

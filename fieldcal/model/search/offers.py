@@ -49,8 +49,9 @@ WIDE = 30
 LEAST = 0.5
 """Gain of ln L below which an offer is none."""
 
-LOST = -12.0
-"""Worth of an offer that no pair makes up for, ln."""
+NEAR = 12.0
+"""How far an offer may be behind to be followed, ln: what is further no pair makes up
+for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +161,7 @@ class Offers(Sets):
             for i, shares in apart.items():
                 some = at[number] == i
                 evidence[some] += shares[alike.variant[number[some]]] - share[i]
-            near = evidence > LOST + share[at].min()
+            near = evidence > share[at].min() - NEAR
             each = (level[near], number[near], evidence[near])
             for i, m, worth in zip(*(e.tolist() for e in each), strict=True):
                 cause = self.dictionary.causes[at[m]]

@@ -13,7 +13,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import DENSITY, Member
-from fieldcal.model.search.offers import Less, Offer, Offers, OfferTable
+from fieldcal.model.search.offers import NEAR, Less, Offer, Offers, OfferTable
 from fieldcal.model.search.pairs import Pair, pairs
 
 SETTLED = 0.02
@@ -25,14 +25,12 @@ MOST = 30
 FOLLOWED = 4
 """Offers that are evaluated in full, at each step."""
 
-NEAR = 12.0
-"""How far an offer may be behind the best one to be followed, ln."""
-
 PROMISING = 16
 """Causes of which pairs are tried."""
 
 OTHERWISE = 6.0
-"""How far other parameters of a cause may be behind to be looked at, ln."""
+"""How far other parameters of a cause, or what may stand in its place, may be predicted
+behind to be looked at, ln."""
 
 SLACK = 3.0
 """Log evidence that a full evaluation may add to the predicted score of an offer."""

@@ -11,11 +11,7 @@ from fieldcal.core.sentences import join
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.deciding_position import (
-    decided_by,
-    deciding_position,
-    extent,
-)
+from fieldcal.diagnosis.wording.deciding_position import deciding_position, extent
 from fieldcal.diagnosis.wording.paragraph import MOST, off_by
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
@@ -98,7 +94,7 @@ def _deciding(
         if open_:
             yield (
                 f"{one.id} or {join(open_, 'or')}? {_none_in_reach(explanation)}"
-                f"{decided_by(one.id)}."
+                f"{catalogue()[one.id].decided_by}."
             )
 
 
@@ -144,7 +140,10 @@ def _remedy(unknown: Unknown) -> tuple[str, str]:
             f": {off_by(unknown.turned)} there.",
         )
     if not np.isfinite(unknown.mismatch.correlation):
-        return f"Repeat {places}", ": {channels} {be} off only there."
+        return (
+            f"Repeat {places}, and look for what was different there",
+            ": {channels} {be} off only there.",
+        )
     return (
         f"Vary {unknown.cause} on purpose and keep the rest constant",
         ": {channels} {follow} it, and no effect in the catalogue does.",

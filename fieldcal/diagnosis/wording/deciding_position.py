@@ -13,7 +13,6 @@ import numpy as np
 
 from fieldcal.core.positions import Position, ladder
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import late
 from fieldcal.model.evidence.sets import Set
@@ -86,8 +85,3 @@ def _state(explanation: Explanation, found: Set) -> State:
     """The state at a set's estimates, orientations as they are."""
     state, _ = explanation.inferred.inference.moved(found)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))
-
-
-def decided_by(name: str) -> str:
-    """What the catalogue names to decide between an effect and others."""
-    return catalogue()[name].decided_by

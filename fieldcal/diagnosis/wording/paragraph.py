@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldcal.core.sentences import join
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
-from fieldcal.diagnosis.wording.deciding_position import decided_by, deciding_position
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
@@ -64,7 +64,7 @@ def paragraph(
     notes: Sequence[str],
     odd: Sequence[str] = (),
 ) -> str:
-    """Say verdict, effects, improvement, doubts and what to do next.
+    """Say verdict, effects, improvement and doubts; what to do is in `advice`.
 
     `odd` are facts of the recording that cannot be.
     """
@@ -75,8 +75,9 @@ def paragraph(
     if verdict in ("left_out", "ambiguous") and effects:
         out += _improvement(*quality)
     for one in effects:
-        for other in one.aliases:
-            out.append(_deciding(explanation, one.id, other))
+        if one.aliases:
+            others = join(one.aliases, "or")
+            out.append(f"{others} would explain it as well as {one.id}.")
     out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
     return " ".join([*filter(None, out), *notes])
 
@@ -152,14 +153,6 @@ def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
     ]
 
 
-def _deciding(explanation: Explanation, one: str, other: str) -> str:
-    head = f"{other} would explain it as well as {one}"
-    position = deciding_position(explanation, one, other)
-    if position is None:
-        return f"{head}; what tells them apart: {decided_by(one)}."
-    return f"{head}; {position.text}: there they differ by {position.apart:.0f} σ."
-
-
 def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     """A mismatch in a sentence, which names all channels that are off there."""
     where = one.mismatch
@@ -175,12 +168,9 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
         if len(where.positions) > 1:
             return (
                 f"{places.capitalize()} are off in the same way, as if {angles} in each"
-                " of them: check this angle of the fixture, set it again, and repeat"
-                " these positions."
+                " of them."
             )
-        return (
-            f"Only {places} is off, as if {angles} there: set it again and repeat it."
-        )
+        return f"Only {places} is off, as if {angles} there."
     alike = [
         u
         for u in all_
@@ -188,10 +178,7 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     ]
     channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
     verb = "is" if len(alike) == 1 else "are"
-    return (
-        f"{channels} {verb} off in {places} only; repeat it, and look for what was"
-        " different there."
-    )
+    return f"{channels} {verb} off in {places} only."
 
 
 def off_by(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:

@@ -28,8 +28,6 @@ from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.solve.estimation import Estimated
 
-UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
-
 EVERYTHING = ""
 """In place of a parameter's name: none of them by itself."""
 
@@ -134,7 +132,7 @@ class Borrowed:
 
 
 def _unit(name: str) -> str:
-    return pretty(UNITS[group_of(name)])
+    return pretty(GROUPS[group_of(name)][2])
 
 
 def borrowed(

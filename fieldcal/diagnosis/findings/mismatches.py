@@ -7,6 +7,7 @@ channels whose squares it explains, and the positions in which it is significant
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,25 +41,37 @@ def _of_residual(
     explanation: Explanation, lost: Removed, kind: Kind, covariate: str
 ) -> Iterator[Mismatch]:
     squares = lost.squares
-    mean, sd, position = averages(explanation.rows, lost.residual)
     most = float(np.nanmax(squares))
     for c in np.flatnonzero(
         squares
         >= min(max(thresholds.IN_CHANNEL, thresholds.IN_CHANNEL_PART * most), most)
-    ):
-        at = standing_out(mean[:, c] / sd[:, c], position)
-        inside = np.isin(position, at)
-        start, end = stretch(explanation, at)
-        yield Mismatch(
-            channel=CHANNELS[c],
-            kind=kind,
-            positions=at,
-            from_s=start,
-            to_s=end,
-            covariate=covariate,
-            rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
-            sigma=float(np.sqrt(max(squares[c], 0.0))),
-        )
+    ).tolist():
+        yield _in_windows(explanation, lost, c, (), kind, covariate)
+
+
+def _in_windows(
+    explanation: Explanation,
+    lost: Removed,
+    c: int,
+    positions: tuple[int, ...],
+    kind: Kind,
+    covariate: str,
+) -> Mismatch:
+    """What windows have without a cause in a channel: at some positions, or where."""
+    mean, sd, position = averages(explanation.rows, lost.residual)
+    at = positions or standing_out(mean[:, c] / sd[:, c], position)
+    start, end = stretch(explanation, at)
+    inside = np.isin(position, at)
+    return Mismatch(
+        channel=CHANNELS[c],
+        kind=kind,
+        positions=at,
+        from_s=start,
+        to_s=end,
+        covariate=covariate,
+        rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
+        sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
+    )
 
 
 def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
@@ -146,25 +159,12 @@ def of_unknown(
             or [int(triad[squares.argmax()])]
         )
         for c in channels:
-            mean, sd, position = averages(explanation.rows, lost.residual)
-            at = positions or standing_out(mean[:, c] / sd[:, c], position)
-            start, end = stretch(explanation, at)
-            inside = np.isin(position, at)
+            kind = KINDS.get(cause.name, "position")
             covariate, correlation, share = followed(
                 explanation, cause, c, lost.residual
             )
-            yield Mismatch(
-                channel=CHANNELS[c],
-                kind=KINDS.get(cause.name, "position"),
-                positions=tuple(at),
-                from_s=start,
-                to_s=end,
-                covariate=covariate,
-                rms=float(np.sqrt(np.nanmean(mean[inside, c] ** 2))),
-                sigma=float(np.sqrt(max(lost.squares[c], 0.0))),
-                correlation=correlation,
-                share=share,
-            )
+            one = _in_windows(explanation, lost, c, positions, kind, covariate)
+            yield replace(one, correlation=correlation, share=share)
 
 
 KINDS: dict[str, Kind] = {

@@ -30,23 +30,16 @@ def _agreement(
     fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
 ) -> Agreement:
     """Residuals of a fit; squares are weighted with the instability of another fit."""
-    squares = (
-        weighed.squares_of(fitted.residual()) if _same_rows(fitted, weighed) else None
-    )
-    total = fitted.squares.sum() if squares is None else squares.sum()
+    same = fitted.rows.y.shape == weighed.rows.y.shape
+    squares = weighed.squares_of(fitted.residual()) if same else fitted.squares
     return Agreement(
         fitted.rows,
         fitted.residual(fitted.certain),
         ahead,
         lines,
         predicted,
-        float(total) / max(fitted.dof, 1),
+        float(squares.sum()) / max(fitted.dof, 1),
     )
-
-
-def _same_rows(one: Fitted, other: Fitted) -> bool:
-    """Whether two fits are of the same rows."""
-    return one.rows.y.shape == other.rows.y.shape
 
 
 def before(block: Block, explanation: Explanation) -> Agreement:

@@ -133,7 +133,7 @@ def drawn(seed: int, tau: float, push: float) -> Array:
     return np.asarray(off)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize(
     ("tau", "push"), [(0.0, 0.0), (3e-3, 0.0), (0.0, 6e-3), (0.0, 0.03), (0.0, 3.0)]
 )

@@ -29,6 +29,9 @@ from fieldcal.model import priors
 FEWEST, MOST = 40, 80
 """Terms of a series, half as many as there are rows."""
 
+UNKNOWN = 1e3
+"""Noise of a row that was not measured, in that of the noisiest: it says nothing."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlickerSeries:
@@ -79,10 +82,13 @@ class FlickerSeries:
 
         """
         unit = self.others**2 @ self.variances
-        known = np.isfinite(y) & np.isfinite(sd)
+        known = np.isfinite(y) & (np.nan_to_num(sd) > 0)
         size = np.zeros(y.shape[1])
-        for c in np.flatnonzero(known.all(axis=0) & (len(self.variances) > 0)):
-            size[c] = self._size(y[:, c], sd[:, c], typical[c])
+        for c in np.flatnonzero(known.any(axis=0) & (len(self.variances) > 0)):
+            there = known[:, c]
+            off = np.where(there, y[:, c] - y[there, c].mean(), 0.0)
+            wide = UNKNOWN * float(sd[there, c].max())
+            size[c] = self._size(off, np.where(there, sd[:, c], wide), typical[c])
         return np.outer(unit, (size * typical) ** 2)
 
     def _size(self, y: Array, sd: Array, typical: float) -> float:

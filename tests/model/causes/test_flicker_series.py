@@ -85,11 +85,25 @@ def test_what_the_terms_leave_has_the_size_of_what_is_there() -> None:
 
 def test_a_channel_that_was_not_measured_has_none() -> None:
     rows = even(100)
-    y, sd = np.zeros((100, 2)), np.full((100, 2), 1e-3)
+    y, sd = np.zeros((100, 3)), np.full((100, 3), 1e-3)
     y[:, 0] = 10 * drawn(*rows, 4)[0]
     y[:, 1] = np.nan
-    left = FlickerSeries.of(*rows).left(y, sd, np.ones(2))
-    assert (left[:, 0] > 0).all() and not left[:, 1].any()
+    sd[:, 2] = np.nan
+    left = FlickerSeries.of(*rows).left(y, sd, np.ones(3))
+    assert (left[:, 0] > 0).all() and not left[:, 1:].any()
+
+
+def test_a_row_that_was_not_measured_changes_little() -> None:
+    rows = even(100)
+    series, y, sd = (
+        FlickerSeries.of(*rows),
+        drawn(*rows, 5)[:6].T,
+        np.full((100, 6), 0.1),
+    )
+    whole = series.left(y, sd, np.ones(6))
+    y[[3, 50, 51]] = np.nan
+    ratio = series.left(y, sd, np.ones(6)) / whole
+    assert (ratio > 0.2).all() and (ratio < 5).all()
 
 
 def test_between_rows_a_term_goes_on() -> None:

@@ -106,7 +106,7 @@ def cheapest(
     if not over or not all(p.oriented for p in about.positions):
         return None
     if all(sensor_of(group_of(name)) == "gyr" for name in over):
-        return _longer(about, over, seconds)
+        return _longer(found, about, had, over, seconds)
     return _besides(found, about, had, limits, over, sigma, seconds)
 
 
@@ -126,14 +126,29 @@ def _over(
 
 
 def _longer(
-    about: Description, over: dict[str, float], seconds: float
+    found: Calibration,
+    about: Description,
+    had: Sequence[Position],
+    over: dict[str, float],
+    seconds: float,
 ) -> Remedy | None:
-    """Gyroscopes average out wherever they rest: longer where the device stands."""
+    """Gyroscopes average out wherever they rest: longer where the device stands.
+
+    What they feel of the mean force of the positions (their g-sensitivity) stays.
+    """
+    force = forces(had, about.gravity).mean(axis=0)
+    stays = counted(found).g_sensitivity * float(np.linalg.norm(force))
+    times = 1.0
+    for name, part in over.items():
+        sigma = found.uncertainty(name) if np.isfinite(part) else np.inf
+        kept = stays if group_of(name) == "gyr_bias" else 0.0
+        room = (SURE * sigma / part) ** 2 - kept**2
+        times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
     whole = seconds * len(about.positions)
-    more = float(np.ceil(whole * ((max(over.values()) / SURE) ** 2 - 1) / 5) * 5)
     last = about.positions[-1].degrees
-    if more > LONGEST or last is None:
+    if not whole * (times - 1) <= LONGEST or last is None:
         return None
+    more = float(np.ceil(whole * (times - 1) / 5) * 5)
     number = len(about.positions)
     says = f"hold position {number} for {more:.0f} s more: then GO is expected"
     return Remedy(says, positions=(last,), seconds=max(more, seconds))

@@ -91,6 +91,29 @@ def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     assert remedy.seconds == pytest.approx(150 * ((1.1 / 0.9) ** 2 - 1), abs=5.0)
 
 
+def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> None:
+    """Six faces have none of it in their mean; home alone has all of it."""
+    limit = LIMITS.gyr_bias_sigma
+    names = tuple(f"gyr_bias.{a}" for a in "xyz")
+    felt = 0.8 * limit
+    found = found_with(names, [1e-4, 1e-4, 1.1 * limit])
+    found = replace(found, info={"g_sensitivity_sigma": felt / 9.81})
+    seconds = []
+    for angles in ([(0.0, 0.0)] * 6, [(a, 0.0) for a in (0.0, 90.0, 180.0, 270.0)]):
+        session = about(tmp_path / str(len(angles)), angles)
+        had = session.about.positions
+        remedy = cheapest(found, session.about, had, LIMITS, ["gyr_bias"], 1e-3, 30.0)
+        assert remedy is not None
+        seconds.append(remedy.seconds / 30.0 / len(angles) + 1)
+    once = (1.1**2 - 0.8**2) / (0.9**2 - 0.8**2)
+    assert seconds[0] == pytest.approx(once, rel=0.02)
+    assert seconds[1] == pytest.approx((1.1 / 0.9) ** 2, abs=5 / 120)
+    more = replace(found, info={"g_sensitivity_sigma": 0.95 * limit / 9.81})
+    session = about(tmp_path / "home", [(0.0, 0.0)] * 6)
+    args = session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
+    assert cheapest(more, session.about, *args) is None
+
+
 def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
     two = [p.degrees or (0.0, 0.0) for p in TWO]
     names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xy")

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import Cause
+from fieldcal.model.causes.cause import CLOSURE, Cause
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
 from fieldcal.model.evidence.sets import Set, Sets, chances
@@ -25,6 +25,10 @@ LEVELS = (3, 6, 9, 40)
 
 FALLING = ((0, 1, 2), (3, 4, 5, 6))
 """Instabilities that fall together: of a triad, and of turns with the gyroscopes."""
+
+RAISED = (EVEN + 1, EVEN + 5)
+"""Sizes to which that of turns' closures may rise where accelerometers were unsteady:
+what bends both is less then, and what turns are off by for themselves stays."""
 
 Less = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
@@ -215,6 +219,10 @@ class Offers(Sets):
         for some in FALLING if self.unstable.any() else ():
             for down in LEVELS:
                 found.append(fallen(instability, some, down))
+        acc = FALLING[0]
+        if self.unstable[CLOSURE] and max(instability[c] for c in acc) > EVEN:
+            steady = fallen(instability, acc, LEVELS[-1])
+            found += [steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED]
         return list(dict.fromkeys(found))
 
     def opened(self, there: Set) -> tuple[Array, float]:
@@ -285,7 +293,12 @@ class Offers(Sets):
     def taken(self, there: Set, *offers: Offer) -> Set:
         """The set with what was offered."""
         sizes = there.sizes
-        less = tuple(map(min, *(o.less for o in offers), sizes.instability))
+        less = tuple(
+            max(some) if max(some) > now else min(some)
+            for now, *some in zip(
+                sizes.instability, *(o.less for o in offers), strict=True
+            )
+        )
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)

@@ -8,7 +8,7 @@ from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.evidence.gram import Eliminated, gains
+from fieldcal.model.evidence.gram import Eliminated, gains, root_of
 from fieldcal.model.priors import SIZES
 
 FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
@@ -168,3 +168,16 @@ def test_some_columns_say_the_same_as_they_do_among_all(free: tuple[int, ...]) -
     assert found.score == pytest.approx(same.score, rel=1e-12)
     np.testing.assert_allclose(found.estimate, same.estimate, rtol=1e-12)
     np.testing.assert_array_equal(np.flatnonzero(part.index >= 0), SET)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_root_is_one_where_numbers_have_too_few_digits(seed: int) -> None:
+    """I + S G S of columns whose sizes differ by many powers of ten."""
+    rng = np.random.default_rng(seed)
+    rows = rng.normal(size=(5, 20)) * np.exp(rng.normal(0, 12, 20))
+    whole = np.eye(20) + rows.T @ rows
+    root = root_of(whole)
+    assert (np.diag(root) > 0).all() and not np.triu(root, 1).any()
+    size = np.sqrt(np.diag(whole))
+    again = root @ root.T / np.outer(size, size)
+    np.testing.assert_allclose(again, whole / np.outer(size, size), atol=1e-6)

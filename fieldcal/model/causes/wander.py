@@ -57,7 +57,7 @@ class Wander:
     modes : (6,) cosines of it that rows see, at least those of a smooth course
     length : s that these are drawn over
     series : flicker of few windows, where it is always there; None of more
-    beside : (n, 6) variance that this leaves of each row
+    unseen : (n, 6) variance that this leaves of each row
 
     """
 
@@ -67,7 +67,7 @@ class Wander:
     modes: Index
     length: float
     series: FlickerSeries | None = None
-    beside: Array | None = None
+    unseen: Array | None = None
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
@@ -84,7 +84,7 @@ class Wander:
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)
         typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3) * unit
-        return replace(out, series=series, beside=series.left(rows.y, rows.sd, typical))
+        return replace(out, series=series, unseen=series.left(rows.y, rows.sd, typical))
 
     @classmethod
     def none(cls) -> Wander:
@@ -95,7 +95,7 @@ class Wander:
     def left_of_rows(self, length: Array, channel: int) -> Array:
         """Variance that cosines and series leave of all rows of the windows, (n,)."""
         out = self.left(length, channel)
-        return out if self.beside is None else out + self.beside[:, channel]
+        return out if self.unseen is None else out + self.unseen[:, channel]
 
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""

@@ -6,6 +6,7 @@ decides has to know what is relied on.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from fieldcal.acceptance.check import Check
@@ -16,7 +17,7 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import G0
 from fieldcal.session.description import Description
 
-DEG_H = 4.84813681e-6
+DEG_H = math.radians(1) / 3600
 """rad/s of one degree an hour."""
 
 

@@ -185,7 +185,6 @@ class _Guess:
         return wanted
 
     def _acceleration(self, gravity: Gravity, acc: Array) -> None:
-        said = self.said
         fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
         fits = as_written(fits, acc)
         if not fits and self._step:
@@ -205,7 +204,8 @@ class _Guess:
             self._ask(
                 f"{shows}, which is gravity in"
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("acc", fits, "g", gravity.size) + zero_elsewhere(said, gravity),
+                answers("acc", fits, "g", gravity.size)
+                + zero_elsewhere(self.said, gravity),
             )
         if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
             self.found["acceleration"] = f"{fits[0]}: {shows}"

@@ -22,18 +22,17 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.core.under_way import UnderWay
-from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import effect_columns, of_size, units_of
+from fieldcal.model.causes.effect_causes import of_size, whole
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.effect import Effect
 from fieldcal.solve.shown import Shown, at_end, carried
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
@@ -188,19 +187,11 @@ class Given(Dictionary):
         Those that a turn of the whole device makes of others are left out of one that
         is `turned` as nobody knows.
         """
-        effect = catalogue()[name]
-        if not isinstance(effect, Motion | Sensor):
-            raise TypeError(f"{name} has no equation")
-        some = [j for j, p in enumerate(effect.params) 
-                if not (turned and p.name in effect.turned_into)]  # fmt: skip
-        at = effect_columns(self, effect, [({}, 0)])[0][some]
-        typical = np.array([effect.params[j].typical for j in some])
-        size, fixed = typical * units_of(self, effect)[some], free
-        if known is not None:
-            size, fixed = np.full(len(some), known), 1.0
-        group = Group(name, "", at, size, effect, params=tuple(some), in_state=True,
-                      fixed=fixed)  # fmt: skip
-        return _given_cause(group)
+        one = whole(self, name, turned)
+        if known is None:
+            return _given_cause(replace(one, fixed=free))
+        size = np.full(len(one.params), known)
+        return _given_cause(replace(one, typical=size, fixed=1.0))
 
     def _factory(self, turned: bool) -> Iterator[Cause]:
         """What the factory left of errors that nobody asked for."""

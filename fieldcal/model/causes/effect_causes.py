@@ -40,8 +40,8 @@ def _of_effect(
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
-def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
-    """An effect of the catalogue whose coefficients have a known size, SI, (1 sigma).
+def whole(table: ColumnTable, name: str, turned: bool) -> Group:
+    """An effect of the catalogue with its parameters, of typical size.
 
     Those that a turn of the whole device makes of others are left out if it is `turned`
     as nobody knows.
@@ -58,8 +58,16 @@ def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
     some = [j for j, p in enumerate(effect.params)
             if not (turned and p.name in effect.turned_into)]  # fmt: skip
     at = effect_columns(table, effect, [({}, 0)])[0][some]
-    wide = size * units_of(table, effect)[some]
-    return Group("factory", name, at, wide, fixed=1.0)
+    typical = np.array([effect.params[j].typical for j in some])
+    size = typical * units_of(table, effect)[some]
+    return Group(name, "", at, size, effect, params=tuple(some), in_state=True)
+
+
+def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
+    """The same as what a factory left, whose coefficients have a known size, SI."""
+    one = whole(table, name, turned)
+    wide = size * units_of(table, catalogue()[name])[list(one.params)]
+    return Group("factory", name, one.columns, wide, fixed=1.0)
 
 
 def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:

@@ -62,9 +62,9 @@ def _checks(
         yield Check("linearity", None, says)
     if left.g_sensitivity and "gyr" in measured:
         by = whose(about.g_sensitivity, left.g_sensitivity, usual.g_sensitivity)
-        size = left.g_sensitivity * G0 / DEG_H
+        felt = float(f"{left.g_sensitivity * G0 / DEG_H:.2g}")  # 180, and not 1.8e+02
         says = (
-            f"this relies on gyroscopes that feel 0 ± {size:.2g} deg/h per g, {by}"
+            f"this relies on gyroscopes that feel 0 ± {felt:g} deg/h per g, {by}"
             " (--g-sensitivity); each ± includes it. Where a data sheet states more,"
             " state it, and hold each axis up and down"
         )

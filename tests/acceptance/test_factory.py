@@ -113,6 +113,9 @@ def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
     np.testing.assert_allclose(more, felt * G, rtol=0.02)
     checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
     assert "18 deg/h per g, as usual for the grade" in checks["g-sensitivity"].says
+    result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=10 * felt))
+    checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
+    assert "0 ± 180 deg/h per g, as stated" in checks["g-sensitivity"].says
 
 
 @pytest.mark.parametrize("left", [{"quadratic": -1e-5}, {"g_sensitivity": 0.3}])

@@ -7,6 +7,8 @@ JOBS ?= 2
 SEED ?= 1
 # names of DRAW mutants; the first run, which finds none of that name, has made them all
 DRAWN = $(CURDIR)/$(BIN)/mutmut results --all true | cut -d: -f1 | awk 'BEGIN {srand($(SEED))} {print rand(), $$1}' | sort | head -n $(DRAW) | cut -d' ' -f2
+# a process that may not keep what it compiled compiles numpy anew each time: half a second
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .PHONY: demo test test-all mutants lint bench docs setup clean
@@ -53,12 +55,13 @@ docs: .venv/.docs
 
 setup: $(READY)
 
-# what calibrates; other modules are compiled when they are first imported, which most never are
+# what calibrates; of the libraries only what `solve` and `diagnose` import is compiled
 $(READY): pyproject.toml constraints.txt Makefile
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "fieldcal needs Python 3.11 or newer; $(PYTHON) is older. Name another: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 2; }
 	$(PYTHON) -m venv .venv
 	$(PIP) --no-compile -e .
 	@$(BIN)/python -m compileall -q fieldcal drivers procedures sim_device
+	@$(BIN)/python -c 'import fieldcal.diagnosis, fieldcal.solve, jsonschema, numpy.ma, pyarrow.parquet, rich.live, rich.table, serial'
 	@touch $@
 
 # what tests and linters need beside, and every format

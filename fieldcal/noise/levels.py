@@ -113,12 +113,12 @@ class CosineLevels:
         if self._origin is None and len(values):
             self._origin = values[0].copy()
         rows: Array = values if self._origin is None else values - self._origin
-        for number in range(len(self._levels) + 1):
-            if not len(rows):
-                return
+        number = 0
+        while len(rows):
             if number == len(self._levels):
                 self._levels.append(_Level(number, self._channels, self._noisy))
             rows = self._levels[number].add(rows)
+            number += 1
 
     def reduced(self) -> Reduced:
         """Sums of all levels below the first that is kept whole."""

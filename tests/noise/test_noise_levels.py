@@ -13,13 +13,13 @@ from fieldcal.noise.measured import measured
 
 
 def test_it_does_not_matter_how_samples_come() -> None:
-    values = np.random.default_rng(1).standard_normal((40_000, 2))
+    values = np.random.default_rng(1).standard_normal((140_000, 2))
     whole, parts = CosineLevels(0.1, 2, 1), CosineLevels(0.1, 2, 1)
     whole.add(values)
-    for part in np.split(values, [1, 700, 701, 17_000, 17_001, 39_990]):
+    for part in np.split(values, [1, 700, 701, 17_000, 17_001, 139_990]):
         parts.add(part)
     one, other = whole.reduced(), parts.reduced()
-    assert one.samples == other.samples == 40_000
+    assert one.samples == other.samples == 140_000
     assert one.means == pytest.approx(other.means, abs=1e-12)
     assert one.squares == pytest.approx(other.squares)
     assert one.number.tolist() == other.number.tolist()

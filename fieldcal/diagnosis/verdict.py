@@ -35,7 +35,7 @@ from fieldcal.diagnosis.result import (
     Verdict,
 )
 from fieldcal.diagnosis.wording.advice import advice
-from fieldcal.diagnosis.wording.lines import lines
+from fieldcal.diagnosis.wording.lines import by_impact, lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
@@ -96,8 +96,8 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         says=words,
         candidates=candidates(explanation, effects),
         curves=tuple(curves(explanation, mismatch, first, then)),
-        next=tuple(advice(explanation, effects, strange, mismatch, odd)),
-        lines=lines(effects),
+        next=tuple(advice(explanation, by_impact(effects), strange, mismatch, odd)),
+        lines=lines(by_impact(effects)),
     )
 
 

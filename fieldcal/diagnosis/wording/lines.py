@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fieldcal.calibration.wording import pretty, title
 from fieldcal.diagnosis.result import EffectLine, FoundEffect, Quantity
@@ -21,6 +21,24 @@ TREATED = {
     "note": "nothing known",
 }
 """What faults of samples do to a calibration, by what is done about them."""
+
+
+def by_impact(effects: Iterable[FoundEffect]) -> list[FoundEffect]:
+    """Effects, those first that move the calibration by most of its sigmas.
+
+    Then those that only widen it, and last what is corrected, left out or subtracted.
+    """
+    return sorted(effects, key=_impact, reverse=True)
+
+
+def _impact(found: FoundEffect) -> tuple[int, float]:
+    """Rank of what an effect does to the calibration, and by how many sigmas."""
+    effect = catalogue()[found.id]
+    if isinstance(effect, Chain | Line):
+        return 0, 0.0
+    if isinstance(effect, Scatter):
+        return 1, 0.0
+    return 2, max(map(_significance, found.moves.values()), default=0.0)
 
 
 def lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:

@@ -7,6 +7,7 @@ far as they were calm.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -14,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
@@ -154,7 +156,11 @@ class Laid:
 
 
 def solved(
-    session: Session, still: Rests, turns: Turns = "auto", **asked: Any
+    session: Session,
+    still: Rests,
+    turns: Turns = "auto",
+    left: Mapping[str, Any] | None = None,
+    **asked: Any,
 ) -> Calibration:
     """Solve a session.
 
@@ -163,6 +169,8 @@ def solved(
     session : the recording
     still : its windows
     turns : whether what the turns between windows say is used; "yes" insists on it
+    left : what the factory left in the device, by the keys of session.toml; otherwise
+        what that says, or what is usual for the grade
     asked : of `fieldcal.solve.solve`; how level the base is and how well angles are set
         are otherwise what session.toml says, or what the grade asks for
 
@@ -172,17 +180,23 @@ def solved(
         If nothing is determined, or turns are insisted on and there are none.
 
     """
-    return solved_as(Laid(session, still), turns, **asked)
+    return solved_as(Laid(session, still), turns, left, **asked)
 
 
-def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
+def solved_as(
+    laid: Laid,
+    turns: Turns = "auto",
+    left: Mapping[str, Any] | None = None,
+    **asked: Any,
+) -> Calibration:
     """The same of windows that were laid out already; raises as `solved` does."""
     session, still, about = laid.session, laid.still, laid.session.about
     if asked.get("level_sigma_deg") is None:
         asked["level_sigma_deg"] = about.level_deg
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
-    asked.setdefault("factory", factory_errors(about))
+    device = replace(about, **(left or {}))
+    asked["factory"] = factory_errors(device)
     printed = bool(asked.get("as_printed"))
     shown = None if printed else laid.explanation
     notes = [] if printed else laid.unexamined
@@ -192,6 +206,12 @@ def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
     if note:
         asked["angle_sigma_deg"], notes = angles, [note, *notes]
         found = solve(laid.observations, recorded=recorded, **asked)
+    shows = _grade(found, laid.observations)
+    if shows.because and not printed:
+        asked["factory"] = factory_errors(device, shows.grade)
+        found = solve(laid.observations, recorded=recorded, **asked)
+        told = {"grade": shows.grade, "because": shows.because}
+        found = replace(found, info={**found.info, "grade_shown": told})
     if turns == "yes":
         _insist(found, session, still)
     # why it is bad comes first
@@ -224,6 +244,15 @@ def _as_shown(
         f"the recording shows that angles are set to ± {angles:.2g}° only, not"
         f" ± {stated:.2g}°: the uncertainties are for that; mend the fixture, or write"
         " down the angles that it really sets"
+    )
+
+
+def _grade(found: Calibration, seen: Observations) -> GradeShown:
+    """The grade that the device has by a result; the stated one of a bad result."""
+    if not found.good:
+        return GradeShown(seen.grade)
+    return GradeShown.of(
+        seen.grade, found.names, found.values, found.sigma, seen.nominal
     )
 
 

@@ -1,7 +1,7 @@
 """The grade that a device has by its biases and scale factors, whatever it is called.
 
 One process makes all errors of a device: a factory that leaves a bias of 50 mg or a
-scale factor of 2 % does not make axes square to 0.05 %. Where a parameter is further
+scale factor of 2 % does not make axes square to 0.1 %. Where a parameter is further
 from nominal than units of the stated grade are (``..._tolerance`` in ``limits.toml``),
 by more than its uncertainty explains, what is not estimated has the size of a coarser
 grade. Noise and grain tell grades less well: accelerometers of 60 to 140 ug/sqrt(Hz)

@@ -1,11 +1,12 @@
 """The grade that a device has by its biases and scale factors, whatever it is called.
 
 One process makes all errors of a device: a factory that leaves a bias of 50 mg or a
-scale factor of 2 % does not make axes square to 0.1 %. Where a parameter is further
-from nominal than units of the stated grade are (``..._tolerance`` in ``limits.toml``),
-by more than its uncertainty explains, what is not estimated has the size of a coarser
-grade. Noise and grain tell grades less well: accelerometers of 60 to 140 ug/sqrt(Hz)
-are sold in both, and either may put out 16 bits.
+scale factor of 2 % does not make axes square to 0.1 %. A parameter may be as far from
+nominal as units of the stated grade are (``..._tolerance`` in ``limits.toml``) and have
+moved since by what is usual from run to run (``..._repeat``). Beyond that, by more than
+its uncertainty explains, what is not estimated has the size of a coarser grade. Noise
+and grain tell grades less well: accelerometers of 60 to 140 ug/sqrt(Hz) are sold in
+both, and either may put out 16 bits.
 """
 
 from __future__ import annotations
@@ -76,9 +77,10 @@ def _beyond(
     bounds = limits.read(grade)
     for name, value, s in zip(names, values, sigma, strict=True):
         parameter = ParameterName.of(name)
-        most = bounds.tolerance(parameter.group)
-        if most is None:
+        tolerance = bounds.tolerance(parameter.group)
+        if tolerance is None:
             continue
+        most = tolerance + (bounds.repeat(parameter.group) or 0.0)
         usual = getattr(nominal, parameter.group)[parameter.axis]
         scale = getattr(nominal, f"{sensor_of(parameter.group)}_scale")
         size = abs(scale[parameter.axis])

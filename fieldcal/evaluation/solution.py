@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
@@ -44,6 +45,7 @@ from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.given import TILTS
 from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
 
@@ -248,12 +250,19 @@ def _as_shown(
 
 
 def _grade(found: Calibration, seen: Observations) -> GradeShown:
-    """The grade that the device has by a result; the stated one of a bad result."""
+    """The grade that the device has by a result; the stated one of a bad result.
+
+    Where neither the tilt of the base is found nor its level stated, accelerometers
+    tell nothing: a tilt may be what is taken for their bias and scale factor.
+    """
     if not found.good:
         return GradeShown(seen.grade)
-    return GradeShown.of(
-        seen.grade, found.names, found.values, found.sigma, seen.nominal
-    )
+    levelled = found.method == "scalar" or "level_sigma_deg" in found.info
+    levelled |= bool({*TILTS} & {*found.groups})
+    told = [levelled or sensor_of(group_of(n)) != "acc" for n in found.names]
+    names = [name for name, tells in zip(found.names, told, strict=True) if tells]
+    values, sigma = found.values[told], found.sigma[told]
+    return GradeShown.of(seen.grade, names, values, sigma, seen.nominal)
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

@@ -22,11 +22,11 @@ def shown(stated: Grade, *values: float, sigma: float = 1e-6) -> GradeShown:
 @pytest.mark.parametrize(
     ("stated", "values", "grade", "says"),
     [
-        ("tactical", (0.29, 1.009, -0.019), "tactical", ""),
-        ("tactical", (-0.31, 1.0, 0.0), "consumer", "acc_bias.x is -0.31 m/s²"),
+        ("tactical", (0.34, 1.0119, -0.0209), "tactical", ""),
+        ("tactical", (-0.36, 1.0, 0.0), "consumer", "acc_bias.x is -0.36 m/s²"),
         ("tactical", (0.0, 0.98, 0.0), "consumer", "acc_scale.x is -0.02 from"),
         ("tactical", (0.0, 1.0, 0.03), "consumer", "gyr_bias.z is +0.03 rad/s"),
-        ("navigation", (0.02, 1.0, 0.0), "tactical", "more than 0.01 m/s²"),
+        ("navigation", (0.02, 1.0, 0.0), "tactical", "more than 0.012 m/s²"),
         ("navigation", (0.5, 1.0, 0.0), "consumer", "acc_bias.x is +0.5 m/s²"),
         ("consumer", (2.0, 1.0, 0.0), "consumer", ""),
     ],
@@ -50,4 +50,4 @@ def test_outputs_in_counts_are_compared_in_their_units() -> None:
         values, sigma = np.array([bias]), np.array([1.0])
         return GradeShown.of("tactical", NAMES[:1], values, sigma, counts).because
 
-    assert of(290.0) == "" and "+0.4 m/s²" in of(400.0)
+    assert of(340.0) == "" and "+0.4 m/s²" in of(400.0)

@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.never_wrong.bench import drawn
 from benchmarks.never_wrong.judging import Judged, judged, write
-from benchmarks.never_wrong.mistakes import AFTER, BEFORE, session
+from benchmarks.never_wrong.mistakes import AFTER, BEFORE, session, spoilt
 
 USUAL, SEED, LONGEST = 150, 84_000_000, 60.0
 SOUND = "none"
@@ -37,6 +37,7 @@ GROUPED = {
     "positions in the wrong order": ("positions swapped",),
     "a position, an angle, or the gauge off": (
         "a position off", "a repeated angle off", "gauge long",
+        "two positions or angles off",
     ),
     "table tilted; level and angles not said": (
         "table tilted", "level and angles not said",
@@ -54,7 +55,17 @@ GROUPED = {
         "time in ns", "windows overlapping", "windows listed 20 times",
         "a gyroscope copied",
     ),
-    "a mean or a bias taken out": ("mean of acc removed", "bias of gyr tracked"),
+    "a mean or a bias taken out": (
+        "mean of acc removed", "mean of acc removed, rounded", "bias of gyr tracked",
+    ),
+    "a low-cost device": ("low-cost device",),
+    "vibration, sway": ("vibration", "sway"),
+    "filter, delay of the gyroscopes, lever arm": (
+        "filter", "delay of the gyroscopes", "lever arm",
+    ),
+    "biases that wander, or keep something of a turn": (
+        "bias that a turn leaves", "wandering biases",
+    ),
     "cut toward zero, clipped": ("cut toward zero", "clipped"),
 }  # fmt: skip
 """Rows of the table: what it is about, and its mistakes."""
@@ -114,12 +125,14 @@ def main() -> None:
     rows: dict[str, list[Judged]] = defaultdict(list)
     for seed in range(options.seed, options.seed + options.count):
         rng = np.random.default_rng(seed)
-        bench = drawn(rng)
-        names = mistakes(seed, rng, options.only)
+        bench, names = drawn(rng), mistakes(seed, rng, options.only)
+        bench = spoilt(bench, names, rng)
         with tempfile.TemporaryDirectory() as where:
             folder = Path(where) / "session"
             write(folder, session(bench, names, rng))
-            one = judged(folder, bench.truth, options.diagnose, options.limit)
+            one = judged(
+                folder, bench.truth, bench.grade, options.diagnose, options.limit
+            )
         rows[names[0] if names else SOUND].append(one)
         odd = one.wrong if one.go else not names
         if odd or one.late or options.each:

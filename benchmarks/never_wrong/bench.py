@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.never_wrong.acting import Acting
 from benchmarks.never_wrong.device import Device
 
 Floats = NDArray[np.float64]
@@ -75,6 +76,8 @@ class Bench:
     acc_noise, gyr_noise : rms of a sample
     grain : what accelerations are rounded to, m/s^2; 0 for none
     imported : whether angles are unknown, and the session is no recalibration
+    acting : what else acts
+    grade : what the device is said to be
 
     """
 
@@ -100,6 +103,8 @@ class Bench:
     gyr_noise: float
     grain: float
     imported: bool
+    acting: Acting = Acting()
+    grade: str = "tactical"
 
     @property
     def angles(self) -> Floats:
@@ -179,9 +184,9 @@ def drawn(rng: np.random.Generator) -> Bench:
         rate=float(rng.choice([50.0, 100.0])),
         mounting=MOUNTINGS[int(rng.integers(len(MOUNTINGS)))],
         acc_bias=rng.normal(0, 0.08, 3),
-        acc_scale=1 + rng.normal(0, 5e-3, 3),
+        acc_scale=1 + rng.normal(0, 3e-3, 3),
         gyr_bias=rng.normal(0, 5e-3, 3),
-        gyr_scale=1 + rng.normal(0, 5e-3, 3),
+        gyr_scale=1 + rng.normal(0, 3e-3, 3),
         device=Device.drawn(rng),
         acc_noise=acc_noise,
         gyr_noise=acc_noise * float(rng.uniform(0.05, 0.3)),
@@ -234,22 +239,28 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     alpha, beta = joints.T
     if bench.joints:
         alpha, beta = alpha + bench.tilt[0], beta + bench.tilt[1]
-    f = turned(alpha, beta, _on_base(bench, np.array([0.0, -bench.gravity, 0.0])))
+    sway, swing = bench.acting.tilted(t)
+    down = np.column_stack([np.zeros_like(t), np.cos(sway), np.sin(sway)])
+    f = turned(alpha, beta, _on_base(bench, -bench.gravity * down))
     latitude, heading = np.deg2rad(bench.latitude), rng.uniform(0, 2 * np.pi)
     north = EARTH * np.cos(latitude)
-    earth = [
-        north * np.sin(heading),
-        -EARTH * np.sin(latitude),
-        north * np.cos(heading),
-    ]
-    w = turned(alpha, beta, _on_base(bench, np.array(earth)))
+    rates = np.tile([north * np.sin(heading), -EARTH * np.sin(latitude),
+                     north * np.cos(heading)], (len(t), 1))  # fmt: skip
+    rates[:, 0] += swing
+    w = turned(alpha, beta, _on_base(bench, rates))
     w[:, 0] += speed[:, 1]
     about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
     w += about_z * speed[:, :1]
     f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
+    f = bench.acting.felt(t, f, w)
     acc, gyr = bench.device.adds(t, f, w)
     acc += bench.acc_bias + bench.acc_scale * f
     gyr += bench.gyr_bias + bench.gyr_scale * w
+    for out, more in zip(
+        (acc, gyr), bench.acting.wanders(t, f, windows, rng), strict=True
+    ):
+        out += more
+    acc, gyr = bench.acting.passed(t, acc, gyr)
     acc += rng.normal(0, bench.acc_noise, f.shape)
     gyr += rng.normal(0, bench.gyr_noise, w.shape)
     if bench.grain:
@@ -257,13 +268,12 @@ def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
     return Samples(t, acc, gyr)
 
 
-def _on_base(bench: Bench, vector: Floats) -> Floats:
-    """A vector of level axes in those of the base, (3,)."""
+def _on_base(bench: Bench, vectors: Floats) -> Floats:
+    """Vectors of level axes in those of the base, (n, 3)."""
     if bench.joints:
-        return vector
-    about_z, about_x = (np.array([angle]) for angle in bench.tilt)
-    tilted: Floats = turned(about_z, about_x, vector)[0]
-    return tilted
+        return vectors
+    about_z, about_x = (np.full(len(vectors), angle) for angle in bench.tilt)
+    return turned(about_z, about_x, vectors)
 
 
 def wrongly_set(bench: Bench, off: Floats) -> Bench:

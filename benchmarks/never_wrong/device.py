@@ -1,11 +1,11 @@
-"""What real devices of tactical grade have beside bias, scale factor and noise, drawn.
+"""What real devices have beside bias, scale factor and noise, drawn.
 
 Written apart from everything that estimates, from the equations of IEEE Std 1293 and
 1431; f m/s^2 and w rad/s in the device's axes, T its warming in K:
 
     U += C f + K2 f^2 + P |f| + K3 f^3 + (c + s f) T,   W += D w + G f + e T
 
-with C and D without diagonal. Sizes are what data sheets of such units state.
+with C and D without diagonal. Sizes are drawn from what data sheets state.
 """
 
 from __future__ import annotations
@@ -17,21 +17,25 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-SQUARE = 5e-4
-"""One sigma of each cross-coupling coefficient that a factory leaves, 0.03 deg."""
+SQUARE = (4e-4, 1.2e-3)
+"""Smallest and largest 1 sigma of each cross-coupling coefficient: half of 0.05 deg, to
+0.1 deg between two axes, as the data sheets of decision 0024 have it."""
 
-QUADRATIC = 2e-5
-"""Of K2, 1/(m/s^2): 0.1 % of a full scale of 10 g from the best straight line."""
+QUADRATIC = (2e-6, 3e-5)
+"""Of K2, 1/(m/s^2): 0.01 % of 10 g to half of 0.5 % of 16 g."""
 
 ASYMMETRY = 5e-5
-"""Of half the difference of the scale factors for the two signs."""
+"""Of half the difference of the scale factors for the two signs; no sheet states it."""
 
 CUBIC = 2e-7
 """Of K3, 1/(m/s^2)^2: half as much off a straight line at 10 g as K2."""
 
-FELT = 9e-6
-"""Of each g-sensitivity of the gyroscopes, (rad/s)/(m/s^2): 0.005 deg/s per g, half of
-what units state."""
+FELT = (5e-7, 1.3e-5)
+"""Of each g-sensitivity of the gyroscopes, (rad/s)/(m/s^2): 1 deg/h per g to half of
+0.015 deg/s per g."""
+
+LOW_COST = (1e-2, 2.5e-4, 9e-5)
+"""The three of a low-cost device: half of 2 %, of 0.5 % of 2 g, of 0.1 deg/s per g."""
 
 WARM_ACC, WARM_SCALE, WARM_GYR = 1e-3, 3e-5, 1e-5
 """Of temperature coefficients: 0.1 mg/K, 30 ppm/K, 2 deg/h/K."""
@@ -64,14 +68,30 @@ class Device:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Device:
-        """A device of tactical grade."""
+        """A device of tactical grade, by one of the data sheets."""
+        square, bent, felt = (
+            float(np.exp(rng.uniform(*np.log(each))))
+            for each in (SQUARE, QUADRATIC, FELT)
+        )
+        return cls._sized(rng, square, bent, felt)
+
+    @classmethod
+    def low_cost(cls, rng: np.random.Generator) -> Device:
+        """Such as an MPU-6050."""
+        return cls._sized(rng, *LOW_COST)
+
+    @classmethod
+    def _sized(
+        cls, rng: np.random.Generator, square: float, bent: float, felt: float
+    ) -> Device:
+        """One whose coefficients have these standard deviations."""
         sizes = np.array([[WARM_ACC], [WARM_SCALE], [WARM_GYR]])
         return cls(
-            coupled=rng.normal(0, SQUARE, (2, 3, 3)) * (1 - np.eye(3)),
-            quadratic=rng.normal(0, QUADRATIC, 3),
+            coupled=rng.normal(0, square, (2, 3, 3)) * (1 - np.eye(3)),
+            quadratic=rng.normal(0, bent, 3),
             asymmetry=rng.normal(0, ASYMMETRY, 3),
             cubic=rng.normal(0, CUBIC, 3),
-            felt=rng.normal(0, FELT, (3, 3)),
+            felt=rng.normal(0, felt, (3, 3)),
             warm=rng.normal(0, 1, (3, 3)) * sizes,
             warming=float(rng.uniform(0, WARMING)),
         )

@@ -24,9 +24,12 @@ from fieldcal.cli import main
 WRONG = 5.0
 """Standard uncertainties from which a parameter is wrong."""
 
-LIMITS = {"acc_bias": 0.02, "acc_scale": 2e-3, "gyr_bias": 1.5e-4}
-"""Standard uncertainty up to which a parameter of tactical grade may be GO, m/s^2, 1
-and rad/s; docs/runs.md. Of a recording from elsewhere nothing but honesty is asked."""
+LIMITS = {
+    "tactical": {"acc_bias": 0.02, "acc_scale": 2e-3, "gyr_bias": 1.5e-4},
+    "consumer": {"acc_bias": 0.1, "acc_scale": 1e-2, "gyr_bias": 1.5e-3},
+}
+"""Standard uncertainty up to which a parameter may be GO by what the device is called,
+m/s^2, 1 and rad/s. Of a recording from elsewhere nothing but honesty is asked."""
 
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
 
@@ -114,18 +117,20 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def judged(
-    folder: Path, truth: dict[str, float], diagnose: bool, limit: float
+    folder: Path, truth: dict[str, float], grade: str, diagnose: bool, limit: float
 ) -> Judged:
     """Solve a session within `limit` s of processor time, and hold it to the truth."""
     try:
         with at_most(limit):
-            return _judged(folder, truth, diagnose)
+            return _judged(folder, truth, grade, diagnose)
     except Late:
         says = f"no answer within {limit:g} s of processor time"
         return Judged(False, 0.0, False, "", "late", says, "", 0, True)
 
 
-def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
+def _judged(
+    folder: Path, truth: dict[str, float], grade: str, diagnose: bool
+) -> Judged:
     history = str(folder.parent / f"{folder.name}.db")
     code, found, err, leaked = said(
         ["solve", str(folder), "--json", "--history", history]
@@ -135,7 +140,7 @@ def _judged(folder: Path, truth: dict[str, float], diagnose: bool) -> Judged:
     decision = found.get("decision", {})
     beyond = bool(decision) and any(
         not known.get(f"{group}.{axis}", np.inf) <= limit
-        for group, limit in LIMITS.items()
+        for group, limit in LIMITS[grade].items()
         for axis in "xyz"
     )
     for name, value, sigma in _parameters(found):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded, wrongly_set
+from benchmarks.never_wrong.device import Device
 
 Rng = np.random.Generator
 
@@ -84,6 +85,74 @@ def swapped(written: Written, bench: Bench, rng: Rng) -> Written:
         if key in rows[i]:
             rows[i][key], rows[j][key] = rows[j][key], rows[i][key]
     return replace(written, about={**written.about, "position": rows})
+
+
+def two_off(bench: Bench, rng: Rng) -> Bench:
+    """Two positions are off, or two repeated angles."""
+    kind = position_off if rng.integers(2) else repeated_angle
+    return kind(kind(bench, rng), rng)
+
+
+# -- what nobody knows of the device and of the bench
+
+
+def low_cost(bench: Bench, rng: Rng) -> Bench:
+    """A low-cost device; one in two is called tactical."""
+    return replace(
+        bench,
+        device=Device.low_cost(rng),
+        acc_bias=rng.normal(0, 0.3, 3),
+        acc_scale=1 + rng.normal(0, 1.2e-2, 3),
+        gyr_bias=rng.normal(0, 0.05, 3),
+        gyr_scale=1 + rng.normal(0, 1.2e-2, 3),
+        grade=str(rng.choice(["tactical", "consumer"])),
+    )
+
+
+def _acting(bench: Bench, **sizes: Any) -> Bench:
+    return replace(bench, acting=replace(bench.acting, **sizes))
+
+
+def _size(rng: Rng, least: float, most: float) -> float:
+    """Any order of magnitude between two is as likely."""
+    return float(np.exp(rng.uniform(np.log(least), np.log(most))))
+
+
+def shaken(bench: Bench, rng: Rng) -> Bench:
+    """The bench vibrates."""
+    return _acting(bench, shaken=_size(rng, 0.01, 1.0), hum_hz=_size(rng, 3, 80))
+
+
+def swaying(bench: Bench, rng: Rng) -> Bench:
+    """The bench sways, or a hand trembles."""
+    sway = float(np.deg2rad(_size(rng, 0.003, 0.3)))
+    return _acting(bench, swaying=sway, sway_hz=_size(rng, 0.2, 5))
+
+
+def filtered(bench: Bench, rng: Rng) -> Bench:
+    """The outputs are behind a filter."""
+    return _acting(bench, filtered=_size(rng, 3e-3, 0.1))
+
+
+def delayed(bench: Bench, rng: Rng) -> Bench:
+    """The gyroscopes are late."""
+    return _acting(bench, delayed=_size(rng, 2e-3, 0.05))
+
+
+def on_an_arm(bench: Bench, rng: Rng) -> Bench:
+    """The device is not in the axes of the fixture."""
+    return _acting(bench, arm=tuple(rng.normal(0, 0.15, 3).tolist()))
+
+
+def stays(bench: Bench, rng: Rng) -> Bench:
+    """Biases keep something of the last turn, 0.03 to 0.2 mg."""
+    return _acting(bench, stays=_size(rng, 3e-4, 2e-3))
+
+
+def wandering(bench: Bench, rng: Rng) -> Bench:
+    """Biases wander by 0.01 to 0.2 mg and 0.2 to 10 deg/h in 100 s."""
+    walk = {"acc_walk": _size(rng, 1e-4, 2e-3), "gyr_walk": _size(rng, 1e-6, 5e-5)}
+    return _acting(bench, **walk)
 
 
 # -- of what is said
@@ -192,6 +261,13 @@ def acc_mean_taken(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=s.acc - s.acc.mean(axis=0)))
 
 
+def mean_taken_and_rounded(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A program takes the mean out, and writes few digits."""
+    s, grain = written.samples, float(rng.choice([1e-3, 1e-2, 0.1]))
+    acc = np.round((s.acc - s.acc.mean(axis=0)) / grain) * grain
+    return replace(written, samples=replace(s, acc=acc))
+
+
 def gyr_tracked(written: Written, bench: Bench, rng: Rng) -> Written:
     """The device takes the bias out of its rates whenever it is at rest."""
     s, gyr = written.samples, written.samples.gyr.copy()
@@ -233,6 +309,15 @@ BEFORE: dict[str, Before] = {
     "a position off": position_off,
     "table tilted": table_tilted,
     "faces left out": no_witness,
+    "two positions or angles off": two_off,
+    "low-cost device": low_cost,
+    "vibration": shaken,
+    "sway": swaying,
+    "filter": filtered,
+    "delay of the gyroscopes": delayed,
+    "lever arm": on_an_arm,
+    "bias that a turn leaves": stays,
+    "wandering biases": wandering,
 }
 
 AFTER: dict[str, After] = {
@@ -251,6 +336,7 @@ AFTER: dict[str, After] = {
     "outputs exchanged": axes_exchanged,
     "a gyroscope copied": gyr_copied,
     "mean of acc removed": acc_mean_taken,
+    "mean of acc removed, rounded": mean_taken_and_rounded,
     "bias of gyr tracked": gyr_tracked,
     "cut toward zero": cut_toward_zero,
     "gravity said wrongly": gravity_said,
@@ -273,7 +359,7 @@ def tables(bench: Bench) -> dict[str, Any]:
         rows.append(row)
     about: dict[str, Any] = {
         "format": 1,
-        "device": {"name": "drawn", "serial": "N-1", "grade": "tactical"},
+        "device": {"name": "drawn", "serial": "N-1", "grade": bench.grade},
         "site": site,
         "frame": {"mounting": list(bench.mounting)},
         "position": rows,
@@ -283,11 +369,16 @@ def tables(bench: Bench) -> dict[str, Any]:
     return about
 
 
-def session(bench: Bench, names: tuple[str, ...], rng: Rng) -> Written:
-    """A session with some mistakes."""
+def spoilt(bench: Bench, names: tuple[str, ...], rng: Rng) -> Bench:
+    """The bench with the mistakes that are made before anything is recorded."""
     for name in names:
         if name in BEFORE:
             bench = BEFORE[name](bench, rng)
+    return bench
+
+
+def session(bench: Bench, names: tuple[str, ...], rng: Rng) -> Written:
+    """A session on it, with the mistakes that are made afterwards."""
     written = Written(tables(bench), recorded(bench, rng))
     for name in names:
         if name in AFTER:

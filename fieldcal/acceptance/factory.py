@@ -7,11 +7,11 @@ decides has to know what is relied on.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.limits import GradeLimits, read
 from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import G0
@@ -39,10 +39,15 @@ def _checks(
 ) -> Iterator[Check]:
     left, usual = counted(found), limits.factory
     measured = {sensor_of(group_of(n)) for n in found.names}
+    of_grade = "the grade"
+    if shows := found.info.get("grade_shown"):
+        usual = read(shows["grade"]).factory
+        of_grade = f"{shows['grade']} grade"
+        yield _coarser(about.grade, shows)
 
     def whose(said: float | None, size: float, grade: float) -> str:
         stated = said is not None or size != grade
-        return "as stated" if stated else "as usual for the grade"
+        return "as stated" if stated else f"as usual for {of_grade}"
 
     if left.cross_coupling and "acc" in measured:
         by = whose(about.squareness, left.cross_coupling, usual.cross_coupling)
@@ -69,3 +74,15 @@ def _checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
+
+
+def _coarser(stated: str, shows: Mapping[str, str]) -> Check:
+    """What is said of a device that is not as good as its grade."""
+    says = (
+        f"this is no device of {stated} grade: {shows['because']}; what is not"
+        f" estimated of it is taken to be as large as {shows['grade']} grade has it. If"
+        f" that is what it is, state it (--grade {shows['grade']}), which has its own"
+        " limits as well; if its data sheet says less, state that (--squareness,"
+        " --quadratic, --g-sensitivity)"
+    )
+    return Check("grade", None, says)

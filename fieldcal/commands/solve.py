@@ -15,7 +15,6 @@ from fieldcal.core.factory import FACTORY
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.lot_prior import LotPrior
-    from fieldcal.core.factory import FactoryErrors
     from fieldcal.evaluation.observations import Rests
     from fieldcal.session.folder import Session
 
@@ -118,6 +117,7 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         session,
         still,
         args.turns,
+        _left(args),
         method=args.method,
         tilt=args.tilt,
         cross=args.cross,
@@ -125,18 +125,14 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles,
-        factory=_factory(args, session),
         lot=_lot(args, session) if args.lot else None,
     )
 
 
-def _factory(args: argparse.Namespace, session: Session) -> FactoryErrors:
-    """What the options say of it, else what session.toml or the grade does."""
-    from fieldcal.session.factory import factory_errors
-
+def _left(args: argparse.Namespace) -> dict[str, float]:
+    """What the options say that the factory left in the device."""
     said = {name: getattr(args, name) for name in FACTORY}
-    given = {name: value for name, value in said.items() if value is not None}
-    return factory_errors(replace(session.about, **given))
+    return {name: value for name, value in said.items() if value is not None}
 
 
 def _lot(args: argparse.Namespace, session: Session) -> LotPrior:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
@@ -149,6 +151,7 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     posterior = Posterior(
         found.search, found.best, lambda there: inference.beside(found, there)
     )
+    _as_good_as_shown(inference.dictionary, best.set, prepared.source.about)
     return Explanation(
         prepared, found, best, base_of(inference, prepared.rows), posterior
     )
@@ -186,6 +189,31 @@ def _factory(
     for name, size in factory_errors(about).by_effect.items():
         if size and name not in known and dictionary.x.f.any():
             yield of_size(dictionary, name, size, turned)
+
+
+def _as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> None:
+    """Let what the factory left be as large as biases and scale factors make likely."""
+    state, nominal = best.state, about.nominal
+    sigma = np.sqrt(np.diag(state.inverse))
+    names: list[str] = []
+    found: list[tuple[float, float]] = []
+    for kind, first in (("bias", dictionary.bias), ("scale", dictionary.scale)):
+        for c, channel in enumerate(CHANNELS):
+            group = f"{'acc' if c < 3 else 'gyr'}_{kind}"
+            for at in np.flatnonzero(state.columns == first + c):
+                names.append(f"{group}.{channel[-1]}")
+                value = nominal[group][c % 3] + state.estimate[at]
+                found.append((float(value), float(sigma[at])))
+    values, error = np.array(found).reshape(-1, 2).T
+    usual = Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()})
+    shows = GradeShown.of(about.grade, names, values, error, usual)
+    if not shows.because:
+        return
+    said, likely = (factory_errors(about, g).by_effect for g in (None, shows.grade))
+    dictionary.unfitted = tuple(
+        replace(g, typical=g.typical * likely[g.part] / said[g.part])
+        for g in dictionary.unfitted
+    )
 
 
 def nominal_of(about: Description, places: int, prepared: Prepared) -> State:

@@ -7,6 +7,7 @@ far as they were calm.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -14,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
@@ -42,6 +45,7 @@ from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.given import TILTS
 from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
 
@@ -154,7 +158,11 @@ class Laid:
 
 
 def solved(
-    session: Session, still: Rests, turns: Turns = "auto", **asked: Any
+    session: Session,
+    still: Rests,
+    turns: Turns = "auto",
+    left: Mapping[str, Any] | None = None,
+    **asked: Any,
 ) -> Calibration:
     """Solve a session.
 
@@ -163,6 +171,8 @@ def solved(
     session : the recording
     still : its windows
     turns : whether what the turns between windows say is used; "yes" insists on it
+    left : what the factory left in the device, by the keys of session.toml; otherwise
+        what that says, or what is usual for the grade
     asked : of `fieldcal.solve.solve`; how level the base is and how well angles are set
         are otherwise what session.toml says, or what the grade asks for
 
@@ -172,17 +182,23 @@ def solved(
         If nothing is determined, or turns are insisted on and there are none.
 
     """
-    return solved_as(Laid(session, still), turns, **asked)
+    return solved_as(Laid(session, still), turns, left, **asked)
 
 
-def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
+def solved_as(
+    laid: Laid,
+    turns: Turns = "auto",
+    left: Mapping[str, Any] | None = None,
+    **asked: Any,
+) -> Calibration:
     """The same of windows that were laid out already; raises as `solved` does."""
     session, still, about = laid.session, laid.still, laid.session.about
     if asked.get("level_sigma_deg") is None:
         asked["level_sigma_deg"] = about.level_deg
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
-    asked.setdefault("factory", factory_errors(about))
+    device = replace(about, **(left or {}))
+    asked["factory"] = factory_errors(device)
     printed = bool(asked.get("as_printed"))
     shown = None if printed else laid.explanation
     notes = [] if printed else laid.unexamined
@@ -192,6 +208,12 @@ def solved_as(laid: Laid, turns: Turns = "auto", **asked: Any) -> Calibration:
     if note:
         asked["angle_sigma_deg"], notes = angles, [note, *notes]
         found = solve(laid.observations, recorded=recorded, **asked)
+    shows = _grade(found, laid.observations)
+    if shows.because and not printed:
+        asked["factory"] = factory_errors(device, shows.grade)
+        found = solve(laid.observations, recorded=recorded, **asked)
+        told = {"grade": shows.grade, "because": shows.because}
+        found = replace(found, info={**found.info, "grade_shown": told})
     if turns == "yes":
         _insist(found, session, still)
     # why it is bad comes first
@@ -225,6 +247,22 @@ def _as_shown(
         f" ± {stated:.2g}°: the uncertainties are for that; mend the fixture, or write"
         " down the angles that it really sets"
     )
+
+
+def _grade(found: Calibration, seen: Observations) -> GradeShown:
+    """The grade that the device has by a result; the stated one of a bad result.
+
+    Where neither the tilt of the base is found nor its level stated, accelerometers
+    tell nothing: a tilt may be what is taken for their bias and scale factor.
+    """
+    if not found.good:
+        return GradeShown(seen.grade)
+    levelled = found.method == "scalar" or "level_sigma_deg" in found.info
+    levelled |= bool({*TILTS} & {*found.groups})
+    told = [levelled or sensor_of(group_of(n)) != "acc" for n in found.names]
+    names = [name for name, tells in zip(found.names, told, strict=True) if tells]
+    values, sigma = found.values[told], found.sigma[told]
+    return GradeShown.of(seen.grade, names, values, sigma, seen.nominal)
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

@@ -32,8 +32,8 @@ def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibra
 @pytest.mark.parametrize(
     ("square", "stated", "says"),
     [
-        (5e-4, None, "0.05 %, as usual for the grade"),
-        (5e-4, 5e-4, "0.05 %, as stated"),
+        (1e-3, None, "0.1 %, as usual for the grade"),
+        (1e-3, 1e-3, "0.1 %, as stated"),
         (3e-4, None, "0.03 %, as stated"),
     ],
 )
@@ -127,7 +127,7 @@ def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
 @pytest.mark.parametrize(
     ("device", "left"),
     [
-        ({}, (5e-4, 2e-5, 9e-6)),
+        ({}, (1e-3, 2e-5, 9e-6)),
         ({"grade": "consumer"}, (1e-2, 2.5e-4, 9e-5)),
         ({"grade": "consumer", "quadratic": 1e-5}, (1e-2, 1e-5, 9e-5)),
         ({"squareness": 1e-4, "g_sensitivity": 1e-7}, (1e-4, 2e-5, 1e-7)),

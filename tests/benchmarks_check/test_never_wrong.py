@@ -9,16 +9,16 @@ import pytest
 
 from benchmarks.never_wrong.bench import drawn
 from benchmarks.never_wrong.judging import WRONG, Judged, judged, write
-from benchmarks.never_wrong.mistakes import session
+from benchmarks.never_wrong.mistakes import session, spoilt
 
 LIMIT = 600.0
 
 
 def of(folder: Path, seed: int, *names: str) -> Judged:
     rng = np.random.default_rng(seed)
-    bench = drawn(rng)
+    bench = spoilt(drawn(rng), names, rng)
     write(folder, session(bench, names, rng))
-    return judged(folder, bench.truth, False, LIMIT)
+    return judged(folder, bench.truth, bench.grade, False, LIMIT)
 
 
 def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(

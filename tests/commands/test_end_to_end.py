@@ -87,7 +87,8 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Unsaid it is NO-GO, and said it is in the uncertainty, without a second turn."""
-    virtual = shlex.join(["--base-tilt=0.5,-0.3", *steady(tmp_path)])
+    bias = "--acc-bias=0.1,-0.2,0.1"
+    virtual = shlex.join(["--base-tilt=0.5,-0.3", bias, *steady(tmp_path)])
     code = main(
         ["run", "two_position", "--headless", f"--virtual={virtual}", "--json"]
         + ["--no-report", "-o", str(tmp_path / "s"), "--angles=0.001"]
@@ -109,7 +110,9 @@ def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     off = np.subtract(found["value"], truth)
     assert (np.abs(off) < 3 * np.array(found["sigma"])).all()
     assert "acc_bias" in again["decision"]["reasons"][0], "known too badly for a launch"
-    assert solved(capsys, tmp_path / "s", "--level", "0.001")["decision"]["go"]
+    said = solved(capsys, tmp_path / "s", "--level", "0.001")["decision"]
+    assert not said["go"], "no unit of the grade is as such a level makes it"
+    assert any(c["name"] == "grade" for c in said["checks"])
 
 
 def solved(

@@ -21,7 +21,7 @@ from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
-BIASES = ["0.2,-0.3,0.1", "-0.1,0.4,0.2", "0.3,0.1,-0.2"]
+BIASES = ["0.2,-0.3,0.1", "-0.1,0.3,0.2", "0.3,0.1,-0.2"]
 
 
 def led(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -67,7 +68,7 @@ def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
     """The same as what a factory left, whose coefficients have a known size, SI."""
     one = whole(table, name, turned)
     wide = size * units_of(table, catalogue()[name])[list(one.params)]
-    return Group("factory", name, one.columns, wide, fixed=1.0)
+    return replace(one, cause="factory", part=name, typical=wide, fixed=1.0)
 
 
 def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:

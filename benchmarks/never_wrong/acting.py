@@ -1,0 +1,101 @@
+"""What acts on a device, or happens in it, beside what positions and turns do.
+
+Written apart from everything that estimates. Device axes, m/s^2 and rad/s:
+
+    f += (dw/dt) x r + w x (w x r)             a lever arm r to the axes of the fixture
+    f += a sin(2 pi h t) e                     vibration of the bench along e
+    U(t) = integral of e^(-s/T) U(t - s) ds/T  a filter of the first order, in both
+    W(t) = W(t - d)                            a delay of the gyroscopes
+    U += s sign(f - f_before)                  what stays of the last turn
+    U += q, W += r                             biases that wander by a random walk
+
+Sway turns the base about its level axis by a sine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Acting:
+    """Sizes of all that; 0 for what there is not.
+
+    Attributes
+    ----------
+    arm : m, along each axis of the device
+    shaken, hum_hz : amplitude, m/s^2, and frequency of a vibration
+    swaying, sway_hz : amplitude, rad, and frequency of the base
+    filtered, delayed : s
+    stays : m/s^2, what the last turn leaves
+    acc_walk, gyr_walk : what biases wander by in 100 s
+
+    """
+
+    arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shaken: float = 0.0
+    hum_hz: float = 0.0
+    swaying: float = 0.0
+    sway_hz: float = 0.0
+    filtered: float = 0.0
+    delayed: float = 0.0
+    stays: float = 0.0
+    acc_walk: float = 0.0
+    gyr_walk: float = 0.0
+
+    def tilted(self, t: Floats) -> tuple[Floats, Floats]:
+        """Tilt of a base that sways, rad, and its rate, rad/s, (n,)."""
+        phase = 2 * np.pi * self.sway_hz * t
+        rate = 2 * np.pi * self.sway_hz * self.swaying * np.cos(phase)
+        return self.swaying * np.sin(phase), rate
+
+    def felt(self, t: Floats, f: Floats, w: Floats) -> Floats:
+        """The force where the accelerometers are, (n, 3)."""
+        arm = np.array(self.arm)
+        out: Floats = f + np.cross(np.gradient(w, t, axis=0), arm)
+        out += np.cross(w, np.cross(w, arm))
+        hum = self.shaken * np.sin(2 * np.pi * self.hum_hz * t)
+        out += hum[:, None] * np.array([0.6, 0.0, 0.8])
+        return out
+
+    def passed(self, t: Floats, acc: Floats, gyr: Floats) -> tuple[Floats, Floats]:
+        """Outputs as filter and delay let them through, (n, 3) each."""
+        if self.filtered:
+            acc, gyr = (_filtered(u, t, self.filtered) for u in (acc, gyr))
+        late = t - self.delayed
+        gyr = np.column_stack([np.interp(late, t, c) for c in gyr.T])
+        return acc, gyr
+
+    def wanders(
+        self, t: Floats, f: Floats, windows: Floats, rng: np.random.Generator
+    ) -> tuple[Floats, Floats]:
+        """What biases are off by, (n, 3) each; nothing at the end."""
+        step = np.sqrt((t[1] - t[0]) / 100.0)
+        walks = []
+        for size in (self.acc_walk, self.gyr_walk):
+            walk = np.cumsum(rng.normal(0, size * step, (len(t), 3)), axis=0)
+            walks.append(walk - walk[t <= windows[-1, 1]][-1])
+        acc, gyr = walks
+        left, last = np.zeros(3), None
+        for start, end in windows:
+            here = f[(t >= start) & (t <= end)].mean(axis=0)
+            if last is not None:
+                now = self.stays * np.sign(here - last)
+                acc[t >= start] += now - left
+                left = now
+            last = here
+        return acc, gyr
+
+
+def _filtered(values: Floats, t: Floats, constant: float) -> Floats:
+    """Behind a filter of the first order, (n, 3)."""
+    keep = float(np.exp(-(t[1] - t[0]) / constant))
+    out = values.copy()
+    for i in range(1, len(out)):
+        out[i] = keep * out[i - 1] + (1 - keep) * values[i]
+    return out

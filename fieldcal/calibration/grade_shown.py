@@ -1,0 +1,91 @@
+"""The grade that a device has by its biases and scale factors, whatever it is called.
+
+One process makes all errors of a device: a factory that leaves a bias of 50 mg or a
+scale factor of 2 % does not make axes square to 0.1 %. A parameter may be as far from
+nominal as units of the stated grade are (``..._tolerance`` in ``limits.toml``) and have
+moved since by what is usual from run to run (``..._repeat``). Beyond that, by more than
+its uncertainty explains, what is not estimated has the size of a coarser grade. Noise
+and grain tell grades less well: accelerometers of 60 to 140 ug/sqrt(Hz) are sold in
+both, and either may put out 16 bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from fieldcal.calibration import limits
+from fieldcal.calibration.names import ParameterName, sensor_of
+from fieldcal.calibration.parameters import COMPONENTS, Nominal
+from fieldcal.calibration.plausible import UNSEEN
+from fieldcal.core.grade import GRADES, Grade
+from fieldcal.core.samples import Array
+from fieldcal.core.sentences import join
+
+
+@dataclass(frozen=True, slots=True)
+class GradeShown:
+    """A grade, and why it is not the stated one.
+
+    Attributes
+    ----------
+    grade : by which what is not estimated is sized
+    because : which parameters are beyond the stated grade; empty where none is
+
+    """
+
+    grade: Grade
+    because: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        stated: Grade,
+        names: Sequence[str],
+        values: Array,
+        sigma: Array,
+        nominal: Nominal,
+    ) -> GradeShown:
+        """The best grade, from the stated one on, that has units like this one.
+
+        Parameters
+        ----------
+        stated : what the device is said to be
+        names : (k,) full names
+        values, sigma : (k,) as a `Calibration` has them
+        nominal : that they are changes from
+
+        """
+        coarser = GRADES[GRADES.index(stated) :: -1]
+        for grade in coarser:
+            beyond = list(_beyond(grade, names, values, sigma, nominal))
+            if grade == stated:
+                because = join(beyond)
+            if not beyond:
+                break
+        return cls(grade, because if grade != stated else "")
+
+
+def _beyond(
+    grade: Grade,
+    names: Sequence[str],
+    values: Array,
+    sigma: Array,
+    nominal: Nominal,
+) -> Iterator[str]:
+    """Each parameter that no unit of a grade has, in words."""
+    bounds = limits.read(grade)
+    for name, value, s in zip(names, values, sigma, strict=True):
+        parameter = ParameterName.of(name)
+        tolerance = bounds.tolerance(parameter.group)
+        if tolerance is None:
+            continue
+        most = tolerance + (bounds.repeat(parameter.group) or 0.0)
+        usual = getattr(nominal, parameter.group)[parameter.axis]
+        scale = getattr(nominal, f"{sensor_of(parameter.group)}_scale")
+        size = abs(scale[parameter.axis])
+        off = float(value - usual) / size
+        if abs(off) - UNSEEN * float(s) / size > most:
+            unit = COMPONENTS[parameter.group][1].replace("m/s^2", "m/s²")
+            shown = "" if unit == "1" else f" {unit}"
+            yield f"{name} is {off:+.2g}{shown} from nominal, more than {most:g}{shown}"

@@ -23,7 +23,6 @@ from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.samples import Block
 from fieldcal.core.sentences import join
 from fieldcal.evaluation.observations import Rests
 from fieldcal.history.store import History, HistoryRun, family
@@ -67,7 +66,7 @@ def assess(
     taken_out = _taken_out(session, still, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
-        link=_link(session.block, still.averages, marks),
+        link=_link(session, still.averages, marks),
         verification=_verification(found, session, marks, limits),
         family=earlier,
         doubts=[*_doubts(marks), *dead, *taken_out],
@@ -185,14 +184,14 @@ def _verification(
 
 
 def _link(
-    block: Block, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
+    session: Session, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
 ) -> dict[str, int]:
     """Samples in the windows, those missing there, and frames refused in all.
 
     What is missing between the pieces of a window is no part of it.
     """
     samples = missing = 0
-    gaps = [g for m in marks if m["event"] == "window" for g in m.get("without_s", ())]
+    block, gaps = session.block, session.about.without
     period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
     for window in windows:
         t = block.between(window.start, np.nextafter(window.end, np.inf)).t

@@ -98,7 +98,8 @@ def read_output(path: Path) -> SimulatorOutput:
         made = import_stream(recording, stream, there, {"format": 1}, STILL_S)
         block = Session.open(there).block
     said = (f"{what.replace('_', ' ')} taken as {why}" for what, why in guessed.items())
-    return SimulatorOutput(block, None, tuple(made.stretches), tuple(said))
+    rests = tuple((rest.start, rest.end) for rest in made.rests)
+    return SimulatorOutput(block, None, rests, tuple(said))
 
 
 def _only_stream(recording: Recording) -> str:
@@ -128,9 +129,10 @@ def _placed(
     later = float(block.t[0] - real.t[0])
     moved = [None if w is None else (w[0] + later, w[1] + later) for w in about.windows]
     if all(w is None or _inside(w, rests) for w in moved):
-        return replace(about, windows=tuple(moved))
+        gaps = tuple((start + later, end + later) for start, end in about.without)
+        return replace(about, windows=tuple(moved), without=gaps)
     if len(rests) == len(ours) == len(about.windows):
-        return replace(about, windows=tuple(rests))
+        return replace(about, windows=tuple(rests), without=())
     raise InputError(
         f"{path}: the simulated device rests {len(rests)} times and not at the times of"
         f" the recording, which has {len(ours)} positions: let the simulator hold the"

@@ -154,7 +154,7 @@ def _say_together(files: Sequence[Path], imported: Sequence[ImportedSession]) ->
             " are of one IMU, import them again with --join, which makes one session"
             " of them\n"
         )
-    rests = [one.rests for one in imported]
+    rests = [one.forces for one in imported]
     if len(files) > 1 and all(len(one) == 1 for one in rests):
         if are_means(np.concatenate(rests)):
             sys.stderr.write(
@@ -190,7 +190,7 @@ def _bring_all(
         imported[stream.name] = _bring(args, one, stream, there)
         written.append(there)
     if len(names) > 1:
-        rests = {name: one.rests for name, one in imported.items()}
+        rests = {name: one.forces for name, one in imported.items()}
         _say_instances(folder, rests, float(args.gravity or G0))
     return list(imported.values())
 
@@ -256,7 +256,7 @@ def _bring(
     err = sys.stderr.write
     err(
         f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
-        f" {_many(len(imported.stretches), 'still stretch', 'es')}"
+        f" {_many(len(imported.rests), 'still stretch', 'es')}"
         f" of {args.still:g} s or more\n"
     )
     for what, why in guessed.items():
@@ -265,14 +265,14 @@ def _bring(
         err(f"{folder}: {sentence}\n")
     if imported.facts.left_out:
         err(f"{folder}: left out: {_many(imported.facts.left_out, 'row', 's')}\n")
-    if not imported.stretches and kept:
+    if not imported.rests and kept:
         err(
             f"nothing says what a {' or '.join(sorted(set(kept.values())))} is worth,"
             " so no still stretch was found: say how many make a g or deg/s, such as"
             " --acc-unit g --acc-lsb 2048 --gyr-unit deg/s --gyr-lsb 16.4, or write"
             " [nominal] scale factors and the positions into session.toml\n"
         )
-    elif not imported.stretches:
+    elif not imported.rests:
         shorter = ", or try --still with a shorter time" if args.still > 1 else ""
         err(f"write the positions into session.toml{shorter}\n")
     sys.stdout.write(f"{folder}\n")

@@ -71,17 +71,31 @@ def disturbed(z: Array, m: int) -> NDArray[np.intp]:
     for column, one in zip(z.T, scale, strict=True):
         np.maximum(size, np.abs(column) / one, out=size)
     loud = size > LARGEST
+    alone = _alone(size)
     for width in (m, 4 * m):
         if width < 2 or width >= len(z):
             continue
         peak = np.zeros(len(z) - width + 1)
         for column, one in zip(z.T, scale, strict=True):
-            np.maximum(peak, _means(column / one, width), out=peak)
+            # a byte decoded wrongly is no push: without it, what of the mean is left
+            level = np.where(alone, 0.0, column / one)
+            np.maximum(peak, _means(level, width), out=peak)
         for first, last in runs(peak > MEAN):
             at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
     found = _joined(runs(loud), 2 * m)
     return np.array([_trimmed(size, a, b) for a, b in found])
+
+
+def _alone(size: Array) -> NDArray[np.bool_]:
+    """Single samples beyond noise between usual ones, by their deviations (n,).
+
+    >>> _alone(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
+    (array([1]),)
+    """
+    calm = np.concatenate([[True], size <= LARGE, [True]])
+    alone: NDArray[np.bool_] = (size > LARGEST) & calm[:-2] & calm[2:]
+    return alone
 
 
 def _means(column: Array, width: int) -> Array:

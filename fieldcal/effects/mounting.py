@@ -94,7 +94,7 @@ def turns_seen(
             continue
         if not unbroken(block.t, gap.start, gap.stop, often):
             continue
-        rest = block.gyr[slice(*recording.windows[p])].mean(axis=0)
+        rest = recording.mean(p)[3:]
         rate = (block.gyr[gap] - rest) / recording.scale[3:]
         middle = (rate[1:] + rate[:-1]) / 2
         out.append(SeenTurn(one, two, middle * np.diff(block.t[gap])[:, None]))
@@ -163,10 +163,9 @@ class Mounting(Chain):
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
         """Axes or unit that are not the declared ones."""
-        block, rows = recording.block, recording.windows
         known = recording.x.force_known
-        held = [i for i, (a, b) in enumerate(rows) if b > a and known[i]]
-        mean = np.array([block.acc[a:b].mean(axis=0) for a, b in rows[held]])
+        held = [i for i, (a, b) in enumerate(recording.windows) if b > a and known[i]]
+        mean = np.array([recording.mean(i)[:3] for i in held])
         if not np.isfinite(mean).all() or not len(mean):
             return []
         acc = (mean - recording.bias[:3]) / recording.scale[:3]

@@ -7,15 +7,14 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import time
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.samples import Array, Block, too_quick
+from fieldcal.importing.found_rests import rests_of
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.spool import SpooledRows
 from fieldcal.importing.stream_facts import StreamFacts
@@ -24,20 +23,11 @@ from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.windows.cells import Between, Cells, CellTable
+from fieldcal.windows.cells import Cells
 from fieldcal.windows.jumps import Jumps
+from fieldcal.windows.knocks import Rest
 from fieldcal.windows.spikes import without_spikes
-from fieldcal.windows.stretch_ends import reasons
-from fieldcal.windows.stretches import (
-    still_stretches_of_file,
-    summary,
-    why_none,
-)
-
-ONLY_RESTS = (
-    "it has no times and turns within no row, so only its rests were recorded, and each"
-    " stretch between two jumps is taken for a position"
-)
+from fieldcal.windows.stretches import summary
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +38,17 @@ class ImportedSession:
     ----------
     folder : where
     facts : what was found
-    stretches : where the device was still, s of device time
+    rests : where the device was still, s of device time
     says : what the user must know, repairs first
-    rests : (m, 3) means of the accelerometers in these stretches, m/s^2
+    forces : (m, 3) means of the accelerometers in these rests, m/s^2
 
     """
 
     folder: Path
     facts: StreamFacts
-    stretches: list[tuple[float, float]]
+    rests: list[Rest]
     says: list[str]
-    rests: Array
+    forces: Array
 
 
 def import_stream(
@@ -93,7 +83,7 @@ def import_stream(
         part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
         held = SessionLock(part)
         try:
-            facts, stretches, says, rests = _fill(part, recording, stream, about, still)
+            made = _fill(part, recording, stream, about, still)
             held.release()
             part.chmod(0o755)
             _settle(*part.iterdir(), part)
@@ -107,7 +97,7 @@ def import_stream(
         raise SessionError(
             f"{folder}: cannot be written: {disk_says(error)}"
         ) from error
-    return ImportedSession(folder, facts, stretches, [*removed, *says], rests)
+    return replace(made, folder=folder, says=[*removed, *made.says])
 
 
 def remove_broken_off(folder: Path) -> list[str]:
@@ -142,7 +132,7 @@ def _fill(
     stream: str,
     about: Mapping[str, Any],
     still: float,
-) -> tuple[StreamFacts, list[tuple[float, float]], list[str], Array]:
+) -> ImportedSession:
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
@@ -160,25 +150,23 @@ def _fill(
         _refuse_useless(recording, facts)
         facts.left_out = judge.left_out
         written.close()
-        found = _rests(jumps, rows, cells.table, written.between, still)
-    stretches, repairs = found.stretches, [*recording.mended, *judge.mended]
-    positions = [{"start_s": round(s, 6), "end_s": round(e, 6)} for s, e in stretches]
+        found = rests_of(jumps, rows, cells.table, written.between, still)
     # an empty list would be in the way of the tables that the user adds
-    tables = {"position": positions} if positions and "position" not in about else {}
+    given = not found.rests or "position" in about
+    tables = {} if given else {"position": found.positions}
     text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
-    recording.says += [found.how] if found.how else []
+    recording.says += [said for said in (found.how, found.left_out) if said]
     recording.says += [step.sentence() for step in clock.steps]
+    repairs = [*recording.mended, *judge.mended]
     marks = _marks(recording, stream, facts, repairs, clock.steps)
-    marks += "".join(
-        mark_line(
-            {"event": "still", "start_s": s, "end_s": e, "began": began, "ended": ended}
-        )
-        for (s, e), (began, ended) in zip(stretches, found.ends, strict=True)
-    )
+    marks += "".join(map(mark_line, found.marks))
     (part / MARKS).write_text(marks, "utf-8")
-    says = [*repairs, *recording.says, *([found.none] if found.none else [])]
-    return facts, stretches, says, found.means
+    none = [found.none] if found.none else []
+    rests, forces = found.rests, found.forces
+    return ImportedSession(
+        part, facts, rests, [*repairs, *recording.says, *none], forces
+    )
 
 
 def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
@@ -192,51 +180,6 @@ def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
         )
     if said := too_quick(facts.rate_hz):
         raise InputError(f"{recording.path}: {said}")
-
-
-class _Rests(NamedTuple):
-    """Where the device rested.
-
-    Attributes
-    ----------
-    stretches : start and end of each, s
-    ends : why each began and ended
-    means : (m, 3) of the accelerometers in them, m/s^2
-    how, none : how they were found if not as rests, and why there are none; or nothing
-
-    """
-
-    stretches: list[tuple[float, float]]
-    ends: list[tuple[str, str]]
-    means: Array
-    how: str
-    none: str
-
-
-def _rests(
-    jumps: Jumps, rows: SpooledRows, rest: CellTable, between: Between, still: float
-) -> _Rests:
-    """Where the device rested for so long, s; `rest` are the cells not in rows yet."""
-    rows.add(summary(rest))
-    if still == np.inf:  # of means
-        return _Rests([], [], np.empty((0, 3)), "", "")
-    held = jumps.positions
-    found = held or still_stretches_of_file(rows, rest.origin, between, still)
-    how = f"{ONLY_RESTS}: it jumps {len(held) - 1} times" if held else ""
-    why = "" if found else why_none(rows, rest.origin)
-    means = np.array([_mean_of(between(*span)) for span in found]).reshape(-1, 3)
-    none = f"no still stretch was found: {why}" if why else ""
-    return _Rests(found, reasons(rows, rest.origin, found), means, how, none)
-
-
-def _mean_of(blocks: Iterable[Block]) -> Array:
-    """Mean of the accelerometers over some blocks, (3,) m/s^2; nan of those without."""
-    total, many = np.zeros(3), np.zeros(3)
-    for block in blocks:
-        total += np.nansum(block.acc, axis=0)
-        many += np.isfinite(block.acc).sum(axis=0)
-    mean: Array = np.divide(total, many, out=np.full(3, np.nan), where=many > 0)
-    return mean
 
 
 def _steadied(clock: SteadyClock, blocks: Iterable[Block]) -> Iterator[Block]:

@@ -66,6 +66,14 @@ class CheckedSamples:
         out[3:] = self.block.gyr[first:last].T
         return out.T
 
+    def mean(self, position: int) -> Array:
+        """Mean of what is known in a window, (6,); nan where nothing is."""
+        six = self.six(*self.windows[position].tolist())
+        known = np.isfinite(six)
+        count = known.sum(axis=0)
+        total = np.where(known, six, 0.0).sum(axis=0)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
     def position_of(self, row: int) -> int:
         """Index of the position whose window holds a sample, -1 if none does."""
         inside = (self.windows[:, 0] <= row) & (row < self.windows[:, 1])

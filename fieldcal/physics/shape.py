@@ -22,6 +22,9 @@ INSTANTS = 36
 """And in all at least: of one long window no piece may be so long that what changes
 amid it looks like a walk."""
 
+BREAK_S = 0.2
+"""Time between two rows of a window that something was left out in, s."""
+
 WITHIN = (0.25, 0.08, 0.025, 0.008)
 """Parts of a row by which an instant is moved in it, closer and closer."""
 
@@ -81,28 +84,34 @@ class Shape:
             if row == 0 or abs(float(x.t[k]) - here) > 0.6 * row:
                 return []  # between windows: their rows do not tell
             return [here + part * ratio * row for part in (-2, -1, 1, 2)]
-        middle = (x.t[1:] + x.t[:-1]) / 2
-        grid = instants(x)
+        between, grid = _between_rows(x), instants(x)
         low = grid[grid < here].max(initial=-np.inf)
         high = grid[grid > here].min(initial=np.inf)
-        found: list[float] = middle[(low < middle) & (middle < high)].tolist()
+        found: list[float] = between[(low < between) & (between < high)].tolist()
         return [at for at in found if at != here]
 
 
 def instants(x: Experience) -> Array:
     """Instants at which something may change: between rows, some for each window, s.
 
-    Those of a window part it into pieces of about the same length.
+    Those of a window part it into pieces of about the same length. Where something was
+    left out of a window, somebody knocked.
     """
-    middle = (x.t[1:] + x.t[:-1]) / 2
+    between = _between_rows(x)
     turned = np.flatnonzero(np.diff(x.position))
-    kept = [turned]
+    ends, starts = x.t[:-1] + x.lasts[:-1] / 2, x.t[1:] - x.lasts[1:] / 2
+    kept = [turned, np.flatnonzero((starts - ends > BREAK_S) & (x.lasts[1:] > 0))]
     for rows in np.split(np.arange(len(x.t)), turned + 1):
         pieces = max(PIECES, INSTANTS // (len(turned) + 1))
         cuts = np.linspace(x.t[rows[0]], x.t[rows[-1]], pieces + 1)[1:-1]
-        inside = middle[rows[:-1]]
+        inside = between[rows[:-1]]
         if len(inside):
             near = np.abs(np.subtract.outer(cuts, inside)).argmin(axis=1)
             kept.append(rows[near])
-    out: Array = middle[np.unique(np.concatenate(kept))]
+    out: Array = between[np.unique(np.concatenate(kept))]
     return out
+
+
+def _between_rows(x: Experience) -> Array:
+    """Instants between the end of each row and the start of the next, (n - 1,) s."""
+    return (x.t[1:] + x.t[:-1] + (x.lasts[:-1] - x.lasts[1:]) / 2) / 2

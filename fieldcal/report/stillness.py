@@ -72,10 +72,11 @@ def _found(material: Material, marks: Sequence[Mapping[str, Any]]) -> blocks.Tab
             f"{float(mark['end_s']) - material.epoch:.1f}",
             str(mark["began"]),
             str(mark["ended"]),
+            str(len(mark.get("without_s", ()))),
         ]
         for i, mark in enumerate(marks, 1)
     ]
-    columns = ("", ">from, s", ">to, s", "before it", "behind it")
+    columns = ("", ">from, s", ">to, s", "before it", "behind it", ">bumps left out")
     return table("Still stretches that the import found", columns, rows)
 
 

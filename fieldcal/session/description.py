@@ -26,7 +26,7 @@ from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.core.under_way import UnderWay
-from fieldcal.session.position_tables import positions_of
+from fieldcal.session.position_tables import left_out, positions_of
 from fieldcal.session.schemas import refusal, validator
 from fieldcal.session.units import UNITS, full_scales, gauge_of, nominal_of
 
@@ -63,6 +63,7 @@ class Description:
     positions : as session.toml lists them
     windows : (start, end) of each position, s of device time; None where not yet known
     numbers : what session.toml counts each position as, from 0
+    without : (start, end) of what is no part of the windows it lies in, s, in order
 
     """
 
@@ -87,6 +88,7 @@ class Description:
     positions: tuple[Position, ...]
     windows: tuple[tuple[float, float] | None, ...]
     numbers: tuple[int, ...]
+    without: tuple[tuple[float, float], ...]
     raw: Mapping[str, Any] = field(repr=False)
 
     @property
@@ -263,6 +265,7 @@ def parse(raw: Mapping[str, Any]) -> Description:
         positions=positions,
         windows=windows,
         numbers=tuple(range(len(positions))),
+        without=left_out(raw.get("position", ())),
         raw=raw,
     )
 

@@ -136,7 +136,7 @@ class Session:
                 np.multiply(triad, unit, out=triad)
         whole, changed = in_one_calibration(raw, self.marks())
         self.warnings += changed
-        return self._steadied(_left_out(whole, self.marks()))
+        return self._steadied(_left_out(whole, self.about.without))
 
     def blocks(self) -> Iterator[Block]:
         """Samples as `block` has them, part by part, however long the recording is.
@@ -146,13 +146,13 @@ class Session:
         if len(stretches(self.marks())) > 1:
             yield self.block
             return
-        marks, clock = list(self.marks()), SteadyClock()
+        clock = SteadyClock()
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
         for raw in sample_files.blocks(sample_files.find(self.folder)):
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
-            yield clock.add(_left_out(part, marks))
+            yield clock.add(_left_out(part, self.about.without))
         yield clock.rest()
 
     def _steadied(self, raw: Block) -> Block:
@@ -161,9 +161,15 @@ class Session:
         if steady is None:
             return raw
         self.warnings += tuple(step.sentence() for step in steady.steps)
-        windows = [w and (steady.moved(w[0]), steady.moved(w[1]))
-                   for w in self.about.windows]  # fmt: skip
-        self.about = replace(self.about, windows=tuple(windows))
+
+        def moved(span: tuple[float, float]) -> tuple[float, float]:
+            return steady.moved(span[0]), steady.moved(span[1])
+
+        self.about = replace(
+            self.about,
+            windows=tuple(w and moved(w) for w in self.about.windows),
+            without=tuple(map(moved, self.about.without)),
+        )
         return steady.block
 
     def marks(self) -> Iterator[dict[str, Any]]:
@@ -186,18 +192,13 @@ def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _left_out(block: Block, marks: Iterable[Mapping[str, Any]]) -> Block:
-    """A block with nan between the pieces of windows that were disturbed."""
-    gaps = [
-        slice(*np.searchsorted(block.t, gap).tolist())
-        for mark in marks
-        if mark.get("event") == "window"
-        for gap in mark.get("without_s", ())
-    ]
-    if not gaps:
+def _left_out(block: Block, gaps: Iterable[tuple[float, float]]) -> Block:
+    """A block with nan in what is no part of the windows."""
+    cut = [slice(*np.searchsorted(block.t, gap).tolist()) for gap in gaps]
+    if not cut:
         return block
     acc, gyr = block.acc.copy(), block.gyr.copy()
-    for gap in gaps:
+    for gap in cut:
         acc[gap] = gyr[gap] = np.nan
     return replace(block, acc=acc, gyr=gyr)
 
@@ -219,7 +220,14 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
             windows[i] = (float(mark["start_s"]), float(mark["end_s"]))
         elif mark.get("event") == "repeated" and isinstance(i, int):
             windows[i : i + 1] = [None]
-    return replace(about, windows=tuple(windows))
+    gaps = [
+        (float(start), float(end))
+        for mark in marks
+        if mark.get("event") == "window"
+        for start, end in mark.get("without_s", ())
+    ]
+    without = tuple(sorted((*about.without, *gaps)))
+    return replace(about, windows=tuple(windows), without=without)
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:

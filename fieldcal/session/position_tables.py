@@ -61,6 +61,30 @@ def _turning(number: int, table: Mapping[str, Any], position: Position) -> Posit
     )
 
 
+def left_out(tables: Iterable[Mapping[str, Any]]) -> tuple[tuple[float, float], ...]:
+    """What is no part of the windows that it lies in, s of device time, in order.
+
+    Raises
+    ------
+    InputError
+        Naming the position, counted from 1.
+
+    """
+    out: list[tuple[float, float]] = []
+    for number, table in enumerate(tables, 1):
+        last = -np.inf
+        for start, end in sorted(map(tuple, table.get("without_s", ()))):
+            inside = "start_s" in table and table["start_s"] < start < end
+            if not (inside and last < start and end < table["end_s"]):
+                raise InputError(
+                    f"[[position]] number {number} without_s = [{start:g}, {end:g}]"
+                    " cannot be: it must lie between start_s and end_s, its start come"
+                    " before its end, and none may overlap"
+                )
+            out.append((float(start), last := float(end)))
+    return tuple(sorted(out))
+
+
 def _window(number: int, table: Mapping[str, Any]) -> tuple[float, float] | None:
     if "start_s" not in table:
         return None

@@ -32,7 +32,7 @@ KNEE = 0.05
 _MORE = 2.0
 """Times by which the noise of a device may grow from one window to the next."""
 
-_ENOUGH = 16
+ENOUGH = 16
 """Durations a window must hold for the noise of that duration to be measured."""
 
 
@@ -65,18 +65,20 @@ def running(values: Array, levels: int = LEVELS) -> list[Array]:
     return [(sums[2**k :] - sums[: -(2**k)]) / 2**k for k in fit]
 
 
-def quiet(means: Array, before: QuietNoise | None = None) -> QuietNoise:
+def quiet(
+    means: Array, before: QuietNoise | None = None, levels: int = LEVELS
+) -> QuietNoise:
     """Noise of cell means (m, c), no nan, m >= 2; with that of the windows before."""
-    levels = running(means)
+    averaged = running(means, levels)
     measured: list[Array] = []
-    for k, u in enumerate(levels):
-        if k and len(u) < _ENOUGH * 2**k:
+    for k, u in enumerate(averaged):
+        if k and len(u) < ENOUGH * 2**k:
             break
         steps = np.abs(u[2**k :] - u[: -(2**k)])
         measured.append(DEVIATION * np.median(steps, axis=0) / np.sqrt(2))  # (1)
     known = np.array(measured)
     white, flat = _white_and_flat(known)
-    tau = 2.0 ** np.arange(len(known), len(levels))[:, None]
+    tau = 2.0 ** np.arange(len(known), len(averaged))[:, None]
     own = QuietNoise(np.vstack([known, np.sqrt(white / tau + flat)]), len(means))  # (2)
     return own if before is None else _pooled(own, before)
 

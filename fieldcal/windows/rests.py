@@ -39,7 +39,7 @@ _PART = 4096
 _SAMPLE = 1 << 15
 """Spans by which the usual is judged: of a longer recording, evenly spread ones."""
 
-_PAUSE = 5.0
+PAUSES = 5.0
 """Usual distances from one cell to the next that are a pause, if they make a span."""
 
 _RATE = 0.02
@@ -60,6 +60,18 @@ class RestRun(NamedTuple):
 def table_of(rows: Array, origin: Array) -> CellTable:
     """Cells of rows of `summary`."""
     return CellTable(rows[:, 0], rows[:, 1:], origin)
+
+
+def cell_of(rows: CellRows, t: float) -> int:
+    """Which cell an instant lies in: the last that begins no later."""
+    low, high = 0, len(rows) - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if rows[middle : middle + 1][0, 0] <= t + CELL * 1e-3:
+            low = middle
+        else:
+            high = middle - 1
+    return low
 
 
 class _Typical(NamedTuple):
@@ -110,7 +122,7 @@ def _typical(rows: CellRows) -> _Typical:
         finest = np.minimum(finest, part[:, 27:33].min(axis=0))
         counts.append(part[-first % every :: every, 1:7].copy())
         steps.append(np.diff(part[:, 0])[-first % every :: every])
-    pause = _PAUSE * max(float(np.median(np.concatenate(steps))), SPAN * CELL / _PAUSE)
+    pause = PAUSES * max(float(np.median(np.concatenate(steps))), SPAN * CELL / PAUSES)
     flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
     return _Typical(np.median(np.concatenate(counts), axis=0), pause, flips)
 

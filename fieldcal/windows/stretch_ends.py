@@ -12,6 +12,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.windows.cells import CELL, CellRows, CellTable
+from fieldcal.windows.rests import cell_of
 
 BEYOND = 1.0
 """Time beyond a stretch that is looked at, s."""
@@ -39,7 +40,7 @@ def reasons(
     """
     out = []
     for start, end in spans:
-        first, last = _cell_of(rows, start), _cell_of(rows, end - 1e-9)
+        first, last = cell_of(rows, start), cell_of(rows, end - 1e-9)
         inside = CellTable(rows[first : last + 1][:, 0], rows[first : last + 1][:, 1:],
                            origin)  # fmt: skip
         k = round(BEYOND / CELL)
@@ -48,18 +49,6 @@ def reasons(
             (_why(before[::-1], inside, origin, -1), _why(after, inside, origin, 1))
         )
     return out
-
-
-def _cell_of(rows: CellRows, t: float) -> int:
-    """Which cell an instant lies in: the last that begins no later."""
-    low, high = 0, len(rows) - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if rows[middle : middle + 1][0, 0] <= t + CELL * 1e-3:
-            low = middle
-        else:
-            high = middle - 1
-    return low
 
 
 def _why(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:

@@ -40,3 +40,21 @@ def test_a_bump_is_masked_within_its_own_window(at: int) -> None:
     assert masked.min() == max(at - 10, first)
     assert masked.max() == min(bumped[-1] + 10, last - 1)
     np.testing.assert_array_equal(np.flatnonzero(~usable), masked)
+
+
+def test_single_wild_samples_are_left_out_and_are_no_bumps() -> None:
+    rng = np.random.default_rng(6)
+    t = np.arange(N) / 20
+    acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.01, (N, 3))
+    wild = np.array([90, 300, 301 + 40, 700])
+    acc[wild, 1] += [25.6, -25.6, 25.6, -12.8]
+    acc[500:506, 2] += 0.3
+    block = Block.of(t, acc, rng.normal(0, 1e-3, (N, 3)))
+    held = [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 0.0, "end_s": 50.0}]
+    site = {"gravity": G, "latitude_deg": 50.0}
+    checked = check(block, parse({"format": 1, "site": site, "position": held}))
+    named = [f for name, f in checked.faults if name == "bump" and f.values]
+    assert [round(f.values["at_s"]) for f in named] == [25]  # type: ignore[call-overload]
+    assert not checked.usable[wild, 1].any()
+    # a wild one takes with it a fifth of a second on either side, and no more
+    assert (~checked.usable[:, 1]).sum() <= len(wild) * 9 + 6 + 8

@@ -49,7 +49,7 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
         imported = import_stream(
             recording, "0", folder / f"{hours}", {"format": 1}, 60.0
         )
-        return tracemalloc.get_traced_memory()[1], len(imported.stretches)
+        return tracemalloc.get_traced_memory()[1], len(imported.rests)
     finally:
         tracemalloc.stop()
 

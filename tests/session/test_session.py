@@ -255,3 +255,24 @@ def test_a_derived_file_is_whole_and_strict_json(tmp_path: Path) -> None:
         "samples.csv",
         "session.toml",
     ]
+
+
+def test_what_is_no_part_of_a_window_is_missing(tmp_path: Path) -> None:
+    rows = "".join(f"{t / 10},0,-9.8,{t},0,0,0\n" for t in range(40))
+    toml = "[[position]]\nstart_s = 0.5\nend_s = 3.5\n"
+    toml += "without_s = [[2.0, 2.5], [1.0, 1.2]]\n"
+    session = Session.open(folder(tmp_path, toml, f"{HEAD}\n{rows}"))
+    left_out = np.isnan(session.block.six).all(axis=1)
+    assert np.flatnonzero(left_out).tolist() == [10, 11, 20, 21, 22, 23, 24]
+    assert session.about.without == ((1.0, 1.2), (2.0, 2.5))
+    parts = [np.isnan(part.acc[:, 0]) for part in session.blocks()]
+    np.testing.assert_array_equal(np.concatenate(parts), left_out)
+
+
+@pytest.mark.parametrize(
+    "gaps", ["[[0.2, 1.0]]", "[[1.0, 4.0]]", "[[2.0, 1.0]]", "[[1.0, 2.0], [1.5, 3.0]]"]
+)
+def test_what_is_no_part_of_a_window_lies_within_it(tmp_path: Path, gaps: str) -> None:
+    toml = f"[[position]]\nstart_s = 0.5\nend_s = 3.5\nwithout_s = {gaps}\n"
+    with pytest.raises(SessionError, match="number 1 without_s = .*start_s and end_s"):
+        Session.open(folder(tmp_path, toml))

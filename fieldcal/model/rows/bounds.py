@@ -6,6 +6,8 @@ seconds: what happens after a turn happens at the start.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,10 +57,30 @@ def edges(start: float, end: float, windows: int) -> Array:
 
 
 def block_bounds(
-    t: Array, first: int, last: int, rate: float, windows: int
+    t: Array,
+    span: tuple[int, int],
+    rate: float,
+    windows: int,
+    without: Iterable[tuple[float, float]] = (),
 ) -> NDArray[np.intp]:
-    """First and one past the last sample of each block of a window, (k, 2)."""
-    grid = edges(float(t[first]), float(t[last - 1]) + 0.5 / rate, windows)
+    """First and one past the last sample of each block of a window, (k, 2).
+
+    Parameters
+    ----------
+    t : (n,) times of all samples, s
+    span : first and one past the last sample of the window
+    rate : samples a second
+    windows : how many there are
+    without : what is no part of windows, s: a block ends before it, another follows it
+
+    """
+    first, last = span
+    start, end = float(t[first]), float(t[last - 1]) + 0.5 / rate
+    gaps = np.array([gap for gap in without if start < gap[0] and gap[1] < end])
+    gaps = gaps.reshape(-1, 2)
+    grid = np.union1d(edges(start, end, windows), gaps)
     at = first + np.searchsorted(t[first:last], grid)
     keep = np.diff(at) > 0
+    for a, b in gaps:
+        keep &= (grid[1:] <= a) | (grid[:-1] >= b)
     return np.column_stack([at[:-1][keep], at[1:][keep]])

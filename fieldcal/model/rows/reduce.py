@@ -112,7 +112,11 @@ def reduce(source: RowSource) -> Rows:
     if source.white is not None:
         noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)
     source = replace(source, block=shaken.block)
-    bounds = [block_bounds(block.t, a, b, rate, len(held)) for a, b in windows[held]]
+    without = source.about.without
+    bounds = [
+        block_bounds(block.t, (a, b), rate, len(held), without)
+        for a, b in windows[held].tolist()
+    ]
     rows = [len(b) for b in bounds]
     out = averaged(
         source,

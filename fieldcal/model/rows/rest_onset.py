@@ -12,6 +12,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
+from fieldcal.model.rows.block_means import block_means
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.session.description import Description
@@ -32,9 +33,7 @@ def arrivals(block: Block, about: Description, noise: Array) -> Array:
     before = 0
     for p, (first, last) in enumerate(windows):
         if last > first >= before:
-            held = np.concatenate(
-                [triad[first:last].mean(axis=0) for triad in (block.acc, block.gyr)]
-            )
+            held = block_means(block, windows[p : p + 1])[0][0]
             moved = _last_motion(block[before:first].six, held, noise, m)
             out[p] = block.t[before + moved if before else 0]
             before = int(last)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from still_samples import about, place, samples
 
-from fieldcal.model.rows.bounds import edges, spans
+from fieldcal.model.rows.bounds import block_bounds, edges, spans
 
 
 def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:
@@ -42,3 +42,16 @@ def test_a_long_window_has_so_many_rows_each_longer_by_the_same_ratio(
     assert ratio[0] > 1.0
     assert len(edges(3.0, 3.0 + rows, windows)) == rows + 1
     np.testing.assert_allclose(np.diff(edges(3.0, 3.0 + rows, windows)), 1.0)
+
+
+def test_no_block_spans_what_was_left_out_of_a_window() -> None:
+    t = np.arange(30_000) / 50
+    gaps = [(100.0, 100.8), (100.9, 103.0), (700.0, 701.0)]
+    whole = block_bounds(t, (50, 29_000), 50.0, 1)
+    found = block_bounds(t, (50, 29_000), 50.0, 1, gaps)
+    inside = np.concatenate([np.arange(a, b) for a, b in found])
+    wanted = [
+        i for i in range(50, 29_000) if not any(a <= t[i] < b for a, b in gaps[:2])
+    ]
+    np.testing.assert_array_equal(inside, wanted)
+    assert len(whole) + 1 <= len(found) <= len(whole) + 3

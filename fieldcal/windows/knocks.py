@@ -1,0 +1,286 @@
+"""Whether the device lies after a disturbance as it lay before.
+
+Somebody bumps the table, or a door slams: two still stretches with a gap of g seconds
+between them. theta is what the device was turned by for good, b what the biases of the
+accelerometers jumped by. Of the two stretches and the gap one sees
+
+    d = mean f after - mean f before = f x theta + b + e,   phi = theta + e'        (1)
+
+phi is what the gyroscopes, less their mean beside the gap, turned in it. Either theta
+is 0, or it is a chance, N(0, TURNED^2); and b is 0, or with a small probability a jump,
+N(0, JUMPED^2). By Bayes' rule over these four
+
+    P(as before) = sum over b of P(b) N(d, phi | theta = 0, b) / sum over all       (2)
+
+Means over T s, g s apart, of noise of the Allan deviation a(T) differ by
+
+    var e = 2 a^2 B(1 + g/T),                                                       (3)
+    B(r) = ((r+1)^2 ln(r+1) + (r-1)^2 ln(r-1) - 2 r^2 ln r) / (4 ln 2)
+
+and by v (T + g), v their common slope, which is as uncertain as it is large; T is that
+at which both are least. B is that of flicker, and too large for white noise.
+The sum of the n samples in the gap is as uncertain as what is quick in them, noise or a
+swing that they do not follow, and as the mean beside it:
+
+    var e' = n dt^2 q + g^2 (var e_w / 4 + d_w^2 / 12) + (s^2 / 2)^2,               (4)
+    q = mean of (k-th differences of w)^2 / (2k over k),   k = 4 if there are so many
+
+q is the variance of white noise; of a swing at a fifth of the sampling rate it leaves a
+fortieth, for the sum of what is sampled often enough is right. s is the largest angle
+on the way: sums of rates are angles to first order.
+Device axes; m/s^2, rad/s, rad, s. Sources: Barnes 1969, NBS TN 375 (bias function B2);
+IEEE 952 (Allan variance).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb, log
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block, concat
+from fieldcal.windows.cells import CELL, Between, CellRows, CellTable, hold_last
+from fieldcal.windows.dead_axis import LivingRows
+from fieldcal.windows.quiet import ENOUGH, LEVELS, quiet
+from fieldcal.windows.rests import PAUSES, SPAN, cell_of, table_of
+
+TURNED = 5e-3
+"""A device that a bump turned for good lies so much otherwise, rad about each axis:
+some tenths of a degree, of feet that slip and cushions that give way."""
+
+AS_BEFORE = 0.5
+"""Chance that a bump leaves a device as it lay."""
+
+JUMP, JUMPED = 0.01, 5e-2
+"""Chance that a bump makes the biases jump, and by how much, m/s^2: as `bias_step`."""
+
+SURE = 0.99
+"""Probability from which the device lies as before; else it is a position of its own,
+and the turn between both says what is known."""
+
+SMALL = 0.1
+"""Angle on the way, rad, up to which the device was bumped and not taken elsewhere."""
+
+LONGEST_S = 60.0
+"""Gap beyond which nobody knows what went on, s: that of a turn that is followed."""
+
+BESIDE = 6000
+"""Cells on either side that tell the noise: ten minutes."""
+
+LONGER = 2
+"""Levels of noise beyond the usual ones, where they are measured: up to 51 s."""
+
+DRIFT = 4
+"""Means of that many times T tell the slope."""
+
+QUICK = 4
+"""Order of the differences of rates that tell what is too quick for the samples."""
+
+
+class Rest(NamedTuple):
+    """A stretch of rest, s of device time, and the gaps that are no part of it."""
+
+    start: float
+    end: float
+    without: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def pieces(self) -> list[tuple[float, float]]:
+        """Start and end of what is part of it, in order, s."""
+        starts = [self.start, *(end for _, end in self.without)]
+        return list(zip(starts, [*(s for s, _ in self.without), self.end], strict=True))
+
+
+def joined_rests(
+    rows: CellRows,
+    origin: Array,
+    between: Between,
+    spans: Sequence[tuple[float, float]],
+) -> list[Rest]:
+    """Still stretches, those that only bumps divide as one.
+
+    Parameters
+    ----------
+    rows, origin, between : of the recording, as `still_stretches_of_file` has them
+    spans : start and end of each stretch, s of device time, in order
+
+    """
+    living = LivingRows(rows)
+    out: list[Rest] = []
+    for start, end in spans:
+        last = out[-1] if out else None
+        if last and _goes_on(
+            living, origin, living.of(between), last.pieces[-1], (start, end)
+        ):
+            out[-1] = Rest(last.start, end, (*last.without, (last.end, start)))
+        else:
+            out.append(Rest(start, end))
+    return out
+
+
+def _goes_on(
+    rows: CellRows,
+    origin: Array,
+    between: Between,
+    first: tuple[float, float],
+    later: tuple[float, float],
+) -> bool:
+    """Whether the device lies in one stretch as in the one before."""
+    gap = (first[1], later[0])
+    if gap[1] - gap[0] > LONGEST_S:
+        return False
+    began, ended, begins, ends = (cell_of(rows, t) for t in (*first, *later))
+    before = table_of(rows[max(began, ended - BESIDE) : ended], origin)
+    after = table_of(rows[begins + 1 : min(ends, begins + 1 + BESIDE)], origin)
+    way = concat(list(between(gap[0] - CELL, gap[1] + CELL)))
+    if min(len(before), len(after)) < 2 or _paused(way.t):
+        return False
+    return as_before(before, way, after, gap) > SURE
+
+
+def _paused(t: Array) -> bool:
+    """Whether the recording paused between these instants, s."""
+    step = np.diff(t)
+    if not len(step):
+        return True
+    return bool(step.max() > max(SPAN * CELL, PAUSES * float(np.median(step))))
+
+
+def as_before(
+    before: CellTable, way: Block, after: CellTable, gap: tuple[float, float]
+) -> float:
+    """Probability that the device lies as before, (2); 0 if it was taken elsewhere.
+
+    Parameters
+    ----------
+    before, after : cells of both stretches, about one origin
+    way : samples from before the gap to behind it
+    gap : its start and end, s of device time
+
+    """
+    level, change, spread = _compared(before, after, gap[1] - gap[0])
+    inside = way.between(*gap)
+    turned, unsure, most = _turned(inside, level[3:], change[3:], spread[3:])
+    if np.isnan(most):  # gravity leans as far as the device
+        most = _leant(inside, level[:3])
+    if not most < SMALL:
+        return 0.0
+    seen = np.concatenate([change[:3], turned])
+    noise = np.concatenate([spread[:3], unsure])
+    known = np.isfinite(seen) & np.isfinite(noise) & (noise > 0)
+    known[:3] &= known[:3].all()
+    if not known[0] and not known[3:].all():
+        return 0.0
+    lean = np.vstack([_crossed(np.nan_to_num(level[:3])), np.eye(3)])  # (1)
+    jump = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * JUMPED**2
+    logs = np.array(
+        [
+            np.log(p * q) + _log_density(seen, np.diag(noise) + turn + step, known)
+            for p, turn in (
+                (AS_BEFORE, np.zeros((6, 6))),
+                (1 - AS_BEFORE, TURNED**2 * lean @ lean.T),
+            )
+            for q, step in ((1 - JUMP, np.zeros((6, 6))), (JUMP, jump))
+        ]
+    )
+    weight = np.exp(logs - logs.max())
+    return float(weight[:2].sum() / weight.sum())  # (2)
+
+
+def _compared(
+    before: CellTable, after: CellTable, gap: float
+) -> tuple[Array, Array, Array]:
+    """Mean beside a gap of so many s, what it changes by, and the variance of that.
+
+    (6,) each, SI; of each channel over the time at which that is least, (3).
+    """
+    left, right = hold_last(before.means)[::-1], hold_last(after.means)
+    fewest = min(len(left), len(right))
+    both = np.vstack([left[::-1], right])
+    longer = LONGER * (len(both) > ENOUGH * 2 ** (LEVELS + LONGER - 1))
+    allan = quiet(both, levels=LEVELS + longer).allan
+    found = []
+    for k, a in enumerate(allan[: fewest.bit_length()]):
+        n = 2**k
+        apart = gap + n * CELL
+        drift = (_slope(right[: DRIFT * n]) - _slope(left[: DRIFT * n])) / 2
+        spread = 2 * a**2 * bias_of_flicker(1 + gap / (n * CELL))  # (3)
+        means = left[:n].mean(axis=0), right[:n].mean(axis=0)
+        found.append((*means, spread + (drift * apart) ** 2))
+    table = np.array(found)
+    best = np.argmin(table[:, 2], axis=0)
+    one, other, spread = table[best, :, np.arange(6)].T
+    coarse = np.maximum(before.rounding, after.rounding)
+    return before.origin + (one + other) / 2, other - one, spread + coarse**2 / 6
+
+
+def _slope(means: Array) -> Array:
+    """Slope of a line through means of cells (m, 6), away from the gap, SI/s."""
+    x = (np.arange(len(means)) - (len(means) - 1) / 2) * CELL
+    slope: Array = x @ means / (x @ x)
+    return slope
+
+
+def bias_of_flicker(r: float) -> float:
+    """B of (3), r > 1.
+
+    >>> round(bias_of_flicker(2.0), 3)
+    1.566
+    """
+    terms = (r + 1) ** 2 * log(r + 1) - 2 * r**2 * log(r)
+    return (terms + (r - 1) ** 2 * log(max(r - 1, 1e-9))) / (4 * log(2))
+
+
+def _turned(
+    way: Block, level: Array, change: Array, spread: Array
+) -> tuple[Array, Array, float]:
+    """What the gyroscopes turned by, (3,) rad, its variance, and the most on the way.
+
+    nan where they are missing.
+
+    Parameters
+    ----------
+    way : samples of the gap
+    level, change, spread : of the rates beside it, as `_compared` gives them
+
+    """
+    nothing = np.full(3, np.nan)
+    if len(way) < 2 or not np.isfinite(way.gyr).all():
+        return nothing, nothing, np.nan
+    step = np.diff(way.t)[:, None]
+    rate = way.gyr - level
+    angle = np.cumsum((rate[1:] + rate[:-1]) / 2 * step, axis=0)
+    most = float(np.linalg.norm(angle, axis=1).max())
+    order = min(QUICK, len(rate) - 1)
+    quick = np.diff(rate, order, axis=0) ** 2 / comb(2 * order, order)
+    drawn = len(rate) * float(np.median(step)) ** 2 * quick.mean(axis=0)
+    bias = float(way.t[-1] - way.t[0]) ** 2 * (spread / 4 + change**2 / 12)
+    return angle[-1], drawn + bias + (most**2 / 2) ** 2, most  # (4)
+
+
+def _leant(way: Block, force: Array) -> float:
+    """Largest angle on the way as gravity shows it, rad, by means over cells."""
+    whole = way.acc[np.isfinite(way.acc).all(axis=1)]
+    if not len(whole):
+        return np.nan
+    many = max(1, round(CELL * len(way) / float(np.ptp(way.t) or CELL)))
+    parts = np.array_split(whole, max(1, len(whole) // many))
+    off = np.array([part.mean(axis=0) - force for part in parts])
+    return float(np.linalg.norm(off, axis=1).max() / np.linalg.norm(force))
+
+
+def _crossed(v: Array) -> Array:
+    """[v]x, by which v x u = [v]x u."""
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _log_density(seen: Array, covariance: Array, known: NDArray[np.bool_]) -> float:
+    """Log of the normal density of what is known of some values."""
+    part = covariance[np.ix_(known, known)]
+    root = np.linalg.cholesky(part)
+    white = np.linalg.solve(root, seen[known])
+    return float(-np.log(root.diagonal()).sum() - white @ white / 2)

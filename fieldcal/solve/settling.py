@@ -107,10 +107,38 @@ def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
     values[gyr] = 0.0
     nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
     state = replace(state, scale=nominal)
-    for _ in range(FOLLOWED):
-        inference.followed(state, values)
+    state, values = _followed_first(inference, given, state, values)
+    for again in range(FOLLOWED):
+        if again:
+            inference.followed(state, values)
         before = state.scale
         state, values, _ = inference.settled(state, values, given.members)
         if np.abs(state.scale / before - 1).max() < NEAR:
             break
     return state, values
+
+
+def _followed_first(
+    inference: Inference, given: Given, state: State, values: Array
+) -> tuple[State, Array]:
+    """Follow the turns by the state that windows led to; back comes where to go on.
+
+    What windows leave open may be anywhere in that state, and gyroscopes then lead
+    elsewhere for no other reason. If they do so in fewer turns where everything is
+    nominal, those turns are what tells the rest.
+    """
+    astray = _astray(inference, state, values)
+    if not astray:
+        return state, values
+    nothing: Array = np.zeros(given.width)
+    if _astray(inference, inference.nominal, nothing) < astray:
+        state, values, _ = inference.settled(inference.nominal, nothing, given.members)
+        return state, values
+    inference.followed(state, values)
+    return state, values
+
+
+def _astray(inference: Inference, state: State, values: Array) -> int:
+    """In how many turns the gyroscopes lead elsewhere by a state."""
+    inference.followed(state, values)
+    return len(inference.turns.turning.contradicted) if inference.turns else 0

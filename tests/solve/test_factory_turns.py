@@ -100,3 +100,15 @@ def test_gyroscopes_are_right_beside_cross_coupling_that_is_only_counted(
         for n in names
     ]
     assert np.abs(pulls).max() < 3.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_few_positions_leave_open_does_not_contradict_the_turns(seed: int) -> None:
+    """Windows alone leave cross-coupling anywhere, and with it every attitude."""
+    whole, quarter = 2 * np.pi * np.eye(3), np.array([np.pi / 2, 0.0, 0.0])
+    device = Device(seed)
+    found = solved(device, [whole[1], whole[0], quarter, whole[2]], cross=True)
+    assert found.good
+    assert not any("another attitude" in said for said in found.warnings)
+    values, sigmas = found.vector("gyr_bias")
+    assert np.abs((values - device.bias) / sigmas).max() < 4

@@ -144,7 +144,8 @@ def _variants(d: Dictionary, group: Group) -> list[Group]:
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parts(d, effect) if part == group.part)
     if isinstance(effect, Motion) or len(whole) > AXES:
-        return at_points(d, group, [(group.shape, group.origin)])
+        one = replace(group, params=_in_axes_of(d, group))
+        return at_points(d, one, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
     grid = [own, *(point for point in points(d, effect) if point != own)]
     out = [
@@ -154,6 +155,21 @@ def _variants(d: Dictionary, group: Group) -> list[Group]:
         for some in combinations(whole, n)
     ]
     return sorted(out, key=lambda g: (g.params, g.shape) != (group.params, group.shape))
+
+
+def _in_axes_of(d: Dictionary, group: Group) -> tuple[int, ...]:
+    """Parameters of an effect in the axes that a given set has.
+
+    Where nobody knows how the device stood, these are the axes in which the parameters
+    that a turn of the device makes of others are zero. A search leaves such a turn to
+    the sizes of all of them; a mean of both has gyroscopes in no axes at all.
+    """
+    effect = group.effect
+    if effect is None or d.x.oriented.any():
+        return group.params
+    names = [p.name for p in effect.params]
+    same = [effect.turned_into.get(names[j], names[j]) for j in group.params]
+    return tuple(sorted({names.index(name) for name in same}))
 
 
 def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:

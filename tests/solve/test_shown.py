@@ -227,3 +227,26 @@ def test_points_stand_evenly_for_the_variants_of_every_cause() -> None:
     two = spread(3, 4)
     np.testing.assert_allclose(two[:, 1], (np.arange(4) * 2**0.5 + 0.125) % 1)
     np.testing.assert_allclose(two[:, 2], (np.arange(4) * 3**0.5 + 0.125) % 1)
+
+
+def test_cross_coupling_is_carried_in_the_axes_of_the_set() -> None:
+    """Where no orientation is known: k21, k31 and k32 are a turn of the device."""
+    rows = recording().rows
+    nowhere = np.full(len(rows.x), np.nan)
+    unknown = replace(rows.x, alpha=nowhere, beta=nowhere)
+    cause, group = next(
+        (c, c.variants[0]) for c in of_effects(given()) if c.name == "cross_coupling"
+    )
+    carried = {}
+    for x in (rows.x, unknown):
+        d = Given(
+            replace(rows, x=x), np.ones(6), recording().since, False, Wanted(),
+            [Shown(((cause, group),), 1.0)],
+        )  # fmt: skip
+        ((_, one),) = d.explanations[0].members
+        assert one.effect is not None
+        carried[bool(x.oriented.all())] = [
+            one.effect.params[j].name for j in one.params
+        ]
+    assert carried[False] == ["k12", "k13", "k23"]
+    assert carried[True] == ["k12", "k13", "k21", "k23", "k31", "k32"]

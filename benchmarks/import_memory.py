@@ -20,7 +20,7 @@ PIECE = 300 * RATE
 CHILD = """
 import sys
 from pathlib import Path
-from fieldcal.importing.ingest import import_stream
+from fieldcal.importing.session.ingest import import_stream
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
 names = ("t", "ax", "ay", "az", "gx", "gy", "gz")

@@ -22,8 +22,8 @@ from time import process_time
 from benchmarks._logs import COLUMNS, ROWS, Log, samples, write_all, write_tables
 from fieldcal.core.samples import Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.session.ingest import import_stream
 
 RUNS = 5
 GOAL = 1.5

@@ -22,8 +22,8 @@ from fieldcal.core.frames import angles_of
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
-from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.session.ingest import import_stream
 from fieldcal.session import description
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session

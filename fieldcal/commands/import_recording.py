@@ -19,12 +19,12 @@ from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
-    from fieldcal.importing.ingest import ImportedSession
     from fieldcal.importing.recording import (
         ImuStream,
         MeanScatter,
         Recording,
     )
+    from fieldcal.importing.session.ingest import ImportedSession
 
 RARE = (
     *(
@@ -111,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
-    from fieldcal.importing.merge import FilesInOrder, MergedFiles
+    from fieldcal.importing.session.merge import FilesInOrder, MergedFiles
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
@@ -146,7 +146,7 @@ def _say_together(files: Sequence[Path], imported: Sequence[ImportedSession]) ->
     """Say that files look like the positions, or the two sensors, of one IMU."""
     import numpy as np
 
-    from fieldcal.importing.gravity_size import are_means
+    from fieldcal.importing.units.gravity_size import are_means
 
     if len(files) == 2 and {one.facts.measured for one in imported} == {"a", "g"}:
         sys.stderr.write(
@@ -233,8 +233,8 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
 def _bring(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> ImportedSession:
-    from fieldcal.importing.ingest import import_stream
-    from fieldcal.importing.unit_guess import settle_units
+    from fieldcal.importing.session.ingest import import_stream
+    from fieldcal.importing.units.unit_guess import settle_units
     from fieldcal.session.units import UNSCALED
 
     name = recording.path.name.split(".")[0]
@@ -288,8 +288,8 @@ def _bring_means(
     scatter: MeanScatter,
 ) -> ImportedSession:
     """Make a session of a table of means."""
-    from fieldcal.importing.ingest import import_stream
-    from fieldcal.importing.means import tables_of_means
+    from fieldcal.importing.session.ingest import import_stream
+    from fieldcal.importing.tables.means import tables_of_means
 
     gravity = float(about["site"].get("gravity", G0))
     tables = tables_of_means(recording, stream.name, scatter, gravity, args.sigma)

@@ -16,7 +16,7 @@ from pathlib import Path
 from fieldcal.core.errors import InputError
 from fieldcal.core.plugins import class_in, names
 from fieldcal.drivers import codec
-from fieldcal.importing.gzip_stream import head
+from fieldcal.importing.files.gzip_stream import head
 from fieldcal.importing.recording import ReadOptions, Recording
 
 LAST = ("csv_like", "wire")

@@ -17,7 +17,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
-from fieldcal.importing.array_tables import (
+from fieldcal.importing.arrays.array_tables import (
     ROWS,
     WIDEST,
     ArrayTable,
@@ -30,12 +30,12 @@ from fieldcal.importing.array_tables import (
     numpy_tables,
     tables_of,
 )
-from fieldcal.importing.column_recording import ColumnRecording
-from fieldcal.importing.gzip_stream import head, on_disk
-from fieldcal.importing.heading import Heading
-from fieldcal.importing.matlab_objects import holds_objects, object_tables
-from fieldcal.importing.paired_tables import ArrayPairing, pairing
-from fieldcal.importing.said_rate import rate_of, scalars
+from fieldcal.importing.arrays.matlab_objects import holds_objects, object_tables
+from fieldcal.importing.arrays.paired_tables import ArrayPairing, pairing
+from fieldcal.importing.files.gzip_stream import head, on_disk
+from fieldcal.importing.headings.heading import Heading
+from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.times.said_rate import rate_of, scalars
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 

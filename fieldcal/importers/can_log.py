@@ -21,9 +21,9 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
-from fieldcal.importing.clock_text import ClockText
-from fieldcal.importing.gzip_stream import head, open_unpacked
+from fieldcal.importing.files.gzip_stream import head, open_unpacked
 from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.times.clock_text import ClockText
 
 if TYPE_CHECKING:
     from fieldcal.drivers.can_buses import Buses

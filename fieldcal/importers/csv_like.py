@@ -20,32 +20,32 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.codec import recognise
 from fieldcal.importing import columns
-from fieldcal.importing.column_recording import ColumnRecording
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.file_names import SENSOR, sensor_of
-from fieldcal.importing.heading import Column, Heading
-from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.instances import Instances, instances_in
-from fieldcal.importing.number_table import NumberTable
+from fieldcal.importing.files.text_encoding import is_plain, wide
+from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ReadOptions, Recording
-from fieldcal.importing.text_encoding import is_plain, wide
-from fieldcal.importing.text_form import TextForm
-from fieldcal.importing.text_forms import CLOCK, forms_of
-from fieldcal.importing.text_lines import (
+from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.text.instances import Instances, instances_in
+from fieldcal.importing.text.number_table import NumberTable
+from fieldcal.importing.text.text_form import TextForm
+from fieldcal.importing.text.text_forms import CLOCK, forms_of
+from fieldcal.importing.text.text_lines import (
     TOP,
     behind,
     split_lines,
     top_lines,
     width_of,
 )
-from fieldcal.importing.text_source import TextSource
-from fieldcal.importing.text_top import (
+from fieldcal.importing.text.text_source import TextSource
+from fieldcal.importing.text.text_top import (
     headings_above,
     numbers_of,
     rate_above,
     rows_begin,
     separator_of,
 )
+from fieldcal.importing.words.file_names import SENSOR, sensor_of
+from fieldcal.importing.words.heading_words import meaning
 
 WHAT = "text with columns"
 

@@ -19,7 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
 from fieldcal.drivers.mavlink_units import untruncated_mean
-from fieldcal.importing.dataflash_messages import (
+from fieldcal.importing.messages.dataflash_messages import (
     AXES,
     BODY,
     FMT,
@@ -28,8 +28,8 @@ from fieldcal.importing.dataflash_messages import (
     MARK,
     DataflashMessages,
 )
-from fieldcal.importing.fifo_time import Batch, FifoBatches
 from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.times.fifo_time import Batch, FifoBatches
 
 WHAT = "ArduPilot dataflash log, .bin"
 

@@ -21,12 +21,12 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.importers.arrays import ArrayFile
-from fieldcal.importing.array_tables import ArrayTable, table_of
-from fieldcal.importing.clock_text import is_clock
-from fieldcal.importing.json_lists import json_lists
-from fieldcal.importing.said_rate import scalars
-from fieldcal.importing.text_encoding import as_utf8
-from fieldcal.importing.text_form import MOSTLY
+from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
+from fieldcal.importing.files.text_encoding import as_utf8
+from fieldcal.importing.records.json_lists import json_lists
+from fieldcal.importing.text.text_form import MOSTLY
+from fieldcal.importing.times.clock_text import is_clock
+from fieldcal.importing.times.said_rate import scalars
 
 WHAT = "JSON: records or lists"
 

@@ -13,12 +13,12 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
-from fieldcal.importing.clock_text import ClockText, is_clock
-from fieldcal.importing.column_recording import ColumnRecording
-from fieldcal.importing.gzip_stream import on_disk
-from fieldcal.importing.heading import Column, Heading
-from fieldcal.importing.heading_words import meaning
+from fieldcal.importing.files.gzip_stream import on_disk
+from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ROWS
+from fieldcal.importing.tables.column_recording import ColumnRecording
+from fieldcal.importing.times.clock_text import ClockText, is_clock
+from fieldcal.importing.words.heading_words import meaning
 from fieldcal.session.arrow_columns import numbers
 
 WHAT = "Parquet and Arrow"

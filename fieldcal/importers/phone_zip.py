@@ -20,9 +20,9 @@ from fieldcal.core.samples import Block
 from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
-from fieldcal.importing.alignment import AlignedPair
-from fieldcal.importing.file_names import ACC, GYR
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
+from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.words.file_names import ACC, GYR
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
 

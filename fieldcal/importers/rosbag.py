@@ -16,9 +16,15 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.gzip_stream import head, on_disk
+from fieldcal.importing.files.gzip_stream import head, on_disk
+from fieldcal.importing.messages.ros_messages import (
+    IMU,
+    MANY,
+    TEMPERATURE,
+    block_of,
+    row_of,
+)
 from fieldcal.importing.recording import ImuStream, Recording
-from fieldcal.importing.ros_messages import IMU, MANY, TEMPERATURE, block_of, row_of
 
 WHAT = "ROS bags: .bag, .db3"
 

@@ -25,10 +25,10 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.mavlink_installed import PX4, Installed, names
-from fieldcal.importing.alignment import AlignedPair
-from fieldcal.importing.fifo_time import Fifo
+from fieldcal.importing.messages.ulog_messages import Table, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording
-from fieldcal.importing.ulog_messages import Table, UlogMessages
+from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.times.fifo_time import Fifo
 
 WHAT = "PX4 log, .ulg"
 

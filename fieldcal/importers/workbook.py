@@ -13,7 +13,7 @@ from typing import Any
 
 from fieldcal.core.errors import InputError
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.gzip_stream import PIECE, on_disk
+from fieldcal.importing.files.gzip_stream import PIECE, on_disk
 
 WHAT = "workbooks of spreadsheets"
 

@@ -10,8 +10,8 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.row_times import FRACTIONS, RowTimes
-from fieldcal.importing.scales import FEWEST
+from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
+from fieldcal.importing.units.scales import FEWEST
 from fieldcal.session.text_files import COLUMNS
 
 SKIP = "_"

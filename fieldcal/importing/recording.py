@@ -19,7 +19,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.gzip_stream import PIECE, pieces
+from fieldcal.importing.files.gzip_stream import PIECE, pieces
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 ROWS = 1 << 15

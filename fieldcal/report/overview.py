@@ -14,7 +14,7 @@ from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.samples import Block as SampleBlock
-from fieldcal.importing.stream_facts import StreamFacts
+from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.model import thresholds
 from fieldcal.report.blocks import (
     Block,

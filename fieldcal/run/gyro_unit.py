@@ -12,9 +12,9 @@ from collections import deque
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.gravity_size import Gravity
-from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.scales import GYR_OUT, GYR_SCALES, fitting
+from fieldcal.importing.units.gravity_size import Gravity
+from fieldcal.importing.units.rate_size import rate_in
+from fieldcal.importing.units.scales import GYR_OUT, GYR_SCALES, fitting
 
 PART = 0.05
 """Device time of which one mean is kept, s."""

@@ -9,8 +9,8 @@ import pytest
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.calm_rates import DEG, RAD, calm_rates
-from fieldcal.importing.rate_size import TurnsShown
+from fieldcal.importing.units.calm_rates import DEG, RAD, calm_rates
+from fieldcal.importing.units.rate_size import TurnsShown
 from fieldcal.session.folder import Session
 
 G, RATE = 9.80665, 100.0

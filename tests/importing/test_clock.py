@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.stream_facts import StreamFacts
+from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.session.clock import SteadyClock
 from fieldcal.session.folder import Session
 

@@ -16,7 +16,7 @@ from small_files import SMALL, Small, whole
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.gzip_stream import pieces
+from fieldcal.importing.files.gzip_stream import pieces
 from fieldcal.session.folder import Session
 
 NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook")

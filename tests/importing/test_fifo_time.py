@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.fifo_time import Fifo
+from fieldcal.importing.times.fifo_time import Fifo
 from fieldcal.session.folder import Session
 
 FIFO = (

@@ -14,10 +14,10 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.heading import Column
-from fieldcal.importing.heading_words import meaning
-from fieldcal.importing.headings import read
+from fieldcal.importing.headings.heading import Column
+from fieldcal.importing.headings.headings import read
 from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.words.heading_words import meaning
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])
 """Milliseconds, g, deg/s."""

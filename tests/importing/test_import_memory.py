@@ -11,10 +11,10 @@ import pytest
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.ingest import import_stream
+from fieldcal.importing.files.spool import IN_MEMORY, SpooledRows
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
-from fieldcal.importing.spool import IN_MEMORY, SpooledRows
-from fieldcal.importing.validation import RowValidator
+from fieldcal.importing.session.ingest import import_stream
+from fieldcal.importing.session.validation import RowValidator
 from fieldcal.session.folder import Session
 from fieldcal.windows import still_stretches
 

@@ -21,9 +21,9 @@ from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
-from fieldcal.importing.ingest import import_stream
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.validation import RowValidator
+from fieldcal.importing.session.ingest import import_stream
+from fieldcal.importing.session.validation import RowValidator
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import findings

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.json_lists import json_lists
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.records.json_lists import json_lists
 
 ROWS = 60
 T = np.arange(ROWS) / 50

@@ -12,10 +12,10 @@ from laid_about import G, write
 from fieldcal.cli import main
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.importing.gravity_size import are_means
-from fieldcal.importing.heading import Column
-from fieldcal.importing.headings import read
-from fieldcal.importing.means import spread
+from fieldcal.importing.headings.heading import Column
+from fieldcal.importing.headings.headings import read
+from fieldcal.importing.tables.means import spread
+from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.session.folder import Session
 
 BIAS, RATE = np.array([0.1, -0.05, 0.2]), np.array([0.01, -0.02, 0.005])

@@ -11,8 +11,8 @@ from laid_about import turned
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.array_tables import tables_of
-from fieldcal.importing.paired_tables import pairing
+from fieldcal.importing.arrays.array_tables import tables_of
+from fieldcal.importing.arrays.paired_tables import pairing
 from fieldcal.session.folder import Session
 
 Arrays = dict[str, Array]

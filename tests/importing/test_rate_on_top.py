@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from laid_about import turned, write
 
 from fieldcal.cli import main
-from fieldcal.importing import rate_on_top
-from fieldcal.importing.rate_on_top import RateOnTop
+from fieldcal.importing.text import rate_on_top
+from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.session.folder import Session
 
 BEGAN = 1.7e9

@@ -14,8 +14,8 @@ from laid_about import turned
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing import receiver_lines
-from fieldcal.importing.receiver_lines import ReceiverLines
+from fieldcal.importing.text import receiver_lines
+from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.session.folder import Session
 
 RATE = 50.0

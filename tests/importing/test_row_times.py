@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import ReadOptions, RowBatch
-from fieldcal.importing.row_times import BETWEEN, RowTimes, SpreadTimes
+from fieldcal.importing.times.row_times import BETWEEN, RowTimes, SpreadTimes
 
 EACH, STEP = 10, 0.1
 """Rows of a batch, and s from one to the next."""

@@ -19,12 +19,12 @@ from small_files import write_workbook
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.cell_forms import HexCells, ListCells
-from fieldcal.importing.column_physics import is_direction
 from fieldcal.importing.columns import wrapped
-from fieldcal.importing.line_forms import EchoedMessages
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.row_times import RowTimes
+from fieldcal.importing.tables.column_physics import is_direction
+from fieldcal.importing.text.cell_forms import HexCells, ListCells
+from fieldcal.importing.text.line_forms import EchoedMessages
+from fieldcal.importing.times.row_times import RowTimes
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)

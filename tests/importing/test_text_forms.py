@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
-from fieldcal.importing.clock_text import ClockText, is_clock
-from fieldcal.importing.labels import labelled_values
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.text_forms import forms_of
+from fieldcal.importing.text.labels import labelled_values
+from fieldcal.importing.text.text_forms import forms_of
+from fieldcal.importing.times.clock_text import ClockText, is_clock
 
 BEGAN = datetime(2024, 5, 3, 23, 59, 58)
 RATE, ROWS = 20.0, 80

@@ -6,9 +6,9 @@ from laid_about import G, turned
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.gravity_size import Gravity
-from fieldcal.importing.rate_size import rate_in
-from fieldcal.importing.turn_closure import closing_scale
+from fieldcal.importing.units.gravity_size import Gravity
+from fieldcal.importing.units.rate_size import rate_in
+from fieldcal.importing.units.turn_closure import closing_scale
 
 RATE = 100.0
 KNOWN = Gravity(G, np.zeros(3), True)

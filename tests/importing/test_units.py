@@ -12,7 +12,7 @@ from laid_about import turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.gravity_size import gravity_in
+from fieldcal.importing.units.gravity_size import gravity_in
 from fieldcal.session.folder import Session
 
 G = 9.80665

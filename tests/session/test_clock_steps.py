@@ -11,7 +11,7 @@ from laid_about import turned
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.importing.validation import SampleWriter
+from fieldcal.importing.session.validation import SampleWriter
 from fieldcal.session.clock import SteadyClock, steadied
 from fieldcal.session.folder import Session
 

@@ -1,0 +1,1 @@
+"""Arrays with names: MATLAB, HDF5, NumPy."""

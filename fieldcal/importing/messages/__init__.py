@@ -1,0 +1,1 @@
+"""Messages of logs that programs write: dataflash, MCAP, ROS, ULog."""

@@ -1,0 +1,141 @@
+"""Lists of numbers in a JSON document, each with the name of what it lies in.
+
+A list of records becomes a list for each of their fields: ``{"acc": {"x": 1}}`` gives
+``acc_x``, three numbers in a list are axes, and texts that are times of a clock become
+seconds. Records that hold several samples each say when the first of them was taken;
+the others lie evenly until the next record begins. Where the texts or the fields of
+records differ, such as the name of a sensor, each kind has lists of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.records.json_record import (
+    DEEPEST,
+    JsonRecord,
+    floats,
+    is_number,
+    record,
+    side_by_side,
+)
+from fieldcal.importing.records.record_pairs import paired
+from fieldcal.importing.times.clock_text import ClockText
+from fieldcal.importing.words.heading_words import meaning
+
+
+def json_lists(
+    document: Any, name: str = "", says: list[str] | None = None
+) -> Iterator[tuple[str, Array]]:
+    """Lists (n,) or (n, k) of a document, with their names.
+
+    Parameters
+    ----------
+    document, name : and what it lies in
+    says : grows by what the user must know, a sentence each
+
+    >>> [(n, v.tolist()) for n, v in json_lists([{"t": 0, "a": {"x": 1}}, {"t": 1}])]
+    [('t', [0.0, 1.0]), ('a_x', [1.0, nan])]
+    """
+    if isinstance(document, Mapping):
+        for key, value in document.items():
+            if name.count("/") < DEEPEST:
+                full = f"{name}/{key}" if name else key
+                yield from json_lists(value, full or "value", says)
+    elif not isinstance(document, list) or len(document) <= 1:
+        return
+    elif all(is_number(one) for one in document):
+        yield name or "list", floats(document)
+    elif all(isinstance(one, list) for one in document):
+        if len({len(one) for one in document}) == 1 and document[0]:
+            rows = [floats(one) for one in document if all(map(is_number, one))]
+            if len(rows) == len(document):
+                yield name or "list", np.array(rows)
+    else:
+        records = [record(one) for one in document if isinstance(one, Mapping)]
+        for bare, values in _fields(records, [] if says is None else says):
+            yield (f"{name}/{bare}" if name else bare), values
+
+
+def _fields(
+    records: Sequence[JsonRecord], says: list[str]
+) -> Iterator[tuple[str, Array]]:
+    """Values of each field, (n,), with the kind of its records before its name."""
+    kinds = {kind: _lists(alike) for kind, alike in _kinds(records).items()}
+    if len(kinds) > 1 and (pair := paired(kinds)) is not None:
+        says.append(
+            f"of its records, those of {pair.acc} are taken, each with the nearest of"
+            f" {pair.gyr}"
+        )
+        yield from pair.fields.items()
+        return
+    for prefix, fields in kinds.items():
+        for key, values in fields.items():
+            yield (f"{prefix}_{key}" if prefix else key), values
+
+
+def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
+    """Records that are alike, by the texts in which they differ from others."""
+    names = {name for one in records for name in one.texts}
+    differ = [
+        name
+        for name in sorted(names)
+        if 1 < len({one.texts.get(name) for one in records}) <= len(records) / 2
+    ]
+    found: dict[str, list[JsonRecord]] = {}
+    for one in records:
+        said = [one.texts.get(n, "") for n in differ]
+        found.setdefault("_".join(filter(None, said)), []).append(one)
+    return found
+
+
+def _lists(records: Sequence[JsonRecord]) -> dict[str, Array]:
+    """Values of each field, (n,), in the order of the records."""
+    records = side_by_side(records)
+    if any(one.samples for one in records):
+        return _of_samples([one for one in records if one.samples])
+    found = {
+        name: np.array([one.numbers.get(name, np.nan) for one in records])
+        for name in dict.fromkeys(name for one in records for name in one.numbers)
+    }
+    return found | {
+        f"utc {name} [s]": _seconds([one.clocks.get(name, "") for one in records])
+        for name in dict.fromkeys(name for one in records for name in one.clocks)
+    }
+
+
+def _seconds(texts: Sequence[str]) -> Array:
+    clock = ClockText()
+    read = (clock.seconds(text) for text in texts)
+    return np.array([np.nan if since is None else since for since in read])
+
+
+def _of_samples(records: Sequence[JsonRecord]) -> dict[str, Array]:
+    """Values of each field of samples, several of which a record holds."""
+    many = [min(len(inner) for inner in one.samples.values()) for one in records]
+    bare = [one._replace(samples={}) for one in records]
+    whole = [
+        record({name: inner[i] for name, inner in one.samples.items()})
+        for one, m in zip(records, many, strict=True)
+        for i in range(m)
+    ]
+    found = _lists(whole) if not any(one.samples for one in whole) else {}
+    for name, values in _lists(bare).items():
+        said = meaning(name)
+        is_time = said is not None and said.kind == "t"
+        spread = _evenly(values, many) if is_time else np.repeat(values, many)
+        found[name] = spread
+    return found
+
+
+def _evenly(begins: Array, many: Sequence[int]) -> Array:
+    """Times of samples that lie evenly from the beginning of a record to the next."""
+    steps = [b - a for a, b in pairwise(begins)] or [0.0]
+    last = steps[-1] * many[-1] / max(many[-2] if len(many) > 1 else 1, 1)
+    parts = zip(begins, [*steps[: len(begins) - 1], last], many, strict=True)
+    return np.concatenate([b + s * np.arange(m) / m for b, s, m in parts])

@@ -1,0 +1,1 @@
+"""From samples to a session folder: validated, merged, written whole."""

@@ -1,0 +1,217 @@
+"""Writes a session folder from one stream of a recording, atomically."""
+
+from __future__ import annotations
+
+import glob
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import time
+from typing import Any
+
+from fieldcal.core.errors import InputError, SessionError, disk_says
+from fieldcal.core.samples import Array, Block, too_quick
+from fieldcal.importing.files.spool import SpooledRows
+from fieldcal.importing.recording import Recording
+from fieldcal.importing.session.found_rests import rests_of
+from fieldcal.importing.session.stream_facts import StreamFacts
+from fieldcal.importing.session.validation import RowValidator, SampleWriter, digest
+from fieldcal.session.clock import ClockStep, SteadyClock
+from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.lock import SessionLock
+from fieldcal.session.marks import MARKS, mark_line
+from fieldcal.windows.cells import Cells
+from fieldcal.windows.jumps import Jumps
+from fieldcal.windows.knocks import Rest
+from fieldcal.windows.spikes import without_spikes
+from fieldcal.windows.stretches import summary
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedSession:
+    """A session folder that an import wrote.
+
+    Attributes
+    ----------
+    folder : where
+    facts : what was found
+    rests : where the device was still, s of device time
+    says : what the user must know, repairs first
+    forces : (m, 3) means of the accelerometers in these rests, m/s^2
+
+    """
+
+    folder: Path
+    facts: StreamFacts
+    rests: list[Rest]
+    says: list[str]
+    forces: Array
+
+
+def import_stream(
+    recording: Recording,
+    stream: str,
+    folder: Path,
+    about: Mapping[str, Any],
+    still: float,
+) -> ImportedSession:
+    """Make a session of one stream.
+
+    Parameters
+    ----------
+    recording, stream : what is imported
+    folder : made new, or empty
+    about : tables of session.toml but the positions
+    still : shortest still stretch that counts as a position, s
+
+    Raises
+    ------
+    InputError
+        If the recording cannot be used; names file, row and column.
+    SessionError
+        If the folder cannot be written.
+
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty; name another folder with -o")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        removed = remove_broken_off(folder)
+        part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+        held = SessionLock(part)
+        try:
+            made = _fill(part, recording, stream, about, still)
+            held.release()
+            part.chmod(0o755)
+            _settle(*part.iterdir(), part)
+            part.replace(folder)
+            _settle(folder.parent)
+        except BaseException:
+            held.release()
+            shutil.rmtree(part, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise SessionError(
+            f"{folder}: cannot be written: {disk_says(error)}"
+        ) from error
+    return replace(made, folder=folder, says=[*removed, *made.says])
+
+
+def remove_broken_off(folder: Path) -> list[str]:
+    """Remove what imports into this folder left that were killed, a sentence each.
+
+    An import that still runs holds a lock of its own.
+    """
+    said = []
+    for part in sorted(folder.parent.glob(f".{glob.escape(folder.name)}.????????")):
+        try:
+            SessionLock(part).release()
+        except (SessionError, OSError):
+            continue
+        shutil.rmtree(part, ignore_errors=True)
+        said.append(f"{part.name}, left by an import that was killed, is removed")
+    return said
+
+
+def _settle(*paths: Path) -> None:
+    """See files and folders onto the disk: a power cut must leave no empty ones."""
+    for path in paths if os.name == "posix" else ():
+        there = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(there)
+        finally:
+            os.close(there)
+
+
+def _fill(
+    part: Path,
+    recording: Recording,
+    stream: str,
+    about: Mapping[str, Any],
+    still: float,
+) -> ImportedSession:
+    import tomlkit
+
+    judge = RowValidator(str(recording.path), recording.place, recording.repair)
+    facts, cells, clock, jumps = StreamFacts(), Cells(), SteadyClock(), Jumps()
+    with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
+        for block in _steadied(clock, recording.blocks(stream)):
+            good = judge.good(block)
+            if len(good):
+                facts.add(good)
+                cells.add(without_spikes(good))
+                if recording.wanted.rate_hz:
+                    jumps.add(good)
+                rows.add(summary(cells.take_complete()))
+                written.add(good)
+        _refuse_useless(recording, facts)
+        facts.left_out = judge.left_out
+        written.close()
+        found = rests_of(jumps, rows, cells.table, written.between, still)
+    # an empty list would be in the way of the tables that the user adds
+    given = not found.rests or "position" in about
+    tables = {} if given else {"position": found.positions}
+    text = tomlkit.dumps({**about, **tables})
+    (part / DESCRIPTION).write_text(text, encoding="utf-8")
+    recording.says += [said for said in (found.how, found.left_out) if said]
+    recording.says += [step.sentence() for step in clock.steps]
+    repairs = [*recording.mended, *judge.mended]
+    marks = _marks(recording, stream, facts, repairs, clock.steps)
+    marks += "".join(map(mark_line, found.marks))
+    (part / MARKS).write_text(marks, "utf-8")
+    none = [found.none] if found.none else []
+    rests, forces = found.rests, found.forces
+    return ImportedSession(
+        part, facts, rests, [*repairs, *recording.says, *none], forces
+    )
+
+
+def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
+    """Raise InputError if nothing can come of these rows."""
+    if not facts.rows:
+        raise InputError(f"{recording.path}: has no row that can be used")
+    if not facts.measured:
+        raise InputError(
+            f"{recording.path}: has no number of an accelerometer or gyroscope in"
+            f" {facts.rows} rows; name its columns with --columns"
+        )
+    if said := too_quick(facts.rate_hz):
+        raise InputError(f"{recording.path}: {said}")
+
+
+def _steadied(clock: SteadyClock, blocks: Iterable[Block]) -> Iterator[Block]:
+    """Blocks without the steps of the device's clock."""
+    for block in blocks:
+        yield clock.add(block)
+    yield clock.rest()
+
+
+def _marks(
+    recording: Recording,
+    stream: str,
+    facts: StreamFacts,
+    repairs: list[str],
+    steps: list[ClockStep],
+) -> str:
+    """What is kept of where the samples come from."""
+    now = round(time(), 3)
+    imported = {
+        "event": "imported",
+        "files": [digest(path) for path in recording.files()],
+        "format": type(recording.parts[0]).__module__.rpartition(".")[2],
+        "stream": stream,
+        **facts.table(),
+        "repairs": repairs,
+        "says": recording.says,
+        "host_s": now,
+    }
+    notes = dict(recording.notes(stream))
+    grain = notes.pop("grain", None)
+    marks = [imported, {"event": "device", **notes, "host_s": now}]
+    if grain is not None:
+        marks.append({"event": "grain", **grain, "host_s": now})
+    marks += [{"event": "clock_step", **s._asdict(), "host_s": now} for s in steps]
+    return "".join(mark_line(mark) for mark in marks)

@@ -1,0 +1,1 @@
+"""A recording in columns: what each is, its times, and tables of means."""

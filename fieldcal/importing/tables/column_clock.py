@@ -1,0 +1,257 @@
+"""What the times and counts of a file in columns are, by its first rows and its words.
+
+A clock may lie in two columns, hold hours and minutes in one number, or count ticks or
+rows; the file may say its rate. What only the user can know is asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+from fieldcal.importing import columns
+from fieldcal.importing.headings.heading import Heading
+from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
+from fieldcal.importing.tables.column_times import (
+    batches,
+    counted_question,
+    counts_rows,
+    is_clock_number,
+    rate_hint,
+    shared_question,
+    split_seconds,
+)
+from fieldcal.importing.times.row_times import FRACTIONS
+from fieldcal.importing.units.gravity_size import are_means
+from fieldcal.importing.units.time_units import (
+    NEAR,
+    TICKED,
+    counts_from_long_ago,
+    shared_times,
+    unit_by_rate,
+    unit_nearest,
+    unit_of_ticks,
+)
+from fieldcal.importing.words.heading_words import meaning
+
+TICK = "fine"
+"""Part of the name of times that count ticks: ``SampleTimeFine``."""
+
+
+BOSCH = ("sensortime", "39.0625us")
+"""Name of the counter of sensors by Bosch, and what it counts."""
+
+
+class ColumnSource(Protocol):
+    """A file of columns, as far as it tells its times.
+
+    Attributes
+    ----------
+    path, says, guessed : as of a recording
+
+    """
+
+    path: Path
+    says: list[str]
+    guessed: dict[str, str]
+
+    def heading(self) -> list[Heading]:
+        """What may be read as names of its columns."""
+
+    def beginning(self) -> Array:
+        """Numbers of the first rows, (n, k)."""
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Rate that the file says, and where."""
+
+
+class ColumnClock:
+    """Finds what the times of one IMU are.
+
+    Parameters
+    ----------
+    source : the file
+    wanted : options of one IMU
+    own : whether the columns are those that the file says
+
+    """
+
+    def __init__(self, source: ColumnSource, wanted: ReadOptions, own: bool) -> None:
+        self._of, self._wanted, self._own = source, wanted, own
+
+    @property
+    def settled(self) -> ReadOptions:
+        """Options with the columns and the unit of its times, or its rate.
+
+        Raises
+        ------
+        InputError
+            If its times do not say when a row was taken.
+
+        """
+        wanted = self._clocked(self._wanted) if self._own else self._wanted
+        return self._signed(self._rated(wanted))
+
+    def _clocked(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with both columns of a clock that has its seconds in one of them."""
+        table, at = self._of.beginning(), numbers_of(self._of, wanted)
+        own = [at[name] for name in ("t", "dt") if name in at]
+        wholes = own or [i for i in range(table.shape[1]) if i not in at.values()]
+        split = split_seconds(table, wholes)
+        if split is None or wanted.rate_hz:
+            return wanted
+        named = [c for c in wanted.columns]
+        places = [c.place for way in self._of.heading() for c in way.columns]
+        for i, name in ((split.whole, "t"), (split.fraction, split.name)):
+            if len(named) == table.shape[1] and not any("=" in c for c in named):
+                named[i] = name
+            elif f"{name}={places[i]}" not in named:
+                named = [*(c for c in named if not c.endswith(f"={places[i]}")),
+                         f"{name}={places[i]}"]  # fmt: skip
+        self._of.says.append(
+            "its clock has whole seconds and what is beyond them apart"
+        )
+        return replace(wanted, columns=tuple(named), time_unit="s")
+
+    def _rated(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the rate that the file says, or with the unit of its times."""
+        if columns.has_time(wanted.columns):
+            return self._ticked(wanted)
+        if wanted.rate_hz:
+            return wanted
+        said = self._of.rate_said()
+        if said is None:
+            at = numbers_of(self._of, wanted)
+            three = [at[c] for c in ("ax", "ay", "az") if c in at]
+            table = (
+                self._of.beginning() if len(three) == len("xyz") else np.empty((0, 0))
+            )
+            means = len(table) and are_means(table[:, three])
+            # of means nobody knows when: they are counted
+            return replace(wanted, rate_hz=1.0) if means else wanted
+        rate, where = said
+        sentence = f"it says the rate: {where!r}"
+        self._of.says += [sentence] if sentence not in self._of.says else []
+        return replace(wanted, rate_hz=rate)
+
+    def _ticked(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the unit of times, where the rate or their name tells it.
+
+        Raises
+        ------
+        InputError
+            If its times are too coarse to say when a row was taken.
+
+        """
+        table, at = self._of.beginning(), numbers_of(self._of, wanted).get("t", -1)
+        if not 0 <= at < table.shape[1]:
+            return wanted
+        t = table[:, at]
+        both = any(name in numbers_of(self._of, wanted) for name in FRACTIONS)
+        if not both and (shared := shared_times(t)) is not None:
+            spread = batches(wanted, shared, t)
+            if spread is not None:
+                return self._said(spread)
+            if shared.equal:
+                asks = shared_question(wanted, shared, t)
+                raise InputError(f"{self._of.path}: {asks}")
+        if wanted.time_unit:
+            return wanted
+        if is_clock_number(t):
+            self._of.guessed["time"] = (
+                f"{CLOCK_NUMBER}: no second of a minute is beyond 60"
+            )
+            return replace(wanted, time_unit=CLOCK_NUMBER)
+        if counts_from_long_ago(t):
+            self._of.guessed["time"] = f"{TICKED}, as Windows and .NET count them"
+            return replace(wanted, time_unit=TICKED)
+        said = self._of.rate_said()
+        if self._own and said is None and counts_rows(t):
+            raise InputError(f"{self._of.path}: {counted_question(wanted, table)}")
+        if wanted.rate_hz:
+            return self._beside_rate(wanted, wanted.rate_hz, t)
+        names = [c.name for way in self._of.heading() for c in way.columns[at : at + 1]]
+        unit, why = "", "its name says ticks"
+        if said is not None:
+            unit, why = unit_by_rate(t, said[0]), f"it says the rate: {said[1]!r}"
+        elif any(TICK in name.lower() for name in names):
+            unit = unit_of_ticks(t)
+        elif any(BOSCH[0] in name.lower() for name in names):
+            unit, why = BOSCH[1], "its name is that of Bosch's counter"
+        if unit in ("", "s"):
+            return wanted
+        self._of.guessed["time"] = f"{unit}: {why}"
+        return replace(wanted, time_unit=unit)
+
+    def _beside_rate(self, wanted: ReadOptions, rate: float, t: Array) -> ReadOptions:
+        """Options with the unit of times (n,) that a rate beside them tells."""
+        unit, makes = unit_nearest(t, rate)
+        if not unit:
+            raise InputError(
+                f"{self._of.path}: its times make {rate:g} Hz in no unit: leave --rate"
+                " out, or name the columns with _ for that of the times"
+            )
+        if unit != "s":
+            self._of.guessed["time"] = f"{unit}: you say {rate:g} Hz"
+        if abs(np.log(makes / rate)) > NEAR:
+            self._of.says.append(
+                f"its times make {makes:.4g} Hz, not {rate:g} Hz as you say: they are"
+                " taken"
+            )
+        return replace(wanted, time_unit=unit, rate_hz=None)
+
+    def _said(self, spread: ReadOptions) -> ReadOptions:
+        """Options by which rows of one batch do not all have its time, and say so."""
+        if batch := spread.batch:
+            self._of.guessed["time"] = (
+                f"{spread.time_unit}, of {batch.rows:.0f} rows that come together each"
+                f" {batch.seconds:.3g} s: they are spread evenly,"
+                f" {batch.rows / batch.seconds:.4g} Hz"
+            )
+        return spread
+
+    def _signed(self, wanted: ReadOptions) -> ReadOptions:
+        """Options with the kinds of channel whose sign was not read."""
+        table, at = self._of.beginning(), numbers_of(self._of, wanted)
+        threes = {k: [at[k + x] for x in "xyz" if k + x in at] for k in "ag"}
+        found = {kind for kind, three in threes.items()
+                 if three and max(three) < table.shape[1]
+                 and columns.are_unsigned(table[:, three])}  # fmt: skip
+        if found:
+            self._of.guessed["counts"] = "of 16 bits with a sign: 65535 is -1"
+        return replace(wanted, unsigned=frozenset(found))
+
+
+def numbers_of(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
+    """Number of each channel's column among those of `beginning`."""
+    names = [c.partition("=") for c in wanted.columns]
+    if not any(place for _, _, place in names):
+        return {name: i for i, (name, _, _) in enumerate(names)}
+    places = [c.place for way in source.heading() for c in way.columns]
+    return {n: places.index(p) for n, _, p in names if p in places}
+
+
+def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
+    """Ask for the rate where no column is the time.
+
+    Raises
+    ------
+    InputError
+        With what the turns say of it.
+
+    """
+    if columns.has_time(wanted.columns) or wanted.rate_hz or not wanted.columns:
+        return
+    table = source.beginning()
+    names = [c.name for way in source.heading() for c in way.columns][: table.shape[1]]
+    said = {name: i for i, name in enumerate(names)
+            if (one := meaning(name)) is not None and one.kind == "t"}  # fmt: skip
+    rows = next((name for name, i in said.items() if counts_rows(table[:, i])), "")
+    why = f"its {rows} only counts rows" if rows else "no column is t, the time"
+    hint = rate_hint(wanted, table)
+    raise InputError(f"{source.path}: {why}: give the rate, e.g. --rate {hint}")

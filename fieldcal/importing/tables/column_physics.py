@@ -1,0 +1,254 @@
+"""Columns that no name tells, told by the physics of what they hold.
+
+Time only grows. Of two sets of three axes, one is the specific force and the other the
+rate of turn if at rest the first has the length of gravity in a usual unit, and turns
+in device axes as the second says. A magnetometer's field turns likewise, but has not
+that length.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
+from fieldcal.importing.units.gravity_size import (
+    FEWEST_MEANS,
+    Gravity,
+    are_means,
+    gravity_in,
+)
+from fieldcal.importing.units.rate_size import rate_in
+from fieldcal.importing.units.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting, gains
+from fieldcal.importing.units.time_units import step_of
+
+GROWS = 0.999
+"""Share of steps of a time that are positive: a line may be damaged."""
+
+EACH = "xyz"
+
+NOISY = 0.1
+"""Part of gravity that its own noise is not."""
+
+EXACT = 5e-5
+"""Part by which a direction's length differs: a sensor has scatter and bias."""
+
+LEAST_COUNTS = 1000.0
+"""Counts in a g by which an accelerometer is told without turns."""
+
+Three = tuple[int, int, int]
+
+
+class Told(NamedTuple):
+    """What numbers tell of columns.
+
+    Attributes
+    ----------
+    channels : by the number of the column
+    why : the reason, as it goes on behind "taken as"
+
+    """
+
+    channels: Mapping[int, str]
+    why: str
+
+
+def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told | None:
+    """Say which columns are time, specific force and rate; None where none is found.
+
+    Parameters
+    ----------
+    table : (n, k) nan where a cell is no number
+    names : (k) over the columns, or nothing
+    known : channels that are named, by column
+
+    """
+    if len(table) < FEWEST_MEANS:
+        return None
+    channels = dict(known)
+    times = [i for i in _growing(table) if i not in known]
+    if "t" not in channels.values():
+        clocks = [i for i in times if not _counts(table[:, i])]
+        if clocks:
+            # a thermometer may only grow as well, but the time stands first
+            channels[clocks[0]] = "t"
+    t = next((i for i, name in channels.items() if name == "t"), None)
+    clock: Array = np.arange(len(table), dtype=float) if t is None else table[:, t]
+    free = [i for i in range(table.shape[1]) if i not in {*known, *times}]
+    acc = _named(known, "a")
+    gyr = _named(known, "g")
+    threes = _threes([i for i in free if _moves(table[:, i])], names)
+    found = _pair(table, clock, [acc] if acc else threes, [gyr] if gyr else threes)
+    if found is None:
+        return None
+    (acc, gyr), why = found
+    for kind, three in (("a", acc), ("g", gyr)):
+        if three is not None:
+            channels |= {i: kind + axis for i, axis in zip(three, EACH, strict=True)}
+    if all(known.get(i) == name for i, name in channels.items()):
+        return None
+    return Told(channels, why)
+
+
+def directions(table: Array) -> list[Three]:
+    """Columns side by side that are a direction: calculated, such as of gravity."""
+    free = [i for i in range(table.shape[1]) if _moves(table[:, i])]
+    beside = [(a, a + 1, a + 2) for a in free if {a + 1, a + 2} <= set(free)]
+    return [three for three in beside if is_direction(table[:, list(three)])]
+
+
+def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
+    """Columns that move and may be three axes, beside those that are known."""
+    if len(table) < FEWEST or table.shape[1] != len(names):
+        return []
+    without = {*known, *_growing(table)}
+    free = [i for i in range(table.shape[1]) if i not in without]
+    return _threes([i for i in free if _moves(table[:, i])], names)
+
+
+def _growing(table: Array) -> list[int]:
+    """Columns that only grow."""
+    found = []
+    for i in range(table.shape[1]):
+        column = table[:, i]
+        steps = np.diff(column[np.isfinite(column)])
+        if len(steps) > len(table) / 2 and (steps > 0).mean() >= GROWS:
+            found.append(i)
+    return found
+
+
+def _counts(column: Array) -> bool:
+    """Whether a column counts rows."""
+    steps = np.diff(column[np.isfinite(column)])
+    return bool((steps == 1).mean() > GROWS)
+
+
+def _moves(column: Array) -> bool:
+    known = column[np.isfinite(column)]
+    return len(known) > len(column) / 2 and float(np.ptp(known)) > 0
+
+
+def _named(known: Mapping[int, str], kind: str) -> Three | None:
+    where = {name: i for i, name in known.items()}
+    if not all(kind + axis in where for axis in EACH):
+        return None
+    x, y, z = (where[kind + axis] for axis in EACH)
+    return x, y, z
+
+
+def _threes(free: Sequence[int], names: Sequence[str]) -> list[Three]:
+    """Columns that may be three axes: by what their names share, or side by side."""
+    stems: dict[str, dict[str, int]] = {}
+    for i in free:
+        if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
+            stem = f"{matched.group(1)}|{matched.group(3)}"
+            stems.setdefault(stem, {})[matched.group(2)] = i
+    whole = [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
+    if whole and len({names[i] for i in free}) == len(free):
+        return whole
+    beside = zip(free, free[1:], free[2:], strict=False)
+    side = [(a, b, c) for a, b, c in beside if c == a + 2]
+    parted = len(free) % len(EACH) == 0 and len(side) == len(free) - len(EACH) + 1
+    return side[:: len(EACH)] if parted else side
+
+
+def _pair(
+    table: Array, clock: Array, forces: Sequence[Three], rates: Sequence[Three]
+) -> tuple[tuple[Three, Three | None], str] | None:
+    """Specific force and rate among sets of axes, and why."""
+    sizes = {three: _gravity(table, three) for three in forces}
+    usual = [three for three in forces if sizes[three] is not None]
+    if not usual and (step := step_of(clock)):
+        # no force, but what velocity and angle gained since the row before
+        sizes = {three: _gravity(table, three, step) for three in forces}
+        usual = [three for three in forces if sizes[three] is not None]
+    # a sphere through rests in many directions is no accident
+    usual = [three for three in usual if _is_round(sizes[three])] or usual
+    turning = []
+    for force in usual:
+        gravity = sizes[force]
+        for rate in rates:
+            if set(force) & set(rate) or gravity is None:
+                continue
+            acc, gyr = table[:, list(force)], table[:, list(rate)]
+            if rate_in(_even(clock), acc, gyr, gravity) is not None:
+                turning.append((force, rate))
+    if len(turning) == 1:
+        return turning[0], "gravity turns in the first three as the other three say"
+    if turning:
+        return None
+    if step_of(clock) and not any(_gravity(table, three) for three in usual):
+        others = {*forces, *rates} - {*usual}
+        why = "the length of the first three at rest is what gravity gains in a step"
+        # the other one of two is what angle gained
+        alone = len(usual) == len(others) == 1
+        return ((usual[0], others.pop()), why) if alone else None
+    # of counts, any length is one: without a turn they are asked about
+    usual = [three for three in usual if _plain(sizes[three])]
+    if len(usual) == 1:
+        pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
+        apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
+        if len(apart) <= 1 and len({*forces, *rates}) - len(apart) == 1:
+            why = "the length of the first three at rest is that of gravity"
+            return (usual[0], apart[0] if apart else None), why
+    return None
+
+
+def _scattered(values: Array, size: float) -> bool:
+    """Whether values (n, 3) differ from row to row by much of a length: noise alone."""
+    if are_means(values):
+        return False
+    differ = np.abs(np.diff(values, axis=0))
+    return bool(np.nanmedian(differ, axis=0).max() > NOISY * size)
+
+
+def is_direction(values: Array) -> bool:
+    """Whether rows (n, 3) are as long as each other: calculated, not measured."""
+    if are_means(values):
+        return False
+    whole = values[np.isfinite(values).all(axis=1)]
+    length = np.linalg.norm(whole, axis=1)
+    moves = len(whole) and np.ptp(whole, axis=0).max() > NOISY * np.median(length)
+    return bool(moves and np.ptp(length) < EXACT * np.median(length))
+
+
+def _is_round(gravity: Gravity | None) -> bool:
+    return gravity is not None and gravity.round
+
+
+def _plain(gravity: Gravity | None) -> bool:
+    """Whether a length is gravity in a unit, or in counts of an 16-bit sensor."""
+    within = ACC_OUT[0]
+    fits = fitting(gravity.size, ACC_SCALES, within) if gravity else []
+    return any(fit.lsb == 1 or fit.lsb >= LEAST_COUNTS for fit in fits)
+
+
+def _even(clock: Array) -> Array:
+    """A clock in steps of about 10 ms, whatever its unit."""
+    steps = np.diff(clock[np.isfinite(clock)])
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    scaled: Array = clock * (0.01 / step)
+    return scaled
+
+
+def _gravity(table: Array, three: Three, step: float = 0.0) -> Gravity | None:
+    """What three columns read at rest, if it is gravity in a usual unit.
+
+    Parameters
+    ----------
+    table, three : (n, k) and the columns
+    step : s, where the columns hold the gain of velocity over it; 0 where not
+
+    """
+    values = table[:, list(three)]
+    found = gravity_in(values)
+    if found is None or _scattered(values, found.size) or is_direction(values):
+        return None
+    within = ACC_OUT[not found.round]
+    scales = gains(step, "m/s^2", G0) if step else ACC_SCALES
+    return found if fitting(found.size, scales, within) else None

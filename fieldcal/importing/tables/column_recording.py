@@ -1,0 +1,236 @@
+"""A recording in columns: the user, names or physics say what each of them is."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from shlex import quote
+from typing import Any
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.importing import columns
+from fieldcal.importing.headings import headings
+from fieldcal.importing.headings.heading import Heading, HeadingMatch
+from fieldcal.importing.recording import (
+    ImuStream,
+    MeanScatter,
+    ReadOptions,
+    Recording,
+)
+from fieldcal.importing.tables import column_physics
+from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, numbers_of
+from fieldcal.importing.tables.heading_times import with_times
+from fieldcal.importing.tables.means import scatter_columns
+from fieldcal.importing.text.rows_in_turn import RowsInTurn
+from fieldcal.importing.units.gravity_size import are_means
+from fieldcal.importing.words.heading_words import meaning
+
+
+class ColumnRecording(Recording):
+    """A file of columns, with one IMU in it or several side by side."""
+
+    asks_units = True
+    imus_found: dict[str, ReadOptions] | None = None
+    """Options of each IMU by its name, once they were looked for."""
+
+    in_turn = False
+    """Whether its rows hold the accelerometer or the gyroscope, as far as is known."""
+
+    @abstractmethod
+    def heading(self) -> list[Heading]:
+        """What may be read as names of its columns, the likeliest first."""
+
+    @abstractmethod
+    def beginning(self) -> Array:
+        """Numbers of the first rows, (n, k); nan where a cell is none. May be empty."""
+
+    @abstractmethod
+    def ask(self) -> str:
+        """What to do where nothing tells its columns."""
+
+    def rate_said(self) -> tuple[float, str] | None:
+        """Sampling rate, Hz, that the file says of itself, and where; or None."""
+        return None
+
+    def streams(self) -> list[ImuStream]:
+        """Return the IMUs in it."""
+        found = self.imus()
+        for wanted in found.values():
+            ask_rate(self, wanted)
+            columns.check(wanted)
+        return [
+            ImuStream(name, f"columns in {columns.units(wanted)}")
+            for name, wanted in found.items()
+        ]
+
+    def notes(self, stream: str) -> dict[str, Any]:
+        """Return the units."""
+        return columns.notes(self.wanted)
+
+    def alone(self, stream: str) -> Recording:
+        """The recording with the columns of one IMU."""
+        wanted = self.imus()[stream]
+        one = super().alone(stream)
+        one.wanted = wanted
+        if isinstance(one, ColumnRecording):
+            one.imus_found = {stream: wanted}
+        return one
+
+    def imus(self) -> dict[str, ReadOptions]:
+        """Options of each IMU by its name."""
+        if self.imus_found is None:
+            own = not self.wanted.columns
+            found = self._found()
+            self.imus_found = {
+                name: ColumnClock(self, one, own).settled for name, one in found.items()
+            }
+            if len(self.imus_found) == 1:
+                (self.wanted,) = self.imus_found.values()
+        if len(self.imus_found) == 1:
+            # units may have been found meanwhile
+            return dict.fromkeys(self.imus_found, self.wanted)
+        return self.imus_found
+
+    def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """Samples of its rows, also where each holds one of two sensors alone."""
+        rows = RowsInTurn()
+        for block in rows.through(blocks):
+            self.in_turn = rows.told
+            yield block
+        self.says += [s for s in rows.says if s not in self.says]
+
+    def scatter(self) -> MeanScatter | None:
+        """What its columns say of the scatter, if its rows are means."""
+        table, wanted = self.beginning(), self.wanted
+        at = numbers_of(self, wanted)
+        if not {"ax", "ay", "az"} <= set(at) or not len(table):
+            return None
+        if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
+            return None
+        fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
+        where = scatter_columns(next(fits, Heading([])).columns)
+        values = np.full((len(table), 6), np.nan)
+        for i, channel in enumerate(CHANNELS):
+            if channel in where:
+                values[:, i] = table[:, where[channel]]
+        count = table[:, where["n"]] if "n" in where else None
+        return MeanScatter(values, count, columns.has_time(wanted.columns))
+
+    def _found(self) -> dict[str, ReadOptions]:
+        if self.wanted.columns:
+            return {"0": self.wanted}
+        table = self.beginning()
+        ways = [(headings.read(*with_times(way, table)), way) for way in self.heading()]
+        named = max((found for found, _ in ways), key=_worth, default=())
+        way = next((w for found, w in ways if found and found is named), None)
+        if len(named) < 2 and not _whole(named):
+            told = self._told(named, way or next((w for _, w in ways), None))
+            if told is not None:
+                return {"0": told}
+            self._say_unnamed(named, way)
+        for way in self.heading() if not named else ():
+            # the question of their size comes before that of their columns
+            named = named or headings.read(*with_times(way, table), weak=True)
+        if not named:
+            raise InputError(self.ask())
+        taken = {one.name: one.taken(self.wanted) for one in named}
+        for one in named:
+            alone = [one.sentence(taken[one.name])] if len(named) == 1 else []
+            self.says += [s for s in (*alone, *one.says) if s not in self.says]
+        return taken
+
+    def _told(
+        self, named: Sequence[HeadingMatch], way: Heading | None
+    ) -> ReadOptions | None:
+        """Options by physics, where names do not say all."""
+        table = self.beginning()
+        k = table.shape[1]
+        names = [c.name for c in way.columns] if way else []
+        names = names if len(names) == k else [""] * k
+        known = _known(named, way)
+        if way is not None and len(way.columns) == k and len(table):
+            table = table.copy()
+            table[:, headings.no_axes(way.columns)] = np.nan
+        told = column_physics.tell(table, names, known)
+        if told is None:
+            return None
+        places = [c.place for c in way.columns] if way and not way.skip else [""] * k
+        pairs = [(told.channels.get(i, columns.SKIP), places[i]) for i in range(k)]
+        chosen = tuple(
+            f"{name}={place}" if place else name
+            for name, place in pairs
+            if name != columns.SKIP or not place
+        )
+        self.guessed["columns"] = f"{','.join(chosen)}: {told.why}"
+        wanted = named[0].taken(self.wanted) if named else self.wanted
+        return replace(wanted, columns=chosen)
+
+    def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:
+        """Ask about axes that no name says where none are the accelerometers.
+
+        Raises
+        ------
+        InputError
+            With the columns both ways.
+
+        """
+        if not named or way is None:
+            return
+        known = _known(named, way)
+        others = {i for i, c in enumerate(way.columns) if meaning(c.name, c.unit)}
+        names = [c.name for c in way.columns]
+        threes = column_physics.unnamed(self.beginning(), names, {*known, *others})
+        if not threes:
+            return
+        which = " ".join(names[i] or f"column {i + 1}" for i in threes[0])
+        if "ax" in known.values():
+            self.says.append(f"{which}: nothing says what they are; they are left out")
+            return
+        axes = zip(threes[0], ("ax", "ay", "az"), strict=True)
+        places = [c.place for c in way.columns]
+        with_them = ",".join(_as_option(known | dict(axes), places, way.skip))
+        raise InputError(
+            f"{self.path}: the names of its columns say where the gyroscopes are, and"
+            f" nothing tells whether {which} are the accelerometers: add --columns"
+            f" {quote(with_them)} if they are, or --columns"
+            f" {quote(','.join(_as_option(known, places, way.skip)))}"
+        )
+
+
+def _as_option(
+    channels: Mapping[int, str], places: Sequence[str], skip: str
+) -> list[str]:
+    """Columns as ``--columns`` names them."""
+    if skip:
+        return [channels.get(i, skip) for i in range(len(places))]
+    return [f"{channels[i]}={places[i]}" for i in sorted(channels)]
+
+
+def _worth(found: Sequence[HeadingMatch]) -> tuple[int, int]:
+    """How many channels are named, and of how many kinds the unit is."""
+    named = sum(len([c for c in one.columns if c != columns.SKIP]) for one in found)
+    return named, sum(bool(unit) for one in found for unit in one.units.values())
+
+
+def _whole(named: Sequence[HeadingMatch]) -> bool:
+    """Whether names say where specific force, rate and time are."""
+    if not named:
+        return False
+    known = {c.partition("=")[0] for c in named[0].columns}
+    return {"ax", "gx"} <= known and columns.has_time(known)
+
+
+def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:
+    """Channels that names say, by the number of the column."""
+    if not named or way is None:
+        return {}
+    if way.skip:
+        pairs = enumerate(named[0].columns)
+        return {i: name for i, name in pairs if name != way.skip}
+    number = {c.place: i for i, c in enumerate(way.columns)}
+    parted = (c.partition("=") for c in named[0].columns)
+    return {number[place]: name for name, _, place in parted}

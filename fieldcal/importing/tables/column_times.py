@@ -1,0 +1,198 @@
+"""Questions about the times of a recording in columns, with what it says itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from shlex import quote
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.columns import SKIP
+from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
+from fieldcal.importing.times.row_times import FRACTIONS, NEAR
+from fieldcal.importing.units.gravity_size import gravity_in
+from fieldcal.importing.units.rate_size import rate_in
+from fieldcal.importing.units.scales import FEWEST, USUAL_COUNTS, about
+from fieldcal.importing.units.time_units import SharedTimes, burst_units, time_units
+
+SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
+"""Rates of logs, Hz."""
+
+
+COARSEST = 1.001
+"""Step of the coarsest clock, s."""
+
+LATER = 0.999
+"""Share of rows that are later than the row before, of a clock: one may be damaged."""
+
+SET_BACK = 0.01
+"""Share of steps back, of a clock that is set now and then; a fraction has more."""
+
+FRACTION_NAMES = tuple(sorted(FRACTIONS, key=lambda name: -FRACTIONS[name]))
+"""Columns of fractions of a second, the coarsest first."""
+
+
+class SplitSeconds(NamedTuple):
+    """A clock in two columns.
+
+    Attributes
+    ----------
+    whole, fraction : numbers of the columns
+    name : what the second is called, of `FRACTIONS`
+
+    """
+
+    whole: int
+    fraction: int
+    name: str
+
+
+def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
+    """Two columns of (n, k) that are a clock together; None if no two are.
+
+    One holds whole seconds, the other what is beyond them, and both together only grow.
+
+    Parameters
+    ----------
+    table : (n, k) first rows
+    wholes : numbers of the columns that may hold the seconds
+
+    """
+    if len(table) < FEWEST:
+        return None
+    for i in wholes:
+        seconds = table[:, i]
+        steps = np.diff(seconds)
+        if not np.isfinite(steps).all() or (steps != np.round(steps)).any():
+            continue
+        if not (steps == 1).any() or (steps == 0).mean() < 0.5:
+            continue
+        for j in range(table.shape[1]):
+            part = table[:, j]
+            name = next((f for f in FRACTION_NAMES
+                         if np.max(part) * FRACTIONS[f] < 1), "")  # fmt: skip
+            if i == j or not name or np.min(part) < 0 or np.ptp(part) == 0:
+                continue
+            if (np.diff(part)[steps == 1] < 0).mean() < LATER:
+                continue
+            both = np.diff(seconds + part * FRACTIONS[name])
+            # within a minute the seconds begin again
+            if (both > 0).mean() > LATER - (steps < 0).mean():
+                return SplitSeconds(i, j, name)
+    return None
+
+
+def is_clock_number(t: Array) -> bool:
+    """Whether times (n,) hold hours, minutes and seconds in one number: 142031.5.
+
+    >>> is_clock_number(np.r_[142058:142060:0.5, 142100:142102:0.5])
+    True
+    """
+    t = t[np.isfinite(t)]
+    begins = np.flatnonzero(np.diff(np.floor(t / 100)) > 0)
+    if not len(begins) or not (t >= 0).all() or t.max() >= 240000:
+        return False
+    inside = (t % 100 < 60).all() and (np.floor(t / 100) % 100 < 60).all()
+    ends = (t[begins] % 100, t[begins + 1] % 100)
+    usual = float(np.median(np.diff(t)))
+    return bool(inside and usual > 0
+                and (60 - ends[0] < NEAR * usual).all()
+                and (ends[1] < NEAR * usual).all())  # fmt: skip
+
+
+def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions | None:
+    """Options by which rows that share times (n,) are spread; None if nobody can tell.
+
+    A second is the coarsest clock, and beyond it rows are bursts with pauses between,
+    also in a unit in which the rows of one have the rate of a log.
+    """
+    t = t[np.isfinite(t)]
+    own = [] if shared.equal else burst_units(t)
+    if any(shared.step * TIME_UNITS[unit] > COARSEST for unit in own):
+        return None
+    each = np.linspace(t[0], t[-1], len(t))  # as if every row had its own
+    unit = wanted.time_unit or next(iter(time_units(each)), "s")
+    seconds = shared.step * TIME_UNITS[unit]
+    if not shared.even or seconds > COARSEST or shared.rows < len("12"):
+        return None
+    return replace(wanted, time_unit=unit, batch=RowBatch(seconds, shared.rows))
+
+
+def shared_question(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
+    """Ask for the rate where rows share times (n,), now more, now fewer."""
+    unit = wanted.time_unit or next(iter(time_units(t)), "s")
+    rate = shared.rows / (shared.step * TIME_UNITS[unit])
+    named = [c for c in wanted.columns if not c.startswith("t=")]
+    names = [SKIP if name == "t" else name for name in named]
+    return (
+        f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"
+        " in each, so they do not say when a row was taken: add --columns"
+        f" {quote(','.join(names))} --rate {about(rate)}"
+    )
+
+
+def counted_question(wanted: ReadOptions, table: Array) -> str:
+    """Ask for the rate where the times only count the rows."""
+    names = [SKIP if name == "t" else name for name in wanted.columns
+             if not name.startswith("t=")]  # fmt: skip
+    return (
+        f"its times only count rows: add --columns {quote(','.join(names))} --rate"
+        f" {rate_hint(wanted, table)}, or --time-unit ms if a row is taken each ms"
+    )
+
+
+def rate_hint(wanted: ReadOptions, table: Array) -> str:
+    """A rate, and what the turns say of it: of counts, one for each full scale."""
+    turns = rates_of_turns(wanted, table)
+    if not turns:
+        return f"{USUAL:.3g}"
+    (unit, rate), *others = turns.items()
+    hint = f"{about(rate)}, which its turns say about, if rates are in {unit}"
+    if unit.startswith("counts"):
+        hint += "".join(f", or {about(hz)} if {what.split()[1]}" for what, hz in others)
+    return hint
+
+
+def counts_rows(t: Array) -> bool:
+    """Whether times (n,) are the numbers of the rows."""
+    steps = np.diff(t[np.isfinite(t)])
+    return len(steps) > FEWEST and float((steps == 1).mean()) > LATER
+
+
+def goes_on(t: Array) -> bool:
+    """Whether times (n,) are numbers that grow, and seldom are set back."""
+    steps = np.diff(t[np.isfinite(t)])
+    back = len(steps) < len(t) / 2 or float((steps < 0).mean()) > SET_BACK
+    return not back and bool((steps > 0).any())
+
+
+def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
+    """Rates, Hz, at which the turns are those that gravity shows, by unit."""
+    at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
+    if not {"ax", "ay", "az", "gx", "gy", "gz"} <= set(at) or (
+        table.shape[1] != len(wanted.columns)
+    ):
+        return {}
+    acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
+    gravity = gravity_in(acc)
+    if gravity is None:
+        return {}
+    reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
+    counts = np.isfinite(gyr).all() and (gyr == np.round(gyr)).all()
+    if reads is None:
+        return {}
+    fits = {"rad/s": 1.0, "deg/s": float(np.rad2deg(1.0)), "mrad/s": 1e3}
+    if wanted.gyr_unit:
+        fits = {wanted.gyr_unit: 1 / wanted.gyr_scale}
+    elif counts:
+        # each full scale would be another rate
+        fits = {str(scale): scale.size for scale in USUAL_COUNTS}
+    rates = {unit: 100 * reads / one for unit, one in fits.items()}
+    sane = {u: rate for u, rate in rates.items() if SLOWEST <= rate <= FASTEST}
+    if counts:
+        # the full scale that a sensor begins with, first
+        return sane
+    return dict(sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL))))

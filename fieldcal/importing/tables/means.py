@@ -1,0 +1,233 @@
+"""A table of means: one row for each position, in place of samples.
+
+How well a mean is known, its scatter and the number of samples tell. Where nobody wrote
+them down, it is what remains of
+
+    |M a - b| = g                                                                  (1)
+
+with bias, scale factor and coupling free (M upper triangular), over the degrees of
+freedom left; and of the gyroscopes, whose outputs at rest are the bias whichever way up
+they are, the deviation from row to row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.chances import DEVIATION
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array, concat
+from fieldcal.importing.headings.heading import Column
+from fieldcal.importing.recording import MeanScatter, Recording
+from fieldcal.importing.words.heading_words import (
+    SCATTER,
+    axis_alone,
+    meaning,
+    words_of,
+)
+
+COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
+"""Names of a column that holds how many samples a mean is of."""
+
+COUPLED, PLAIN = 9, 6
+"""Parameters of (1) with coupling and without."""
+
+REPEATS = 5
+"""Times that the scatter is measured and the fit repeated with it."""
+
+OUT = 6.0
+"""Standard deviations beyond which a mean is none of the same scatter (2e-9)."""
+
+SPARE = 3
+"""Degrees of freedom that tell a scatter."""
+
+
+ROUNDED = 1e-9
+"""Part of a mean below which a scatter is no noise of a sensor."""
+
+
+class Spread(NamedTuple):
+    """How well means are known.
+
+    Attributes
+    ----------
+    sigma : (n, 6) m/s^2 and rad/s; nan where nothing tells
+    why : where that is taken from; empty where the table says it
+
+    """
+
+    sigma: Array
+    why: str
+
+
+def scatter_columns(columns: Sequence[Column]) -> Mapping[str, int]:
+    """Columns that hold the scatter of a channel, or "n", by the channel.
+
+    A scatter that names no sensor, ``x_std``, is of the only one that there is.
+    """
+    found: dict[str, int] = {}
+    kinds = {said.kind for c in columns if (said := meaning(c.name, c.unit))} & {*"ag"}
+    for i, column in enumerate(columns):
+        if column.name.strip().lower() in COUNTS:
+            found["n"] = i
+        elif (said := meaning(column.name, column.unit)) and said.kind in ("a", "g"):
+            if set(said.label) & set(SCATTER):
+                found[said.kind + said.axis] = i
+        elif (alone := axis_alone(words_of(column.name))) and len(kinds) == 1:
+            if set(alone[1]) & set(SCATTER):
+                found[min(kinds) + alone[0]] = i
+    return found
+
+
+def spread(means: Array, scatter: Array, count: Array | None, gravity: float) -> Spread:
+    """Say how well means are known.
+
+    Parameters
+    ----------
+    means : (n, 6) m/s^2 and rad/s
+    scatter : (n, 6) standard deviation of the samples of each; nan where not written
+    count : (n,) samples of each, where that is written
+    gravity : m/s^2
+
+    """
+    # values that never change have the rounding of a computer for a scatter
+    scatter = np.where(scatter > ROUNDED * np.abs(means), scatter, np.nan)
+    told = np.isfinite(scatter)
+    if count is not None and told.any():
+        return Spread(scatter / np.sqrt(np.maximum(count, 1.0))[:, None], "")
+    shown = np.concatenate(
+        [[_off_the_sphere(means[:, :3], gravity)] * 3, _from_row_to_row(means[:, 3:])]
+    )
+    sigma = np.broadcast_to(shown, means.shape)
+    why = "what remains of |a| = g and of steady rates"
+    if told.any():
+        sigma = np.where(told, np.fmin(sigma, scatter), sigma)
+        why = "their scatter at most, and " + why
+    sigma = np.where(np.isfinite(means), sigma, np.nan)
+    size = np.median(sigma[:, 0])
+    return Spread(sigma, f"{size:.2g} m/s^2: {why}" if np.isfinite(size) else "")
+
+
+def _given(said: str, means: Array) -> Array:
+    """What the user says of how well means (n, 6) are known."""
+    try:
+        two = [float(one) for one in said.split(",")]
+    except ValueError:
+        two = []
+    if not 1 <= len(two) <= 2 or min(two) <= 0:
+        raise InputError(
+            f"--sigma {said} cannot be: write one or two numbers above 0, such as"
+            " 0.005,0.0005 (m/s^2, rad/s)"
+        )
+    row = np.repeat([two[0], two[-1] if len(two) > 1 else np.nan], 3)
+    return np.where(np.isfinite(means), row, np.nan)
+
+
+def _from_row_to_row(gyr: Array) -> Array:
+    """Deviation of outputs at rest (n, 3) from their mean, rad/s."""
+    if len(gyr) <= SPARE:
+        return np.full(3, np.nan)
+    shown: Array = gyr.std(axis=0, ddof=1)
+    return np.where(shown > 0, shown, np.nan)
+
+
+def _off_the_sphere(acc: Array, gravity: float) -> float:
+    """What remains of (1), m/s^2; nan where too few rows tell."""
+    acc = acc[np.isfinite(acc).all(axis=1)]
+    for free in (COUPLED, PLAIN):
+        if len(acc) < free + SPARE:
+            continue
+        return _fit(acc[_agreeing(acc, free, gravity)], free, gravity)[1]
+    return float("nan")
+
+
+def _fit(acc: Array, free: int, gravity: float) -> tuple[Array, float]:
+    """Parameters of (1), and the standard deviation that remains, m/s^2."""
+    from scipy.optimize import least_squares
+
+    found = least_squares(_misfit, np.zeros(free), args=(acc, gravity))
+    return found.x, float(np.sqrt(2 * found.cost / (len(acc) - free)))
+
+
+def _agreeing(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
+    """Rows but those that no scatter of the others brings: one that was moved.
+
+    Rows bear witness against one only where more of them are to spare than the
+    parameters use up.
+    """
+    from scipy.optimize import least_squares
+
+    # from what fits all, narrower step by step: far off, every row is one by itself
+    x, size = _fit(acc, free, gravity)
+    few = np.sqrt(len(acc) / (len(acc) - free))
+    for _ in range(REPEATS):
+        x = least_squares(
+            _misfit, x, args=(acc, gravity), loss="cauchy", f_scale=size or 1.0
+        ).x
+        left = np.abs(_misfit(x, acc, gravity))
+        size = DEVIATION * few * float(np.median(left))
+    all_of_them = np.ones(len(acc), dtype=bool)
+    near = left <= OUT * size
+    for _ in range(REPEATS):
+        if near.sum() < max(2 * free, len(acc) / 2):
+            return all_of_them
+        # the narrow fit leaves out some that the scatter of those that agree brings
+        x, size = _fit(acc[near], free, gravity)
+        near = np.abs(_misfit(x, acc, gravity)) <= OUT * size
+    return near
+
+
+def _misfit(free: Array, acc: Array, gravity: float) -> Array:
+    matrix = np.diag(1 + free[3:6])
+    matrix[np.triu_indices(3, 1)] = free[6:] if len(free) == COUPLED else 0.0
+    left: Array = np.linalg.norm((acc - free[:3]) @ matrix.T, axis=1) - gravity  # (1)
+    return left
+
+
+def tables_of_means(
+    recording: Recording,
+    stream: str,
+    scatter: MeanScatter,
+    gravity: float,
+    said: str = "",
+) -> dict[str, Any]:
+    """Tables of session.toml for a table of means: [means], [[position]], [guessed].
+
+    Parameters
+    ----------
+    recording, stream, scatter : the table
+    gravity : m/s^2
+    said : by the user, "0.005,0.0005": sigma of accelerations and of rates, SI
+
+    Raises
+    ------
+    InputError
+        If nothing tells how well the means are known.
+
+    """
+    block = concat(recording.alone(stream).blocks(stream))
+    scale = np.repeat([recording.wanted.acc_scale, recording.wanted.gyr_scale], 3)
+    found = spread(block.six, scatter.values * scale, scatter.many, gravity)
+    if said:
+        found = Spread(_given(said, block.six), "")
+    if not np.isfinite(found.sigma[:, :3]).all():
+        raise InputError(
+            f"{recording.path}: nothing says how well its {len(block)} means are known:"
+            " add --sigma 0.005,0.0005 (of accelerations in m/s^2, of rates in rad/s),"
+            f" or take {PLAIN + SPARE} positions or more, which tell it"
+        )
+    half = (float(np.diff(block.t).min()) if len(block) > 1 else 1.0) / 4
+    positions = [
+        {
+            "start_s": round(float(t) - half, 6),
+            "end_s": round(float(t) + half, 6),
+            "sigma": [float(f"{one:.4g}") for one in row if np.isfinite(one)],
+        }
+        for t, row in zip(block.t, found.sigma, strict=True)
+    ]
+    guessed = {"guessed": {"sigma": found.why}} if found.why else {}
+    return {"means": {"timed": scatter.timed}, "position": positions, **guessed}

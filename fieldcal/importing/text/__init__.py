@@ -1,0 +1,1 @@
+"""Texts with columns, and those that become such: lines, labels, tags, cells."""

@@ -1,0 +1,142 @@
+"""Cells that are no numbers as they stand: between bars, lists, hexadecimal counts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Self
+
+from fieldcal.importing.text.text_form import Reader, TextForm, most
+from fieldcal.importing.text.text_top import cells, is_number, separator_of
+
+AXES = ("x", "y", "z")
+
+_RULE = re.compile(r"[\s|:+-]*")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LIST = re.compile(rf"[\[({{]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}]")
+_DIGITS = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{2}|[0-9A-Fa-f]{4}|[0-9A-Fa-f]{8})")
+
+FEWEST = 3
+"""Columns of digits that are counts: the axes of a sensor."""
+
+
+class BarTable(TextForm):
+    """Columns between bars, ``| 0.01 | 0.1 |``, also with a rule below the names."""
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines have it."""
+
+        def is_so(line: str) -> bool:
+            return line.count("|") > 1 and separator_of(line) in (None, ",")
+
+        return None if separator or not most(lines, is_so) else cls()
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            parted = line.strip().removeprefix("|").removesuffix("|").split("|")
+            return "\t".join(cell.strip() for cell in parted)
+
+        return lambda lines: [one(line) for line in lines if not _RULE.fullmatch(line)]
+
+
+class ListCells(TextForm):
+    """Cells that hold a list of numbers each, ``[0.1, 0.2, 9.8]``: columns of it."""
+
+    def __init__(self, separator: str, names: Sequence[str]) -> None:
+        self._separator, self.names = separator, tuple(names)
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines have such cells and each as many numbers."""
+        if not lines or not most(lines, lambda line: bool(_LIST.search(line))):
+            return None
+        bare = _LIST.sub("0", lines[-1])
+        parted = separator or separator_of(bare) or ("\t" if " " not in bare else " ")
+        if parted == " " and not all(is_number(cell, False) for cell in bare.split()):
+            return None
+        many = [len(re.split(r"[\s,;]+", said)) if (said := _list_in(cell)) else 1
+                for cell in _cells(lines[-1], parted)]  # fmt: skip
+        above = [cells(line, parted) for line in lines if not _LIST.search(line)]
+        fits = [row for row in above if len(row) == len(many)]
+        return cls(parted, _names(fits[-1], many) if fits else ())
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            return self._separator.join(
+                self._separator.join(re.split(r"[\s,;]+", said))
+                if (said := _list_in(cell)) else cell
+                for cell in _cells(line, self._separator)
+            )  # fmt: skip
+
+        return lambda lines: [one(line) for line in lines if _LIST.search(line)]
+
+
+def _list_in(cell: str) -> str:
+    """Numbers of a cell that is a list; nothing of another."""
+    said = _LIST.fullmatch(cell.strip().strip('"').strip())
+    return said[1].strip() if said else ""
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Cells of a line; a separator within a list parts none."""
+    lists = list(_LIST.finditer(line))
+    for said in lists:
+        within = said[0].replace(separator, "\0")
+        line = f"{line[: said.start()]}{within}{line[said.end() :]}"
+    return [cell.replace("\0", separator) for cell in line.split(separator)]
+
+
+def _names(row: Sequence[str], many: Sequence[int]) -> list[str]:
+    """Names of columns, those of a list of three with axes."""
+    found: list[str] = []
+    for name, n in zip(row, many, strict=True):
+        ends = [""] if n == 1 else AXES if n == len(AXES) else map(str, range(n))
+        found += [f"{name}_{end}" if end else name for end in ends]
+    return found
+
+
+class HexCells(TextForm):
+    """Counts in hexadecimal digits, of as many bits as there are digits, signed."""
+
+    says = "its counts are in hexadecimal digits, taken as signed"
+
+    def __init__(self, separator: str | None, columns: Sequence[int]) -> None:
+        self._separator, self._columns = separator, tuple(columns)
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if some columns hold such digits in most lines, as many in each."""
+        if not lines:
+            return None
+        parted = separator or separator_of(lines[-1])
+        rows = [cells(line, parted) for line in lines]
+        width = len(rows[-1])
+        rows = [row for row in rows if len(row) == width]
+        columns = [i for i in range(width) if _are_digits([row[i] for row in rows])]
+        return cls(parted, columns) if len(columns) >= FEWEST else None
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            row = line.split(self._separator)
+            for i in self._columns:
+                if i < len(row) and (said := _DIGITS.fullmatch(row[i].strip())):
+                    bits, value = 4 * len(said[1]), int(said[1], 16)
+                    row[i] = str(value - (1 << bits if value >> (bits - 1) else 0))
+            return (self._separator or " ").join(row)
+
+        return lambda lines: [one(line) for line in lines]
+
+
+def _are_digits(column: Sequence[str]) -> bool:
+    """Whether cells hold hexadecimal digits below a name, not all of them decimal."""
+    said = [m for cell in column if (m := _DIGITS.fullmatch(cell))]
+    alike = len({len(m[1]) for m in said}) == 1
+    letters = any(not is_number(m[0], False) for m in said)
+    return alike and letters and len(said) > len(column) / 2 + 1

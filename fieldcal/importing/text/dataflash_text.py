@@ -1,0 +1,110 @@
+"""A dataflash log of ArduPilot as text.
+
+    FMT, 131, 39, IMU, QBffffffIIfBBHH, TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,…
+    PARM, 1000, INS_ACCOFFS_X, 0.1
+    IMU, 2018601318, 0, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8, 0, 0, 38.5, …
+
+Messages are m/s^2 and rad/s. Where ``IMU`` is not logged, but ``ACC`` and ``GYR`` are,
+each of the accelerometer goes with the nearest of the gyroscope. Which are, their
+definitions do not say: those of all messages stand at the beginning.
+Source: ArduPilot, LogStructure.h.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from fieldcal.importing.text.nearest_lines import NearestLines
+from fieldcal.importing.text.text_form import Reader, TextForm
+from fieldcal.importing.text.text_top import cells, is_number
+
+BEGINS = 20
+"""Lines before the first definition: numbers of the log, or nothing."""
+
+TIMES = ("TimeUS", "TimeMS")
+RATES = ("GyrX", "GyrY", "GyrZ")
+FORCES = ("AccX", "AccY", "AccZ")
+WARM = ("T", "Temp")
+
+_DEFINED = re.compile(r"FMT,\s*\d+,\s*\d+,\s*(IMU|ACC|GYR),\s*\w+,\s*(.*)")
+
+Defined = Mapping[str, Sequence[str]]
+"""Fields of each message, of which the first is its name."""
+
+
+class DataflashText(TextForm):
+    """Of the messages of a dataflash log, those of the first IMU."""
+
+    gathers = True
+    says = (
+        "it is the text of a dataflash log, of which the first IMU alone is read: its"
+        " .bin has all of them, with what was installed"
+    )
+
+    def __init__(self, defined: Defined) -> None:
+        self._defined = defined
+        fields = {name for of in defined.values() for name in of}
+        self._time = next(name for name in TIMES if name in fields)
+        rates = (f"{name} [rad/s]" for name in RATES)
+        forces = (f"{name} [m/s^2]" for name in FORCES)
+        self.names = (self._time, *rates, *forces, "temperature")
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> DataflashText | None:
+        """The form, if it begins with what defines messages."""
+        if not any(line.startswith("FMT,") for line in lines[:BEGINS]):
+            return None
+        said = [found for line in lines if (found := _DEFINED.match(line))]
+        defined = {one[1]: [one[1], *cells(one[2], ",")] for one in said}
+        whole = {*defined} >= {"IMU"} or {*defined} >= {"ACC", "GYR"}
+        timed = all({*TIMES} & {*fields} for fields in defined.values())
+        return cls(defined) if whole and timed else None
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+        first: dict[str, str] = {}
+        wanted: list[str] = []
+        pairs = NearestLines()
+
+        def messages(lines: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
+            """Messages of the first instance, by their names and fields."""
+            found = []
+            for line in lines:
+                fields = self._defined.get(line.partition(",")[0].strip(), ())
+                row = cells(line, ",")
+                if not fields or len(row) != len(fields):
+                    continue
+                said = dict(zip(fields, row, strict=True))
+                mine = said.get("I", "")
+                if first.setdefault(row[0], mine) == mine:
+                    found.append((row[0], said))
+            return found
+
+        def read(lines: Sequence[str]) -> list[str]:
+            said = messages(lines)
+            if said and not wanted:
+                all_in_one = any(name == "IMU" for name, _ in said)
+                wanted.extend(["IMU"] if all_in_one else ["ACC", "GYR"])
+            rows = []
+            for name, one in (one for one in said if one[0] in wanted):
+                if name == "IMU":
+                    rows.append(self._row(one))
+                    continue
+                t = one.get("SampleUS", one[self._time])
+                if not is_number(t, comma=False):
+                    continue
+                if name == "GYR":
+                    both = pairs.rate(float(t), [one[n] for n in RATES])
+                else:
+                    both = pairs.force(float(t), [t, *(one[n] for n in FORCES)])
+                # the time, what is behind the forces, and they
+                rows += [[row[0], *row[4:], *row[1:4], ""] for row in both]
+            return [",".join(row) for row in rows]
+
+        return read
+
+    def _row(self, one: Mapping[str, str]) -> list[str]:
+        """Cells of a message that has all channels."""
+        warm = next((one[name] for name in WARM if name in one), "")
+        return [*(one.get(n, "") for n in (self._time, *RATES, *FORCES)), warm]

@@ -1,0 +1,92 @@
+"""Rows of several IMUs in one text, in turn, with a column that says which.
+
+imu,t,ax,ay,az                     the column's name says that it tells devices
+1,0.00,0.1,0.2,9.8                 apart, or it holds words; rows of all of them
+2,0.00,0.1,0.3,9.7                 come in turn, about as many of each
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from fieldcal.importing.text.text_top import cells, is_number, separator_of
+
+NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
+         "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
+"""Names of columns that tell devices apart, without "id" at their end."""
+
+MOST = 16
+"""IMUs of one log."""
+
+FEWEST = 20
+"""Rows of each among the first."""
+
+BALANCE = 3.0
+"""Times that one has more rows than another."""
+
+TURNS = 0.05
+"""Least share of rows that are of another than the row before."""
+
+
+class Instances(NamedTuple):
+    """Which column tells the IMUs apart, and their names.
+
+    Attributes
+    ----------
+    column : its number
+    separator : of columns
+    names : cells of that column, in the order in which they come
+
+    """
+
+    column: int
+    separator: str | None
+    names: tuple[str, ...]
+
+    def only(self, name: str, lines: Sequence[str]) -> list[str]:
+        """Lines of one IMU, and those that are none of any."""
+        return [line for line in lines if self._cell(line) in (name, None)]
+
+    def _cell(self, line: str) -> str | None:
+        row = line.split(self.separator)
+        cell = row[self.column].strip().strip('"') if len(row) > self.column else ""
+        return cell if cell in self.names else None
+
+
+def instances_in(lines: Sequence[str], separator: str | None) -> Instances | None:
+    """The column that tells several IMUs apart; None if there is one IMU."""
+    if not lines:
+        return None
+    parted = separator or separator_of(lines[-1])
+    rows = [cells(line, parted) for line in lines]
+    width = len(rows[-1])
+    whole = [row for row in rows if len(row) == width]
+    numbers = [r for r in whole if sum(is_number(c, parted != ",") for c in r) > 1]
+    above = [row for row in whole if row not in numbers]
+    for i in range(width):
+        column = [row[i] for row in numbers]
+        named = any(tells_devices(row[i]) for row in above)
+        words = not any(is_number(cell, False) for cell in column)
+        if (named or words) and _in_turn(column):
+            return Instances(i, parted, tuple(dict.fromkeys(column)))
+    return None
+
+
+def tells_devices(name: str) -> bool:
+    """Whether a name is that of a column or field that tells devices apart."""
+    bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
+    return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
+
+
+def _in_turn(column: Sequence[str]) -> bool:
+    """Whether cells change from row to row between a few, about as many of each."""
+    many = Counter(column)
+    if not 1 < len(many) <= MOST or "" in many:
+        return False
+    most, least = max(many.values()), min(many.values())
+    changes = sum(a != b for a, b in zip(column, column[1:], strict=False))
+    turns = changes > TURNS * len(column)
+    return turns and least >= FEWEST and most <= BALANCE * least

@@ -1,0 +1,260 @@
+"""Values with their labels in a line, as programs print them for people.
+
+    ax: 0.12 ay: 0.34 az: 9.81        AcX = 12 | AcY = 34 | AcZ = 16384
+    Acceleration X: 0.1, Y: 0.2, Z: 9.8 m/s^2
+    12:34:56.789 -> Accel: 0.1, 0.2, 9.8 g  Gyro: 1, 2, 3
+    I (312) IMU: ax=0.1 ay=0.2         2024-05-03 14:20:01,123 INFO acc=(0.1, 0.2, 9.8)
+    Accel: x= 0.1 | y= 0.2 | z= 9.8    Acc (mg) [ 10.1, -2.3, 999.1 ], Tmp (C) [ 25.1 ]
+    Acceleration in g's  X: 0.1  Y: 0.2  Z: 0.9      ax 0.1 ay 0.2 az 9.8
+    accel: {'x': 0.1, 'y': 0.2, 'z': 9.8}
+
+An axis alone belongs to the label before it, which may stand without a value; three
+values behind one label are axes; a unit holds for all axes before it. A time of day at
+the beginning is one of the monitor.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from fieldcal.importing.words.heading_units import unit_in
+from fieldcal.importing.words.heading_words import meaning
+
+TIME = "utc time [s]"
+"""Name of the time that a monitor writes before a line."""
+
+TICKS = "time [ms]"
+"""Name of the time since a device started."""
+
+CLOCKS = frozenset((TIME, TICKS))
+"""Names that each line of a row may have."""
+
+AXES = ("x", "y", "z")
+
+OFTEN = 0.5
+"""Share of the commonest label's lines in which others are no column."""
+
+LONGEST = 12
+"""Letters of a unit; what is longer is a sentence."""
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LIST = re.compile(
+    rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
+)
+_LISTED = re.compile(
+    rf"(\([^()]*\)|[A-Za-z])\s*\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]"
+)
+"""Values in a list right behind a label or its unit in brackets."""
+
+_DICT = re.compile(
+    r"\{\s*"
+    + r"\s*,\s*".join(rf"['\"]{a}['\"]\s*:\s*({_NUMBER})" for a in AXES)
+    + r"\s*\}"
+)
+"""Three axes as Python prints them."""
+
+_PAIRS = re.compile(rf"\s*(?:[A-Za-z_]\w*\s+{_NUMBER}[\s,;|]*){{3,}}")
+_PAIR = re.compile(rf"([A-Za-z_]\w*)\s+(?={_NUMBER})")
+"""Labels with a space before their value, where a line holds nothing else."""
+
+_ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}\D*)")
+"""A label with its value alone in a line, as programs print a temperature."""
+
+_SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
+"""What stands before an axis: something else, and the label of all its axes."""
+
+_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?\(([^()]+)\))( [xyzXYZ])?")
+"""A label that says the unit of its values."""
+
+_LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
+_VALUES = re.compile(rf"\s*({_NUMBER}(?:[\s,;|]+{_NUMBER})*)\s*(.*)", re.DOTALL)
+_STEM = re.compile(r"(.*[^\s_])[\s_]*[xyzXYZ]")
+"""A label that ends with an axis, and what the other axes have before it."""
+
+_TICKS = re.compile(
+    r"[EWIDV] \((\d+)\) [\w.-]+:\s*|\[\s*(\d+)\]\[[EWIDV]\]\[[^\]]*\]\s*\w+\(\):\s*"
+)
+"""What ESP-IDF and Arduino write before a line: ms since the start, level and place."""
+
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
+"""Colours of a terminal."""
+
+_TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
+"""A line that holds nothing but a name."""
+
+_LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
+"""What programs write behind the time of a line."""
+
+_ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
+
+Labelled = tuple[str, str]
+"""A label and its value."""
+
+
+def labelled_values(line: str) -> list[Labelled]:
+    """Labels and values of a line; empty if it holds something else.
+
+    >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
+    [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
+    >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
+    ([], [])
+    """
+    line = _COLOURS.sub("", line)
+    line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
+    line = _LISTED.sub(r"\1: \2", line)
+    line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
+    line = _of_temperature(line)
+    arrival, ticks = _ARRIVAL.match(line), _TICKS.match(line)
+    rest = line[arrival.end() :] if arrival else line
+    rest = rest[ticks.end() :] if ticks else rest
+    rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
+    read: list[tuple[str, str, str]] = []
+    for label, text in _parted(rest):
+        said = _VALUES.fullmatch(text)
+        values = re.findall(_NUMBER, said[1]) if said else []
+        if said is None or len(values) not in (1, len(AXES)):
+            return []
+        label, moved = _apart(label)
+        if moved and read:
+            read = _with_unit(read, moved)
+        label, unit = _whole(label, read)
+        names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
+        read += [(n, v, unit) for n, v in zip(names, values, strict=True)]
+        behind = said[2].strip(" \t,;|")
+        if len(behind) > LONGEST:
+            return []
+        if unit_in(behind):
+            read = _with_unit(read, behind)
+    first = [(TIME, arrival[1].strip())] if read and arrival else []
+    first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
+    return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+
+
+def _of_temperature(line: str) -> str:
+    """A line that holds a temperature alone, with what stands behind a label.
+
+    >>> _of_temperature("  Temperature 23.40 deg C"), _of_temperature("Sample 12")
+    ('Temperature: 23.40 deg C', 'Sample 12')
+    """
+    alone = _ALONE.fullmatch(line)
+    said = meaning(alone[1]) if alone else None
+    if alone is None or said is None or said.kind != "temperature":
+        return line
+    return f"{alone[1]}: {alone[2]}"
+
+
+class TitledValues:
+    """Labels and values of lines, of which some say what the axes behind them are of.
+
+    Attributes
+    ----------
+    titles : lines of that kind so far
+
+    >>> titled = TitledValues()
+    >>> [titled.of(line) for line in ("--- Gyro (deg/s) ---", "X: 1 Y: 2")]
+    [[], [('Gyro X [deg/s]', '1'), ('Gyro Y [deg/s]', '2')]]
+    """
+
+    def __init__(self) -> None:
+        self._title = self._unit = ""
+        self.titles = 0
+
+    def of(self, line: str) -> list[Labelled]:
+        """Labels and values of the next line."""
+        read = labelled_values(line)
+        title = None if read else _TITLE.fullmatch(line)
+        if title is not None:
+            bare, unit = _whole(" ".join(title[1].split()), [])
+            said = meaning(f"{bare} x")
+            if said is not None and said.kind:
+                self._title, self._unit = bare, f" [{unit}]" if unit else ""
+                self.titles += 1
+        if not self._title:
+            return read
+        return [(f"{self._title} {n}{self._unit}" if n.lower() in AXES else n, v)
+                for n, v in read]  # fmt: skip
+
+
+def _parted(line: str) -> list[tuple[str, str]]:
+    """Labels, and what stands behind each; none if anything stands before the first.
+
+    >>> _parted("Accel: x= 1 | y= 2 Gyro: x= 3")
+    [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')]
+    """
+    parts = _LABEL.split(line)
+    if len(parts) < len(AXES):
+        return []
+    labels, texts = [" ".join(one.split()) for one in parts[1::2]], parts[::2]
+    for i, label in enumerate(labels):
+        sensor = _SENSOR.fullmatch(texts[i])
+        if sensor and label.lower() in AXES:
+            texts[i], labels[i] = sensor[1], f"{sensor[2]} {label}"
+    if any(letter.isalnum() for letter in texts[0]):
+        return []
+    return [*zip(labels, texts[1:], strict=True)]
+
+
+def _apart(label: str) -> tuple[str, str]:
+    """A label, and the unit of the value before it that stands before it."""
+    first, _, rest = label.partition(" ")
+    return (rest.strip(), first) if rest.strip() and unit_in(first) else (label, "")
+
+
+def _whole(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
+    """A label and its unit; of an axis alone with what the one before it says."""
+    before, _, unit = read[-1] if read else ("", "", "")
+    bare, _, axis = before.rpartition(" ")
+    if bare and label.lower() in AXES and axis.lower() in AXES:
+        return f"{bare} {label}", unit
+    said = _IN_UNIT.fullmatch(label)
+    if said and unit_in(said[2] or said[3]):
+        return said[1] + (said[4] or ""), said[2] or said[3]
+    return label, ""
+
+
+def _with_unit(
+    read: Sequence[tuple[str, str, str]], unit: str
+) -> list[tuple[str, str, str]]:
+    """What was read, with a unit behind the last of it: of all its axes."""
+    last = read[-1][0]
+    stem = _STEM.fullmatch(last)
+
+    def mine(name: str) -> bool:
+        other = _STEM.fullmatch(name)
+        return name == last or bool(stem and other and other[1] == stem[1])
+
+    return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
+
+
+def shape(line: str) -> str:
+    """A line without its numbers: what a program prints again and again.
+
+    >>> shape("Temperature 25.31 deg C") == shape("Temperature -1 deg C")
+    True
+    """
+    return re.sub(_NUMBER, "", line).strip()
+
+
+def repeated(lines: Iterable[str], names: Iterable[str]) -> set[str]:
+    """Shapes that come more than once, of lines that say none of these names.
+
+    What has such a name and no value is a damaged row.
+
+    >>> repeated(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
+    {'--'}
+    """
+    words = {w for name in names for w in _WORD.findall(name.partition(" [")[0])}
+    seen = Counter(shape(line) for line in lines if not words & {*_NAMED.findall(line)})
+    return {one for one, times in seen.items() if times > 1 and one}
+
+
+def names_of(rows: Iterable[Sequence[Labelled]]) -> list[str]:
+    """Labels that come again and again, in their order."""
+    seen = Counter(name for row in rows for name, _ in row)
+    usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
+    return [name for name, many in seen.items() if many >= OFTEN * usual]

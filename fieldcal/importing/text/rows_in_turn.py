@@ -1,0 +1,117 @@
+"""Rows of which some hold the accelerometer or the gyroscope alone.
+
+time,ax,ay,az,gx,gy,gz             two sensors with times of their own, merged by time:
+0.000,0.1,0.2,9.8,,,               no row has both, so no row tells how the force turns
+0.004,,,,0.01,0.02,0.03            with the rates
+
+0.000,0.1,0.2,9.8,0.01,0.02,0.03   a sensor that is slower than the rows: no two
+0.004,,,,0.01,0.02,0.03            neighbours tell its noise
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing.times.alignment import AlignedPair
+
+FEWEST = 20
+"""Rows of each sensor that tell."""
+
+BOTH = 0.05
+"""Share of the rows with values that has both at most: two times may be the same."""
+
+SLOWER = 0.2
+"""Share of rows that lack a sensor which is slower; of others some are lost."""
+
+
+class RowsInTurn:
+    """Makes rows of both sensors.
+
+    Where no row has both, each sample of the accelerometer goes with the nearest of the
+    gyroscope; where one sensor is slower than the rows, those without it are left out.
+    Other rows stay as they are.
+
+    Attributes
+    ----------
+    says : what the user must know, a sentence each
+    told : whether rows are of two sensors
+
+    """
+
+    def __init__(self) -> None:
+        self.says: list[str] = []
+        self.told = False
+        self._warm = np.nan
+
+    def through(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """All samples, of both sensors."""
+        flow = iter(blocks)
+        first = next(flow, None)
+        if first is None:
+            return
+        acc, gyr = _known(first)
+        many = (acc & ~gyr).sum(), (gyr & ~acc).sum()
+        self.told = min(many) >= FEWEST and (acc & gyr).sum() <= BOTH * sum(many)
+        if not self.told:
+            alone = acc ^ gyr
+            slow = sum(many) > SLOWER * len(first) and _alternate(alone, acc & gyr)
+            yield from (
+                self._whole(chain([first], flow)) if slow else chain([first], flow)
+            )
+            return
+        pair = AlignedPair()
+        for block in chain([first], flow):
+            acc, gyr = _known(block)
+            warm = self._warmth(block.temperature)[acc]
+            yield pair.feed(
+                Block.of(block.t[acc], block.acc[acc], None, warm),
+                Block.of(block.t[gyr], np.full((gyr.sum(), 3), np.nan), block.gyr[gyr]),
+            )
+        yield pair.rest()
+        self.says.append(
+            "its rows hold the accelerometer or the gyroscope: each sample of the first"
+            f" goes with the nearest, {1e3 * pair.worst:.2g} ms apart at most"
+        )
+
+    def _whole(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """Rows of both sensors alone."""
+        left = 0
+        for block in blocks:
+            acc, gyr = _known(block)
+            both = acc & gyr
+            left += len(block) - int(both.sum())
+            yield Block(*(getattr(block, f.name)[both] for f in fields(Block)))
+        self.says.append(
+            "one of its sensors is slower than its rows: those that lack it are left"
+            f" out, {left} in all"
+        )
+
+    def _warmth(self, values: Array) -> Array:
+        """Temperatures (n,), those that are missing as they were last known."""
+        held = np.concatenate([[self._warm], values])
+        last = np.maximum.accumulate(
+            np.where(np.isfinite(held), np.arange(len(held)), 0)
+        )
+        self._warm = float(held[last[-1]])
+        filled: Array = held[last][1:]
+        return filled
+
+
+def _alternate(alone: NDArray[np.bool_], both: NDArray[np.bool_]) -> bool:
+    """Whether rows (n,) of one sensor lie between those of both, few at a time."""
+    if both.sum() < FEWEST or alone.sum() < FEWEST:
+        return False
+    starts = np.count_nonzero(np.diff(alone.astype(int)) == 1)
+    return bool(starts > min(alone.sum(), both.sum()) / 2)
+
+
+def _known(block: Block) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rows (n,) of which the accelerometer is known, and the gyroscope."""
+    acc, gyr = (np.isfinite(x.sum(axis=1)) for x in (block.acc, block.gyr))
+    return acc, gyr

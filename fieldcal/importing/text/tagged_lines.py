@@ -1,0 +1,185 @@
+"""Lines of several kinds in one text, each with a word that says which.
+
+    IMU,0.01,0.1,0.2,9.8,0,0,0         those of the IMU alone are taken
+    GPS,0.01,48.1,11.5,512
+    ACCE;1.234;0.1;0.2;9.8             accelerometer and gyroscope go together
+    GYRO;1.235;0.01;0.02;0.03
+
+A line of the gyroscope goes with the nearest of the accelerometer; nothing is
+interpolated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Self
+
+from fieldcal.importing.text.nearest_lines import NearestLines
+from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
+from fieldcal.importing.text.text_top import cells, is_number, separator_of
+from fieldcal.importing.words.heading_words import meaning
+
+SENSORS = {
+    "a": re.compile(r"acc", re.IGNORECASE),
+    "g": re.compile(r"gyr|rotation|angular", re.IGNORECASE),
+    "imu": re.compile(r"imu|mpu", re.IGNORECASE),
+}
+"""What the word of a kind holds, by what its lines hold."""
+
+OTHER = re.compile(r"lin|user|free|magn", re.IGNORECASE)
+"""What it holds if they lack gravity or are of another sensor."""
+
+PLACES = 3
+"""Columns at the beginning of which one is the word."""
+
+FEWEST = 2
+"""Lines of a kind that is none by chance."""
+
+_WORD = re.compile(r"[^\W\d][^,;\t]*")
+
+
+class Kind(NamedTuple):
+    """Lines of one kind.
+
+    Attributes
+    ----------
+    word : that they begin with
+    width : columns
+    names : of the columns, where a line says them; else empty
+
+    """
+
+    word: str
+    width: int
+    names: tuple[str, ...]
+
+
+class TaggedLines(TextForm):
+    """Lines of an IMU among others, or of its two sensors in turn."""
+
+    gathers = True
+
+    def __init__(
+        self, separator: str | None, place: int, acc: Kind, gyr: Kind | None, time: int
+    ) -> None:
+        self._separator, self._place = separator, place
+        self._acc, self._gyr, self._time = acc, gyr, time
+        self.names = _named(acc, "acc" if gyr else "")
+        if gyr is not None and self.names:
+            own = _named(gyr, "gyr")
+            self.names += tuple(self._of_gyroscope(own)) if own else ()
+        what = f"of its lines, those that say {acc.word}"
+        if gyr is not None:
+            what += f" are taken, each with the nearest that says {gyr.word}"
+        self.says = what if gyr is not None else f"{what} are taken"
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
+        """The form, if most lines begin with one of several words."""
+        seen = Counter(separator_of(line) for line in lines)
+        parted = separator or (seen.most_common(1)[0][0] if seen else None)
+        rows = [cells(line, parted) for line in lines]
+        place = next((i for i in range(PLACES) if _is_word(rows, i)), None)
+        if place is None:
+            return None
+        found = _kinds(rows, place)
+        acc, gyr = _chosen(found)
+        if acc is None:
+            return None
+        here = [row for row in rows if len(row) == acc.width and row[place] == acc.word]
+        time = next((i for i in range(acc.width) if _grows(row[i] for row in here)), -1)
+        if gyr is not None and time < 0:
+            return None
+        return cls(parted, place, acc, gyr, time)
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+        pairs = NearestLines()
+
+        def read(lines: Sequence[str]) -> list[str]:
+            found = []
+            for line in lines:
+                row = cells(line, self._separator)
+                word = row[self._place] if len(row) > self._place else ""
+                if word == self._acc.word and is_number(row[self._time], False):
+                    if self._gyr is None:
+                        found.append(row)
+                    else:
+                        found += pairs.force(float(row[self._time]), row)
+                elif self._gyr and (word, len(row)) == (
+                    self._gyr.word,
+                    self._gyr.width,
+                ):
+                    if is_number(row[self._time], False):
+                        rates = self._of_gyroscope(row)
+                        found += pairs.rate(float(row[self._time]), rates)
+            return [(self._separator or " ").join(row) for row in found]
+
+        return read
+
+    def _of_gyroscope(self, row: Sequence[str]) -> list[str]:
+        """Cells of a line of the gyroscope, but its word and time."""
+        return [c for i, c in enumerate(row) if i not in (self._place, self._time)]
+
+
+def _is_word(rows: Sequence[Sequence[str]], i: int) -> bool:
+    """Whether most rows have a word in a column, and numbers beside it."""
+    said = [row for row in rows if len(row) > i and _WORD.fullmatch(row[i])]
+    beside = [row for row in said if sum(is_number(c, False) for c in row) > 1]
+    return len(beside) > MOSTLY * len(rows)
+
+
+def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[Kind]:
+    """Kinds of lines by their word and width, the commonest first."""
+    whole = [row for row in rows if len(row) > place]
+    words = [row for row in whole if not any(is_number(c, False) for c in row)]
+    numbers = [row for row in whole if any(is_number(c, False) for c in row)]
+    seen = Counter((row[place], len(row)) for row in numbers)
+    usual = [kind for kind, many in seen.most_common() if many >= FEWEST]
+    found = []
+    for word, width in usual:
+        # "# Header: IMU" ends with the word; a line without any is said of all kinds
+        said = [(row[place].split(" ")[-1].lstrip("#%/"), row)
+                for row in words if len(row) == width]  # fmt: skip
+        own = [row for first, row in said if first == word]
+        own += [row for first, row in said if first not in dict(usual)]
+        found.append(Kind(word, width, tuple(own[0]) if own else ()))
+    return found
+
+
+def _chosen(kinds: Sequence[Kind]) -> tuple[Kind | None, Kind | None]:
+    """Kinds of which the lines are taken: of the forces or of all, and of the rates."""
+    if len({kind.word for kind in kinds}) < len("ab"):
+        return None, None
+    plain = [kind for kind in kinds if not OTHER.search(kind.word)]
+    of = {s: [k for k in plain if has.search(k.word)] for s, has in SENSORS.items()}
+    if of["imu"] and not of["a"]:
+        return of["imu"][0], None
+    if of["a"]:
+        first = of["a"][0]
+        gyr = [k for k in of["g"] if not SENSORS["a"].search(k.word)]
+        return first, (gyr[0] if gyr else None)
+    # words of equal lines say what was done, or which device it was
+    wide = [kind for kind in kinds if kind.width > len("txyz")]
+    return (
+        (wide[0], None) if len({k.width for k in kinds}) > 1 and wide else (None, None)
+    )
+
+
+def _named(kind: Kind, sensor: str) -> tuple[str, ...]:
+    """Names of the columns of a kind, bare axes with their sensor."""
+    bare = [name.lower() in ("x", "y", "z") for name in kind.names]
+    said = [meaning(name) for name in kind.names]
+    if not any(bare) and not any(s and s.kind in "ag" for s in said):
+        return ()
+    return tuple(f"{sensor} {name}" if axis and sensor else name
+                 for name, axis in zip(kind.names, bare, strict=True))  # fmt: skip
+
+
+def _grows(column: Iterable[str]) -> bool:
+    """Whether numbers never step back and do not stay."""
+    values = [float(cell) for cell in column if is_number(cell, False)]
+    pairs = zip(values, values[1:], strict=False)
+    return len(values) > 1 and values[-1] > values[0] and all(a <= b for a, b in pairs)

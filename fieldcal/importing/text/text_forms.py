@@ -1,0 +1,246 @@
+r"""Texts that are not plain columns, written as such: quotes, labels, times of a clock.
+
+    "0,12","0,34"                      quoted, also with decimal commas
+    12:34:56.789 -> ax: 0.1 ay: 0.2    values with labels, also over several lines
+    IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
+    $IMU,0.01,0.1*5A                   lines with a checksum
+    %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
+    0.01,0.1,0.2,9.8;                  lines with a mark at their end
+    angular_velocity:\n  x: 0.1        messages as ROS shows them
+    | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
+    FF3A 0012                          counts in hexadecimal digits
+    2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
+
+Which of these a text is, its first lines tell. Each form turns lines into lines, so
+that everything behind it knows columns of numbers alone.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Sequence
+
+from fieldcal.importing.text.cell_forms import BarTable, HexCells, ListCells
+from fieldcal.importing.text.dataflash_text import DataflashText
+from fieldcal.importing.text.labels import (
+    CLOCKS,
+    TitledValues,
+    names_of,
+    repeated,
+    shape,
+)
+from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
+from fieldcal.importing.text.rate_on_top import RateOnTop
+from fieldcal.importing.text.receiver_lines import ReceiverLines
+from fieldcal.importing.text.tagged_lines import TaggedLines
+from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, most
+from fieldcal.importing.text.text_top import cells, separator_of
+from fieldcal.importing.times.clock_text import IN_LINE, ClockText, is_clock, is_date
+
+CLOCK = "utc time [s]"
+"""What a column is called whose clock was read; a device's own time goes before it."""
+
+_ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*->\s*")
+
+
+def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
+    """Forms of a text by its first lines, in the order in which they are undone.
+
+    Parameters
+    ----------
+    lines : that are not empty
+    separator : of columns, where the user says it
+
+    """
+    found: list[TextForm] = []
+    for form in FORMS:
+        one = form.of(lines, separator)
+        if one is not None:
+            found.append(one)
+            lines = one.reader()(lines)
+    return found
+
+
+class QuotedCells(TextForm):
+    """Cells in quotes: without them, parted by tabs."""
+
+    def __init__(self, old: str, new: str) -> None:
+        self._old, self._new = old, new
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> QuotedCells | None:
+        """The form, if most lines have it."""
+        if not most(lines, lambda line: line.count('"') > 1):
+            return None
+        bare = re.sub('"[^"]*"', '""', lines[-1])
+        return cls(separator or separator_of(bare) or " ", separator or "\t")
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def read(lines: Sequence[str]) -> list[str]:
+            rows = csv.reader(lines, delimiter=self._old, skipinitialspace=True)
+            return [self._new.join(row) for row in rows]
+
+        return read
+
+
+class LabelledValues(TextForm):
+    """Values with their labels, as a program prints them for people.
+
+    Its other lines, those that come again and again, are no damaged rows.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        separator: str,
+        gathers: bool,
+        others: Collection[str],
+    ) -> None:
+        self.names, self._separator, self.gathers = tuple(names), separator, gathers
+        self._others = others
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> LabelledValues | None:
+        """The form, if most lines have it."""
+        titled = TitledValues()
+        read = [titled.of(line) for line in lines]
+        many = [row for row in read if row]
+        names = names_of(many)
+        told = len(many) + titled.titles
+        if told <= MOSTLY * len(lines) or len(names) < len("xyz"):
+            return None
+        gathers = max(len(row) for row in many) < len(names)
+        others = [one for one, row in zip(lines, read, strict=True) if not row]
+        return cls(names, separator or "\t", gathers, repeated(others, names))
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+        row: dict[str, str] = {}
+        titled = TitledValues()
+
+        def read(lines: Sequence[str]) -> list[str]:
+            found = []
+            for line in lines:
+                titles = titled.titles
+                said = titled.of(line)
+                bare = not said and titles == titled.titles
+                values = {k: v for k, v in said if k in self.names}
+                if bare and shape(line) not in self._others:
+                    # no row: whoever reads rows says so
+                    found.append(line)
+                if (row.keys() & values.keys()) - CLOCKS:
+                    found.append(self._row(row))
+                # a row has the time of its first line
+                row.update({k: v for k, v in values.items() if k not in row})
+                if len(row) == len(self.names):
+                    found.append(self._row(row))
+            return found
+
+        return read
+
+    def _row(self, row: dict[str, str]) -> str:
+        text = self._separator.join(row.get(name, "") for name in self.names)
+        row.clear()
+        return text
+
+
+class ArrivalPrefix(TextForm):
+    """The time at which a monitor received a line, ``12:34:56.789 -> ``: a column."""
+
+    def __init__(self, separator: str) -> None:
+        self._separator = separator
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> ArrivalPrefix | None:
+        """The form, if most lines have it."""
+        if not most(lines, lambda line: _ARRIVAL.match(line) is not None):
+            return None
+        return cls(separator or separator_of(_ARRIVAL.sub("", lines[-1])) or "\t")
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+
+        def one(line: str) -> str:
+            arrival = _ARRIVAL.match(line)
+            if arrival is None:
+                return line
+            rest = line[arrival.end() :]
+            bare = separator_of(rest) is None
+            rest = self._separator.join(rest.split()) if bare else rest
+            return f"{arrival[1]}{self._separator}{rest}"
+
+        return lambda lines: [one(line) for line in lines]
+
+
+class ClockColumn(TextForm):
+    """A column with times of a clock, as seconds; the date may stand beside it."""
+
+    def __init__(
+        self, clock: int, day: int | None, separator: str | None, merged: bool
+    ) -> None:
+        self.clock, self._day = clock, day
+        self._separator, self._merged = separator, merged
+
+    @classmethod
+    def of(cls, lines: Sequence[str], separator: str | None) -> ClockColumn | None:
+        """The form, if most lines have it."""
+        if not lines:
+            return None
+        parted = separator or separator_of(lines[-1])
+        if parted is None and (place := _of_two_words(lines)) is not None:
+            return cls(place, None, None, True)
+        rows = [cells(line, parted) for line in lines]
+        clock = next((i for i, cell in enumerate(rows[-1]) if is_clock(cell)), None)
+        if clock is None:
+            return None
+        many = sum(len(row) > clock and is_clock(row[clock]) for row in rows)
+        if many <= MOSTLY * len(rows):
+            return None
+        day = next((i for i, cell in enumerate(rows[-1]) if is_date(cell)), None)
+        return cls(clock, day, parted, False)
+
+    def reader(self) -> Reader:
+        """Return what reads a text of this form from its beginning."""
+        clock = ClockText()
+        return lambda lines: [self._seconds(line, clock) for line in lines]
+
+    def _seconds(self, line: str, clock: ClockText) -> str:
+        """The line with seconds in place of a clock."""
+        if self._merged:
+            said = IN_LINE.search(line)
+            since = clock.seconds(said[0]) if said else None
+            if said is None or since is None:
+                return line
+            return f"{line[: said.start()]}{since:.9f}{line[said.end() :]}"
+        row = line.split(self._separator)
+        if self.clock is None or len(row) <= self.clock:
+            return line
+        day = row[self._day] if self._day is not None and self._day < len(row) else ""
+        since = clock.seconds(row[self.clock], day)
+        if since is None:
+            return line
+        row[self.clock] = f"{since:.9f}"
+        return (self._separator or " ").join(row)
+
+
+def _of_two_words(lines: Sequence[str]) -> int | None:
+    """Column of a date and time that is one though a space parts them; None if not.
+
+    It is two if a line above the numbers has as many words as they have.
+    """
+    said = IN_LINE.search(lines[-1])
+    others = {len(line.split()) for line in lines if not IN_LINE.search(line)}
+    if said is None or len(lines[-1].split()) in others:
+        return None
+    return len(lines[-1][: said.start()].split())
+
+
+FORMS: tuple[type[TextForm], ...] = (
+    DataflashText, RateOnTop, ReceiverLines, CheckedLines, EchoedMessages, EndedLines,
+    QuotedCells, LabelledValues, BarTable, ListCells, TaggedLines, ArrivalPrefix,
+    HexCells, ClockColumn,
+)  # fmt: skip
+"""Forms in the order in which they are looked for."""

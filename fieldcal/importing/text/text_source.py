@@ -1,0 +1,81 @@
+"""Whole lines of a text file as UTF-8, with what must be undone before columns.
+
+The text may be a file of a .zip. Lines come many at a time, so that a log may be as
+long as it likes.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from zipfile import BadZipFile, ZipFile
+
+from fieldcal.core.errors import InputError
+from fieldcal.importing.files.gzip_stream import PIECE
+from fieldcal.importing.files.text_encoding import as_utf8
+from fieldcal.importing.recording import Recording
+from fieldcal.importing.text.text_form import TextForm
+from fieldcal.importing.text.text_lines import split_lines, top_lines
+
+
+class TextSource:
+    """Lines of a text.
+
+    Parameters
+    ----------
+    recording : whose file it is
+    member : the file of a .zip that is the text; "" if it is the file itself
+
+    """
+
+    def __init__(self, recording: Recording, member: str) -> None:
+        self._recording, self._member = recording, member
+
+    def top(self) -> list[str]:
+        """First lines, as they stand in the file."""
+        return next((top_lines(data) for data in self._whole_lines()), [])
+
+    def pieces(self, forms: Sequence[TextForm]) -> Iterator[bytes]:
+        """Whole lines, many at a time, with these forms undone."""
+        readers = [form.reader() for form in forms]
+        for data in self._whole_lines():
+            if not readers:
+                yield data
+                continue
+            lines = split_lines(data)
+            for read in readers:
+                lines = read(lines)
+            yield ("\n".join(lines) + "\n").encode()
+
+    def _whole_lines(self) -> Iterator[bytes]:
+        """Whole lines of the file as UTF-8, many at a time."""
+        rest = b""
+        for data in as_utf8(self._bytes()):
+            end = data.rfind(b"\n") + 1
+            if not end:
+                rest += data
+                continue
+            # one copy: there may be gigabytes of them
+            whole, rest = b"".join((rest, memoryview(data)[:end])), data[end:]
+            if not whole.isspace():
+                yield whole
+        # a number that was cut off is another number
+        if rest.strip() and not self._recording.ends_early:
+            # a file without a line feed may have the other kind of ends of lines
+            yield rest.replace(b"\r", b"\n")
+
+    def _bytes(self) -> Iterator[bytes]:
+        """Bytes of the text, unpacked."""
+        if not self._member:
+            yield from self._recording.pieces()
+            return
+        path = self._recording.path
+        try:
+            with ZipFile(path) as archive, archive.open(self._member) as file:
+                while data := file.read(PIECE):
+                    yield data
+        except (BadZipFile, OSError, RuntimeError, zlib.error, EOFError) as error:
+            raise InputError(
+                f"{path}: {self._member} cannot be read: {error}; copy it again from"
+                " where it came"
+            ) from error

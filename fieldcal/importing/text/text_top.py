@@ -1,0 +1,206 @@
+"""The top of a text file: where its numbers begin, what parts them, what names them.
+
+Names may stand in one line, with units in the line below, or in two lines of which the
+first says the sensor of several columns (``Accelerometer,,,Gyroscope,,``) and the
+second the axis. A line such as ``Fs,100`` or ``# Sample rate: 100 Hz`` says the rate.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.columns import SKIP
+from fieldcal.importing.headings.heading import Column, Heading
+from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.words.heading_units import unit_in
+
+SEPARATORS = (";", "\t", ",")
+"""Between columns; a comma in a line with one of the others is a decimal comma."""
+
+ABOVE = 4
+"""Lines above the numbers among which their names are looked for."""
+
+LATEST = 50
+"""Lines below the first of numbers among which their names are looked for."""
+
+AXES = 3
+"""Fewest columns by which the width of a table is told."""
+
+FULL = 50
+"""Lines at the top by which the width of a row is judged."""
+
+NUMBERS = 0.5
+"""Share of the cells of a line that are numbers, where names of columns are not."""
+
+_AXIS = re.compile(r"(.*[^\W_].*?|.*\(|[A-Za-z])([xyzXYZ])(\)?\s*(?:[\[({].*[\])}])?)")
+"""A name that ends with an axis, and maybe a unit."""
+
+_RATE_WITHIN = re.compile(
+    r"(?:\bat|rate|frequency|freq|odr|fs)\b[\s:=_]*(?:is|of)?\s*([0-9]+(?:\.[0-9]+)?)\s*hz\b",
+    re.IGNORECASE,
+)
+"""A rate that stands among other words of a line."""
+
+_RATE = re.compile(
+    r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging)[ _]*"
+    r"(?:rate|frequency|freq)|frequency|odr)\b[ _]*(?:\(?hz\)?)?\s*[:=,;\t ]+\s*\"?"
+    r"([0-9]+(?:\.[0-9]+)?)\s*(?:hz)?\W*",
+    re.IGNORECASE,
+)
+
+
+def separator_of(line: str) -> str | None:
+    """Return what parts the columns of a line; None for spaces."""
+    return next((s for s in SEPARATORS if s in line), None)
+
+
+def is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
+    try:
+        float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return False
+    return True
+
+
+def cells(line: str, separator: str | None) -> list[str]:
+    """Cells of a line, without spaces and quotes about them."""
+    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+
+
+def first_numbers(lines: Sequence[str], separator: str | None) -> int:
+    """Which of the lines is the first of numbers; how many there are if none is."""
+    parted = [separator or separator_of(line) for line in lines]
+    rows = [cells(line, s) for line, s in zip(lines, parted, strict=True)]
+    many = Counter(len(row) for row in rows if len(row) >= AXES)
+    # a line into which another broke is wider than all others
+    width = (
+        max(many, key=lambda n: (many[n], n))
+        if many
+        else max(map(len, rows), default=0)
+    )
+    for i, (row, s) in enumerate(zip(rows, parted, strict=True)):
+        said = [cell for cell in row if cell]
+        if len(row) < min(AXES, width) or not said:
+            continue
+        numbers = sum(is_number(cell, s != ",") for cell in said)
+        wide = s is None or len(row) >= width - 1
+        if numbers > NUMBERS * len(said) and numbers >= min(AXES, width) and wide:
+            return i
+    return len(lines)
+
+
+def rows_begin(lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]) -> int:
+    """How many lines at the top hold something else than numbers; -1 if all do.
+
+    Parameters
+    ----------
+    lines : at the top
+    wanted : columns of the text, and its separator where the user says it
+    use : numbers of the columns that are read
+
+    """
+    if wanted.skip is not None:
+        return wanted.skip
+    parted = [wanted.separator or separator_of(line) for line in lines]
+    rows = [line.split(s) for line, s in zip(lines, parted, strict=True)]
+    width, full = len(wanted.columns), max(map(len, rows[:FULL]), default=0)
+    for i, (row, separator) in enumerate(zip(rows, parted, strict=True)):
+        said = [row[j].strip() for j in use if j < len(row)]
+        whole = separator is None or len(row) in (full, width)
+        numbers = all(is_number(cell, separator != ",") for cell in said if cell)
+        if whole and any(said) and numbers:
+            return i
+    return -1
+
+
+def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]:
+    """What stands above the numbers, read as names in each of several ways."""
+    first = first_numbers(lines, separator)
+    tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
+    # who listens before the device starts has rows above the names
+    tops += [line for line in lines[first : first + LATEST] if _all_words(line)]
+    rows = [cells(line, separator or separator_of(line)) for line in tops]
+    found = [Heading(way, SKIP) for way in _ways(rows)]
+    return [one for one in found if len(one.columns) > 2]
+
+
+def _all_words(line: str) -> bool:
+    """Whether all cells of a line are words."""
+    row = cells(line, separator_of(line))
+    return len(row) > 2 and all(cell[:1].isalpha() for cell in row)
+
+
+def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
+    for i, row in enumerate(rows):
+        yield [Column("", name) for name in row]
+        if (filled := _filled(row)) != [*row]:
+            yield [Column("", name) for name in filled]
+        if i + 1 == len(rows) or len(rows[i + 1]) != len(row):
+            continue
+        below = rows[i + 1]
+        units = [unit_in(cell) for cell in below]
+        if any(units):
+            pairs = zip(row, below, strict=True)
+            yield [Column("", name, unit) for name, unit in pairs]
+        above = ""
+        joined = []
+        for name, under in zip(row, below, strict=True):
+            above = name or above
+            joined.append(Column("", f"{above} {under}"))
+        yield joined
+
+
+def _filled(row: Sequence[str]) -> list[str]:
+    """Names of which an axis alone belongs to the one before: ``acc_x,y,z``.
+
+    >>> _filled(["t", "Accel (z) [g]", "(x)", "(y)", "gx", "y", "z"])
+    ['t', 'Accel (z) [g]', 'Accel (x) [g]', 'Accel (y) [g]', 'gx', 'gy', 'gz']
+    """
+    found: list[str] = []
+    for name in row:
+        bare = re.fullmatch(r"\(?([xyzXYZ])\)?", name)
+        before = _AXIS.fullmatch(found[-1]) if found else None
+        if bare and before:
+            name = f"{before[1]}{bare[1]}{before[3]}"
+        found.append(name)
+    return found
+
+
+def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str] | None:
+    """Rate in Hz that a line above the numbers says, and that line."""
+    for line in lines[: first_numbers(lines, separator)]:
+        within = _RATE_WITHIN.findall(line)
+        matched = _RATE.fullmatch(line.strip())
+        said = [matched.group(1)] if matched else within if len(within) == 1 else []
+        if said and float(said[0]) > 0:
+            return float(said[0]), line.strip()
+    return None
+
+
+def numbers_of(lines: Sequence[str], separator: str | None) -> Array:
+    """Numbers of lines, (n, k) as wide as the first; nan where a cell is none."""
+    first = first_numbers(lines[:1000], separator)
+    if first >= len(lines):
+        return np.empty((0, 0))
+    parted = separator or separator_of(lines[first])
+    width = len(cells(lines[first], parted))
+    rows = []
+    for line in lines[first:]:
+        row = line.split(parted)
+        if len(row) == width:
+            text = [c.replace(",", ".") for c in row] if parted != "," else row
+            rows.append([_number(cell) for cell in text])
+    return np.array(rows, dtype=float).reshape(-1, width)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,1 @@
+"""Units and full scales of numbers, by physics, and questions about them."""

@@ -1,0 +1,99 @@
+"""Units of rates of which no turn tells: of a device at rest, driven or flown.
+
+What the accelerometers of a vehicle feel is more than gravity, so nothing says what 1
+rad/s reads. Yet they say by how much gravity turns at most, which excludes units; the
+rest is what is usual, or is asked.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnsShown
+from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, gains
+from fieldcal.importing.units.unit_answers import answers
+
+FAST = 0.5
+"""Rate, rad/s, that nothing at rest shows: 30 deg/s."""
+
+ROUGH = 0.02
+"""Scatter of rates from sample to sample, rad/s, that nothing at rest shows."""
+
+FASTEST = 4000.0
+"""Full scale, deg/s, beyond which no gyroscope in a log goes."""
+
+AS_SHOWN = 1.5
+"""How many times what gravity turns at most rates say in their own unit: of mrad/s,
+deg/s would say some ten times as much."""
+
+RAD, DEG = GYR_SCALES[:2]
+
+
+class CalmRates(NamedTuple):
+    """What the unit of rates is thought to be, or what is asked.
+
+    Attributes
+    ----------
+    scale, why : the unit, and the reason; None where it is asked
+    asks, answers : the question, and options to paste
+
+    """
+
+    scale: Scale | None
+    why: str = ""
+    asks: str = ""
+    answers: tuple[str, ...] = ()
+
+
+def calm_rates(
+    gyr: Array, turns: TurnsShown | None, step: float | None, usual: str
+) -> CalmRates:
+    """Say what unit rates are in of which no turn tells.
+
+    Parameters
+    ----------
+    gyr : (n, 3) numbers of the file, all known
+    turns : by how much gravity would turn, were they rad/s, and does; None: not known
+    step : s, where accelerations are the gain of velocity over it; None where not
+    usual : unit that rates of such names are in; "" where names tell none
+
+    """
+    plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
+    if step is not None:
+        # who writes gains of velocity, writes gains of angle beside them
+        plain = [*gains(step, "rad/s"), *gains(step, "deg/s", DEG.size)]
+    allowed = [s for s in plain if turns is None or turns.allow(s.size)]
+    whole = bool((gyr == np.round(gyr)).all())
+    first = plain[0]
+    if step is not None and allowed:
+        return CalmRates(allowed[0], "so are the accelerations, and no turn tells")
+    if usual and first in allowed:
+        return CalmRates(first, "so rates of such names are, and no turn tells")
+    if not whole and turns is not None and _in_degrees(turns):
+        return CalmRates(DEG, f"as rad/s, {turns.odd()}")
+    fast = float(np.median(np.abs(gyr).max(axis=1)))
+    noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
+    if RAD in allowed and fast <= FAST and noise <= ROUGH:
+        return CalmRates(RAD, "it is the usual one, and no turn tells")
+    shown = f"{fast:.4g}" if fast > FAST else f"a scatter of {noise:.2g}"
+    asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
+    return CalmRates(None, "", asks, tuple(_answers(gyr, turns, whole)))
+
+
+def _in_degrees(turns: TurnsShown) -> bool:
+    """Whether rad/s cannot be by how gravity turns, and deg/s are as it turns."""
+    least = max(STIRS, TIMES * turns.shown)
+    return turns.said >= least and turns.allow(DEG.size, AS_SHOWN)
+
+
+def _answers(gyr: Array, turns: TurnsShown | None, whole: bool) -> list[str]:
+    """Options: those that can be; of whole numbers counts as well."""
+    scales = [DEG, *(USUAL_COUNTS if whole else [RAD])]
+    fits = [s for s in scales if turns is None or turns.allow(s.size)]
+    if whole and np.abs(gyr).max() > FASTEST:
+        fits = [s for s in fits if s != DEG]
+    said = answers("gyr", fits or scales, "deg/s", DEG.size)
+    return [f"{a}, if it is so" if a == "--gyr-unit rad/s" else a for a in said]

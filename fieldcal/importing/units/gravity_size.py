@@ -1,0 +1,162 @@
+"""What gravity reads in the numbers of a file, by its rests.
+
+    |a| at rest is g                                                               (1)
+
+tells m/s^2, g, mg and counts of the usual full scales apart, once the offset of raw
+counts is known from rests in many directions (a sphere through their means).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.importing.recording import LARGEST
+from fieldcal.importing.units.scales import FEW, FEWEST
+
+FEWEST_MEANS, MOST_MEANS = 3, 200
+"""Rows of a table of means, one for each position."""
+
+FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
+"""Rows on a sphere that show its middle: of rows in all directions, and of others."""
+
+APART = np.deg2rad(10.0)
+"""Angle between successive rows that samples do not have, rad."""
+
+_ALIKE = 0.15
+"""Part by which lengths of means in a table of them differ."""
+
+_GROUP = 8
+"""Rows of which the mean is taken for (1)."""
+
+_QUIET = 0.3
+"""Part of these groups that is taken for rest, the quietest."""
+
+_ROUND = 0.03
+"""Departure from a sphere, over its radius, of means that lie on one."""
+
+_STEPS = 30
+"""Steps to the middle of a sphere of a known radius."""
+
+_WIDE = 0.05
+"""Least share of the directions' variance along any axis, for a sphere."""
+
+
+class Gravity(NamedTuple):
+    """What the accelerometers read at rest, in numbers of the file.
+
+    Attributes
+    ----------
+    size : |a|, less the offset where that is known
+    offset : (3,) 0 where it is not
+    round : whether it is known
+
+    """
+
+    size: float
+    offset: Array
+    round: bool
+
+
+def _readings(acc: Array) -> Array:
+    """Rows (m, 3) that a sensor may have said."""
+    rows: Array = acc[(np.abs(acc) < LARGEST).all(axis=1)]
+    return rows
+
+
+def are_means(acc: Array) -> bool:
+    """Whether successive rows (n, 3) point so differently that they are no samples.
+
+    Samples that follow each other point nearly the same way; means of positions do not.
+    """
+    acc = _readings(acc)
+    if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
+        return False
+    # a large offset hides how much the directions differ
+    center, radius = _sphere(acc, FEWEST_FACES)
+    acc = acc - center if radius else acc
+    length = np.linalg.norm(acc, axis=1)
+    if not length.all():
+        return False
+    usual = float(np.median(length))
+    if np.quantile(np.abs(length / usual - 1), 0.8) > _ALIKE:
+        return False
+    up = acc / length[:, None]
+    turned = np.arccos(np.clip((up[1:] * up[:-1]).sum(axis=1), -1, 1))
+    return bool(np.median(turned) > APART)
+
+
+def gravity_in(acc: Array) -> Gravity | None:
+    """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
+    acc = _readings(acc)
+    if are_means(acc):
+        return _gravity_of(acc)
+    if len(acc) < FEW:
+        return None
+    # of so few, no part is quieter than the others
+    return _gravity_of(_quiet_means(acc) if len(acc) >= FEWEST else acc[:FEW])
+
+
+def _quiet_means(acc: Array) -> Array:
+    """Means (m, 3) of the quietest groups of rows."""
+    groups = acc[: len(acc) // _GROUP * _GROUP].reshape(-1, _GROUP, 3)
+    means, spread = groups.mean(axis=1), groups.std(axis=1).max(axis=1)
+    quiet: Array = means[spread <= np.quantile(spread, _QUIET)]
+    return quiet
+
+
+def _gravity_of(quiet: Array) -> Gravity | None:
+    """Size of gravity by means (m, 3) of rests."""
+    center, radius = _sphere(quiet)
+    if radius:
+        return Gravity(radius, center, True)
+    size = float(np.median(np.linalg.norm(quiet, axis=1)))
+    return Gravity(size, np.zeros(3), False) if size else None
+
+
+def with_length(acc: Array, size: float) -> Gravity | None:
+    """Gravity of a known length, with the offset that rests show; None if they do not.
+
+    Rests in few directions lie on many spheres, but on one of a known radius.
+    """
+    acc = _readings(acc)
+    if len(acc) < FEWEST:
+        return None
+    x = _quiet_means(acc)
+    center = x.mean(axis=0)
+    for _ in range(_STEPS):
+        away = x - center
+        length = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
+        out = away / length[:, None]
+        center = center + np.linalg.lstsq(out, length - size, rcond=1e-3)[0]
+    length = np.linalg.norm(x - center, axis=1)
+    spread = float(np.linalg.norm(x.std(axis=0)))
+    if spread < size / 2 or np.quantile(np.abs(length / size - 1), 0.9) > _ROUND:
+        return None
+    return Gravity(size, center, True)
+
+
+def _sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, float]:
+    """Center and radius of a sphere through points; radius 0 if they lie on none.
+
+    Nor do fewer than `fewest` tell one.
+    """
+    middle = points.mean(axis=0)
+    unit = float(np.abs(points - middle).max()) or 1.0
+    x = (points - middle) / unit
+    # |x|^2 = 2 c x + r^2 - c^2
+    left = np.column_stack([2 * x, np.ones(len(x))])
+    found, *_, singular = np.linalg.lstsq(left, (x**2).sum(axis=1), rcond=None)
+    if len(x) < fewest or singular[-1] < 1e-3 * singular[0]:
+        return middle, 0.0
+    radius = float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+    away = x - found[:3]
+    if not radius:
+        return middle, 0.0
+    departs = np.abs(np.linalg.norm(away, axis=1) / radius - 1)
+    share = np.linalg.eigvalsh(np.cov(away.T))[0] / radius**2
+    if np.quantile(departs, 0.9) > _ROUND or share < _WIDE:
+        return middle, 0.0
+    return middle + unit * found[:3], unit * radius

@@ -1,0 +1,208 @@
+"""Units that the times of a file may be in.
+
+A logger writes 1 to 8000 samples a second, which tells s, ms, us, ns and the days of a
+spreadsheet apart. Where the file says the rate, that tells its ticks.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.samples import Array
+from fieldcal.importing.recording import TIME_UNITS
+from fieldcal.importing.units.scales import FEW, FEWEST
+
+RATES_HZ = (1.0, 8000.0)
+"""What a logger of an IMU writes in a second."""
+
+SHORTEST = 5.0
+"""Shortest recording, s, where another unit of time makes it longer."""
+
+TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "d": 1 / 86400}
+
+TICKED = "100ns"
+"""Unit in which Windows and .NET count."""
+
+EPOCHS = (11644473600.0, 62135596800.0)
+"""Time from where they count, 1601 and the year 1, to 1970, s."""
+
+SHARED, TOGETHER, REGULAR = 0.5, 0.1, 0.9
+"""Part of the rows that come with the row before, of a clock too coarse; the part of
+the mean step by which they follow; and of batches that have as many rows."""
+
+JITTER = 0.5
+"""Quartiles of the steps of a sensor's clock differ by a smaller part of the step;
+those of arrivals, of rows that wait for each other, by more."""
+
+UNIX = (1e9, 4e9)
+"""Times of day since 1970, s: 2001 to 2096."""
+
+
+def time_units(t: Array) -> list[str]:
+    """Units that times (n,) of a file may be in."""
+    t = t[np.isfinite(t)]
+    steps = np.diff(t)
+    steps = steps[steps > 0]
+    if len(steps) < FEW:
+        return []
+    day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= t[-1] / n < UNIX[1]]
+    step = float(np.median(steps))
+    low, high = RATES_HZ
+    usual = [u for u, n in TIME_SIZES.items() if low <= n / step <= high]
+    if both := [u for u in usual if u in day]:
+        return both
+    span = float(steps.sum())
+    return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
+
+
+def unit_taken(name: str, t: Array) -> tuple[str, str]:
+    """Unit taken for the times (n,) of a recording, and why; "" where it is s.
+
+    Raises
+    ------
+    InputError
+        With a question and its answers, where several would do.
+
+    """
+    fits, step = time_units(t), _step(t)
+    if len(fits) > 1:
+        rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
+        raise InputError(
+            f"{name}: its times may be {' or '.join(rates)}: add"
+            f" {' or '.join(f'--time-unit {u}' for u in fits)}"
+        )
+    if not fits or fits == ["s"]:
+        return "", ""
+    rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
+    return fits[0], f"{fits[0]}, which makes {rate:.4g} Hz"
+
+
+def counts_from_long_ago(t: Array) -> bool:
+    """Whether times (n,) count 100 ns from 1601 or the year 1, and are today's.
+
+    >>> counts_from_long_ago(np.array([638503500000000000.0]))
+    True
+    """
+    known = t[np.isfinite(t)]
+    since = float(np.median(known)) * TIME_UNITS[TICKED] if len(known) else 0.0
+    return any(UNIX[0] <= since - epoch < UNIX[1] for epoch in EPOCHS)
+
+
+def step_of(t: Array) -> float:
+    """Usual distance of times (n,), s, if one unit alone fits them; else 0."""
+    fits = time_units(t)
+    return _step(t) * TIME_UNITS[fits[0]] if len(fits) == 1 else 0.0
+
+
+TICKS = ("0.1ms", "us")
+"""Units of what is called ``SampleTimeFine``, by the device."""
+
+TICKED_HZ = (4.0, 2000.0)
+"""Rates of the devices that count them: of two units, one alone is within."""
+
+ABOUT = float(np.log(3.0))
+"""Logarithm by which a rate is out that somebody says, and his device does not keep."""
+
+NEAR = 0.1
+"""Part by which a rate that is said and that of the times differ."""
+
+
+def unit_by_rate(t: Array, rate_hz: float) -> str:
+    """Unit in which times (n,) come at a rate; nothing if in none.
+
+    >>> unit_by_rate(np.arange(100) * 100.0, 100.0)
+    '0.1ms'
+    """
+    step = _step(t)
+    near = [u for u, size in TIME_UNITS.items()
+            if step and abs(np.log(rate_hz * step * size)) < NEAR]  # fmt: skip
+    return near[0] if near else ""
+
+
+def unit_nearest(t: Array, rate_hz: float) -> tuple[str, float]:
+    """Unit in which times (n,) come about at a rate, and the rate they make.
+
+    "" if in none within a factor of three, or of unusual ones within a tenth.
+
+    >>> unit_nearest(np.arange(100) * 13.0, 100.0)[0]
+    'ms'
+    """
+    step = _step(t)
+    units = {*TIME_SIZES, unit_by_rate(t, rate_hz)} - {""}
+    rates = {u: 1 / (step * TIME_UNITS[u]) for u in units if step}
+    away = {u: abs(np.log(rate / rate_hz)) for u, rate in rates.items()}
+    unit = min(away, key=away.__getitem__, default="")
+    return (unit, rates[unit]) if unit and away[unit] < ABOUT else ("", np.nan)
+
+
+def unit_of_ticks(t: Array) -> str:
+    """Unit of ticks (n,) that make a rate that loggers have; nothing if none does."""
+    low, high = TICKED_HZ
+    step = _step(t)
+    usual = [u for u in TICKS if step and low <= 1 / (step * TIME_UNITS[u]) <= high]
+    return usual[0] if len(usual) == 1 else ""
+
+
+class SharedTimes(NamedTuple):
+    """Times of rows that came together.
+
+    Attributes
+    ----------
+    step : from those of one batch to those of the next, in their unit
+    rows : in a batch
+    even : whether all batches have as many, but for one row
+    equal : whether they have the very same time; else they may be bursts of a device
+        that pauses between them
+
+    """
+
+    step: float
+    rows: float
+    even: bool
+    equal: bool
+
+
+def shared_times(t: Array) -> SharedTimes | None:
+    """How rows share times (n,): a coarse clock, or when a batch of them came.
+
+    None where most rows have a time of their own.
+    """
+    t = t[np.isfinite(t)]
+    steps = np.diff(t)
+    if len(steps) < FEWEST:
+        return None
+    together = steps < TOGETHER * steps.mean()
+    begins = np.flatnonzero(~together)
+    if together.mean() < SHARED or len(begins) < len("12"):
+        return None
+    rows, usual = np.diff(begins), float(np.median(np.diff(begins)))
+    even = float((np.abs(rows - usual) <= 1).mean()) >= REGULAR
+    equal = float((steps == 0).mean()) > SHARED
+    return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
+
+
+def burst_units(t: Array) -> list[str]:
+    """Units in which rows of times (n,) between pauses were taken when these say.
+
+    They are even then, and make the rate of a log. Of rows that a port hands over at
+    once, each with the time at which it was read, they are neither.
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    own = steps[steps < TOGETHER * steps.mean()]
+    low, middle, high = np.quantile(own, (0.25, 0.5, 0.75))
+    if middle <= 0 or high - low > JITTER * middle:
+        return []
+    least, most = RATES_HZ
+    return [
+        u for u, n in TIME_SIZES.items() if u != "d" and least <= n / middle <= most
+    ]
+
+
+def _step(t: Array) -> float:
+    """Usual distance of times that differ; 0 of none."""
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if len(steps) else 0.0

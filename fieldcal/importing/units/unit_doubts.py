@@ -1,0 +1,149 @@
+"""Units that somebody says, held against the physics of what a recording holds."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Block
+from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.units.gravity_size import Gravity, gravity_in
+from fieldcal.importing.units.rate_size import rate_in, turns_said
+from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, about
+from fieldcal.importing.units.unit_answers import zero_elsewhere
+from fieldcal.session.units import UNSCALED
+
+FAR = 0.25
+"""Logarithm of what no sensor in the unit that is said is out by."""
+
+NO_GRAVITY = 0.05
+"""Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
+
+
+def hold_own_units(recording: Recording, block: Block) -> None:
+    """Ask or say where a format's own units cannot be.
+
+    Raises
+    ------
+    InputError
+        If the format has an option that would make them right.
+
+    """
+    gravity = gravity_in(block.acc)
+    if gravity is None or abs(np.log(gravity.size / G0)) < FAR:
+        return
+    turned = rate_in(block.t, block.acc, block.gyr, gravity)
+    odd = (
+        f"|a| at rest is {gravity.size:.4g} m/s^2, {gravity.size / G0:.3g} times"
+        " gravity: its full scale or unit is another"
+    )
+    if answer := recording.rescaled(gravity.size / G0, turned or 1.0):
+        raise InputError(f"{recording.path}: {odd}: add {answer}")
+    recording.says.append(odd)
+
+
+class SaidUnits:
+    """Units that the user says, or the names of the columns.
+
+    Parameters
+    ----------
+    name : of the recording
+    said : units, those that were guessed included
+    guessed : quantities of which they were
+
+    """
+
+    def __init__(self, name: str, said: ReadOptions, guessed: Container[str]) -> None:
+        self._name, self._said, self._guessed = name, said, guessed
+
+    def doubts(self, block: Block, gravity: Gravity) -> list[str]:
+        """What the user says and physics does not, a sentence each.
+
+        Raises
+        ------
+        InputError
+            If gravity was taken out, or the names of the columns say what cannot be.
+
+        """
+        return self._of_forces(gravity) + self._of_rates(block, gravity)
+
+    def _of_forces(self, gravity: Gravity) -> list[str]:
+        reads = gravity.size / G0
+        if not self._has_size("a") or abs(np.log(reads)) <= FAR:
+            return []
+        if reads < NO_GRAVITY:
+            raise InputError(
+                f"{self._name}: |a| at rest is {gravity.size:.3g} m/s^2: gravity was"
+                " taken out of these accelerations, and nothing can be calibrated by"
+                " them; log those with gravity in them"
+            )
+        fits = _within(gravity.size / self._said.acc_scale, ACC_SCALES)
+        shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"
+        self._ask_zero(gravity, shows)
+        return self._contradict("a", shows, "--acc-unit", fits)
+
+    def _ask_zero(self, gravity: Gravity, shows: str) -> None:
+        """Ask where the zero of counts lies whose size the user says."""
+        unit, lsb = self._unit("a"), self._said.acc_lsb
+        zero = zero_elsewhere(self._said, gravity)
+        if lsb != 1 and "a" not in self._said.named and zero:
+            raise InputError(
+                f"{self._name}: {lsb:g} counts in a {unit} as you say, but {shows}: add"
+                f" {zero[0]} or --acc-zero 0,0,0, if it is so"
+            )
+
+    def _of_rates(self, block: Block, gravity: Gravity) -> list[str]:
+        if not self._has_size("g"):
+            return []
+        turned = rate_in(block.t, block.acc, block.gyr, gravity)
+        if turned is None:
+            return self._of_calm(block, gravity)
+        if abs(np.log(turned)) <= FAR:
+            return []
+        fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
+        shows = f"rates are {turned:.4g} times those at which gravity turns"
+        other = self._said.rate_hz and f"--rate {about(self._said.rate_hz * turned)}"
+        return self._contradict("g", shows, "--gyr-unit", fits, other or "")
+
+    def _of_calm(self, block: Block, gravity: Gravity) -> list[str]:
+        """Rates by which gravity would turn where it does not."""
+        turns = turns_said(block.t, block.acc, block.gyr, gravity)
+        if turns is None or turns.allow(1):
+            return []
+        plain = [s for s in GYR_SCALES if s.lsb == 1]
+        size = self._said.gyr_scale
+        fits = [s.unit for s in plain if turns.allow(size * s.size)][:1]
+        return self._contradict("g", turns.odd(), "--gyr-unit", fits)
+
+    def _unit(self, kind: str) -> str:
+        return self._said.acc_unit if kind == "a" else self._said.gyr_unit
+
+    def _has_size(self, kind: str) -> bool:
+        """Whether the user or the file says a unit that has a size."""
+        what = {"a": "acceleration", "g": "angular_rate"}[kind]
+        unit = self._unit(kind)
+        return bool(unit) and what not in self._guessed and unit not in UNSCALED
+
+    def _contradict(
+        self, kind: str, shows: str, option: str, fits: list[str], other: str = ""
+    ) -> list[str]:
+        """Ask about a unit of the file's; of the user's only say what is odd."""
+        unit = self._unit(kind)
+        if kind not in self._said.named:
+            return [f"{unit} as you say, but {shows}"]
+        answers = [other] if other else []
+        answers += [f"{option} {one}" for one in fits if one != unit]
+        answers.append(f"{option} {unit}, if it is so")
+        raise InputError(
+            f"{self._name}: the names of its columns say {unit}, but {shows}: add"
+            f" {' or '.join(answers)}"
+        )
+
+
+def _within(size: float, scales: tuple[Scale, ...]) -> list[str]:
+    """Units without counts in which a quantity may show as `size`."""
+    plain = [s for s in scales if s.lsb == 1]
+    return [s.unit for s in plain if abs(np.log(size / s.size)) < FAR]

@@ -1,0 +1,299 @@
+"""What is taken for units that neither the file nor the user says, and why.
+
+What physics tells is taken, said, and kept as a guess until the user confirms it; where
+it leaves a choice, the user is asked, with what to add to the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array, Block
+from fieldcal.importing.recording import LARGEST, ReadOptions, Recording
+from fieldcal.importing.units.calm_rates import calm_rates
+from fieldcal.importing.units.gravity_size import (
+    Gravity,
+    are_means,
+    gravity_in,
+    with_length,
+)
+from fieldcal.importing.units.rate_size import rate_in, turns_said
+from fieldcal.importing.units.scales import (
+    ACC_OUT,
+    ACC_SCALES,
+    FEW,
+    GYR_OUT,
+    GYR_SCALES,
+    about,
+    fitting,
+    gains,
+)
+from fieldcal.importing.units.thermometers import temperature_counts, temperature_fits
+from fieldcal.importing.units.time_units import step_of, unit_taken
+from fieldcal.importing.units.unit_answers import (
+    answers,
+    as_written,
+    other_rates,
+    zero_elsewhere,
+)
+from fieldcal.importing.units.unit_doubts import SaidUnits, hold_own_units
+
+ROWS = 1 << 17
+"""Rows at the beginning by which units are told."""
+
+NO_UNIT = 0.75
+"""What gravity reads at least in any unit, less what no factory scale is out by."""
+
+OFFSET = 0.25
+"""Part of g that no bias is: what raw counts show more is where their zero lies."""
+
+
+class Settled(NamedTuple):
+    """What was taken for what nobody said.
+
+    Attributes
+    ----------
+    guessed : a sentence each, by quantity
+    acc_bias : x y z of [nominal], m/s^2; None where zero lies at zero
+
+    """
+
+    guessed: dict[str, str]
+    acc_bias: list[float] | None = None
+
+
+def settle_units(recording: Recording, stream: str) -> Settled:
+    """Give a recording the units that its numbers tell.
+
+    Raises
+    ------
+    InputError
+        With a question and its answers, where several or none would do.
+
+    """
+    parts = recording.parts
+    times = [why for part in parts if len(parts) > 1 and (why := _timed(part))]
+    heard = recording.alone(stream)
+    block = _beginning(heard, stream)
+    if not all(part.asks_units for part in parts):
+        hold_own_units(recording, block)
+        return Settled(heard.guessed)
+    guess = _Guess(str(recording.path), _said(parts), block)
+    for part in parts:
+        part.wanted = guess.on(part.wanted)
+    parts[0].says += guess.doubts
+    taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
+    taken |= {"time": times[0]} if times else {}
+    return Settled(taken | guess.found, guess.acc_bias)
+
+
+def _timed(part: Recording) -> str:
+    """Give one of several files the unit of its own times, and say why; "" if it has.
+
+    Each has a clock column of its own, while each unit of a sensor stands in one.
+    """
+    wanted = part.wanted
+    if not part.asks_units or wanted.time_unit or wanted.rate_hz:
+        return ""
+    stream = part.streams()[0].name
+    unit, why = unit_taken(
+        str(part.path), part.alone(stream).first_rows(stream, ROWS).t
+    )
+    part.wanted = replace(part.wanted, time_unit=unit or "s")
+    return why
+
+
+def _beginning(recording: Recording, stream: str) -> Block:
+    whole = recording.first_rows(stream, ROWS)
+    # such values tell no unit; whoever takes the rows says where they stand
+    acc, gyr = (np.where(np.abs(three) > LARGEST, np.nan, three)
+                for three in (whole.acc, whole.gyr))  # fmt: skip
+    return replace(whole, acc=acc, gyr=gyr)
+
+
+def _said(parts: Sequence[Recording]) -> ReadOptions:
+    """What is said of any part: each channel stands in one of them."""
+    said = parts[0].wanted
+    for part in parts[1:]:
+        w = part.wanted
+        said = replace(
+            said,
+            acc_unit=said.acc_unit or w.acc_unit,
+            gyr_unit=said.gyr_unit or w.gyr_unit,
+            time_unit=said.time_unit or w.time_unit,
+            named=said.named | w.named,
+        )
+    return said
+
+
+class _Guess:
+    """Units of the beginning of a recording.
+
+    Attributes
+    ----------
+    found : what was guessed, by quantity
+    said : what is said, with what was found
+    acc_bias : as in `Settled`
+    doubts : what the user says and physics does not, a sentence each
+
+    """
+
+    def __init__(self, name: str, said: ReadOptions, block: Block) -> None:
+        self.found: dict[str, str] = {}
+        self.acc_bias: list[float] | None = None
+        self.doubts: list[str] = []
+        self._name, self.said, self._read = name, said, said
+        # of means, the pauses between them say nothing
+        if not (said.time_unit or said.rate_hz or are_means(block.acc)):
+            unit, why = unit_taken(name, block.t)
+            self.said = replace(said, time_unit=unit)
+            self.found |= {"time": why} if why else {}
+        t = block.t * (self.said.time_scale / said.time_scale)
+        block = replace(block, t=t)
+        self._zero = said.acc_scale * said.zero
+        written, block = block.acc, replace(block, acc=block.acc - self._zero)
+        gravity = gravity_in(block.acc)
+        self._step = step_of(t) if said.rate_hz is None else 1 / said.rate_hz
+        if gravity and not said.acc_unit and said.acc_lsb == 1:
+            self._acceleration(gravity, written)
+        elif gravity and said.acc_lsb != 1:
+            gravity = with_length(block.acc, G0) or gravity
+        if said.acc_zero:
+            self._lies_at(self._zero)
+        if gravity and self.said.acc_lsb != 1:
+            self._offset(gravity)
+        if not said.gyr_unit and said.gyr_lsb == 1:
+            self._rates(block, gravity)
+        if gravity:
+            said_units = SaidUnits(name, self.said, self.found)
+            self.doubts += said_units.doubts(block, gravity)
+        if not said.temp_unit:
+            self._temperature(block.temperature)
+
+    def on(self, wanted: ReadOptions) -> ReadOptions:
+        """Options of a part with what was found."""
+        found = self.said
+        if "time" in self.found:
+            wanted = replace(wanted, time_unit=found.time_unit)
+        if "acceleration" in self.found:
+            wanted = replace(wanted, acc_unit=found.acc_unit, acc_lsb=found.acc_lsb)
+        if "angular_rate" in self.found:
+            wanted = replace(wanted, gyr_unit=found.gyr_unit, gyr_lsb=found.gyr_lsb)
+        if "temperature" in self.found:
+            wanted = replace(wanted, temp_unit=found.temp_unit)
+        return wanted
+
+    def _acceleration(self, gravity: Gravity, acc: Array) -> None:
+        fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
+        fits = as_written(fits, acc)
+        if not fits and self._step:
+            scales = gains(self._step, "m/s^2", G0)
+            fits = fitting(gravity.size, scales, ACC_OUT[not gravity.round])
+        shows = f"|a| at rest is {about(gravity.size, 4)}"
+        if gravity.round:
+            shows += " (from a sphere through the rests)"
+        if not fits and gravity.size < NO_UNIT:
+            raise InputError(
+                f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
+                " to be taken out of these accelerations, and nothing can be"
+                " calibrated by them; log those with gravity in them, or, if it is so,"
+                f" add --acc-unit g --acc-lsb {about(gravity.size)}"
+            )
+        if len(fits) != 1:
+            self._ask(
+                f"{shows}, which is gravity in"
+                f" {' or '.join(map(str, fits)) or 'no usual unit'}",
+                answers("acc", fits, "g", gravity.size)
+                + zero_elsewhere(self.said, gravity),
+            )
+        if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
+            self.found["acceleration"] = f"{fits[0]}: {shows}"
+            self.said = replace(self.said, acc_unit=fits[0].unit, acc_lsb=fits[0].lsb)
+
+    def _offset(self, gravity: Gravity) -> None:
+        if (np.abs(gravity.offset) > OFFSET * gravity.size).any():
+            counts = self._lies_at(self._zero + gravity.offset)
+            reads = " ".join(f"{number:.5g}" for number in counts)
+            self.found["acc_bias"] = f"{reads} counts: the sphere lies about it"
+
+    def _lies_at(self, zero: Array) -> Array:
+        """Take a zero, as read, for the nominal bias; return it as the file has it."""
+        counts: Array = zero / self._read.acc_scale
+        self.acc_bias = [round(b * self.said.acc_scale, 4) for b in counts]
+        return counts
+
+    def _rates(self, block: Block, gravity: Gravity | None) -> None:
+        gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
+        if len(gyr) < FEW:
+            return
+        reads = gravity and rate_in(block.t, block.acc, block.gyr, gravity)
+        if reads is None or gravity is None:
+            self._calm(block, gyr, gravity)
+            return
+        fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
+        fits = as_written(fits, block.gyr)
+        if self._gained:
+            # who writes gains of velocity, writes gains of angle beside them
+            degrees = gains(self._step, "deg/s", 180 / np.pi)
+            scales = (*gains(self._step, "rad/s"), *degrees)
+            fits = fitting(reads, scales, GYR_OUT[not gravity.round])
+        elif self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
+            # who writes one sensor's registers as they are, writes the other's so too
+            fits = counts
+        shows = f"as gravity turns, 1 rad/s reads {about(reads, 4)}"
+        if len(fits) != 1:
+            self._ask(
+                f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
+                answers("gyr", fits, "deg/s", np.deg2rad(reads))
+                + (other_rates(reads, self.said.rate_hz or 0, gyr) if not fits else []),
+            )
+        if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
+            self.found["angular_rate"] = f"{fits[0]}: {shows}"
+            self.said = replace(self.said, gyr_unit=fits[0].unit, gyr_lsb=fits[0].lsb)
+
+    @property
+    def _gained(self) -> bool:
+        """Whether accelerations are gains of velocity since the row before."""
+        return self.said.acc_lsb != 1 and self.said.acc_lsb == self._step
+
+    def _calm(self, block: Block, gyr: Array, gravity: Gravity | None) -> None:
+        """Rates of which no turn tells."""
+        turns = gravity and turns_said(block.t, block.acc, block.gyr, gravity)
+        gained = self._step if self._gained else None
+        found = calm_rates(gyr, turns, gained, self.said.usual)
+        if found.scale is None:
+            self._ask(found.asks, [*found.answers])
+        else:
+            unit, lsb = found.scale.unit, found.scale.lsb
+            self.found["angular_rate"] = f"{found.scale}: {found.why}"
+            self.said = replace(self.said, gyr_unit=unit, gyr_lsb=lsb)
+
+    def _temperature(self, values: Array) -> None:
+        fits = temperature_fits(values)
+        if "degC" in fits:
+            return
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        known = values[np.isfinite(values)]
+        # who writes one sensor's registers as they are, may write the other's so too
+        raw = self.said.acc_lsb != 1 and bool((known == np.round(known)).all())
+        if len(fits) != 1 or raw:
+            self._ask(
+                f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
+                [
+                    *(f"--temp-unit {unit}" for unit in fits),
+                    *temperature_counts(low, high),
+                    "--temp-unit none, which leaves it out",
+                ],
+            )
+        ((unit, middle),) = fits.items()
+        self.said = replace(self.said, temp_unit=unit)
+        self.found["temperature"] = f"{unit}: it is {middle:.1f} deg C then"
+
+    def _ask(self, what: str, answers: list[str]) -> None:
+        raise InputError(f"{self._name}: {what}: add {' or '.join(answers)}")

@@ -1,0 +1,1 @@
+"""What the name of a column, of a rate or of a file says."""

@@ -1,0 +1,64 @@
+"""The sensor that a name says: of a file whose columns are axes alone, of records.
+
+Telephones and data sets write a file for each sensor: ``Gyroscope.csv``,
+``TotalAcceleration.csv``, ``acc_exp01_user01.txt``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fieldcal.importing.words.heading_words import words_of
+
+_SENSORS = {
+    "acc": ("acc", "accel", "accelerometer", "acceleration"),
+    "gyr": ("gyr", "gyro", "gyroscope", "rotationrate", "gyroscopes"),
+}
+_OTHERS = ("mag", "magnetometer", "linear", "lin", "gravity", "imu", "and", "angle",
+           "orientation")  # fmt: skip
+"""Words of files that hold something else, or more."""
+
+ACC = (
+    "totalacceleration",
+    "accelerometeruncalibrated",
+    "accelerometer",
+    "acceleration",
+)
+GYR = ("gyroscope", "gyroscopeuncalibrated", "rotationrate", "gyro")
+"""Names that programs on telephones give to sensors, those that are taken first first.
+
+From what is called an accelerometer beside a total acceleration gravity was taken out.
+"""
+
+SENSOR = {"acc": "accelerometers", "gyr": "gyroscopes"}
+"""What each is called in a sentence."""
+
+
+def best_of(sensor: str, names: Iterable[str]) -> str | None:
+    """Of several names the best for a sensor, acc or gyr; None if none is of it.
+
+    >>> best_of("acc", ["Gyroscope", "Accelerometer", "TotalAcceleration"])
+    'TotalAcceleration'
+    """
+    ranks = {"acc": ACC, "gyr": GYR}[sensor]
+    there = {name: name.lower().replace(" ", "") for name in names}
+    for rank in ranks:
+        for name, bare in there.items():
+            if bare == rank:
+                return name
+    return next((name for name in there if sensor_of(name) == sensor), None)
+
+
+def sensor_of(stem: str) -> str:
+    """Sensor of a file by its name without the ending; "" if it says none, or several.
+
+    >>> sensor_of("TotalAcceleration"), sensor_of("gyro_exp01_user01")
+    ('acc', 'gyr')
+    >>> sensor_of("acc_and_gyro"), sensor_of("userAcceleration"), sensor_of("log")
+    ('', '', '')
+    """
+    words = words_of(stem)
+    before = dict(zip(words[1:], words, strict=False))
+    said = [sensor for sensor, names in _SENSORS.items() if {*words} & {*names}]
+    more = {*words} & {*_OTHERS} or "user" in {before.get(w) for w in _SENSORS["acc"]}
+    return said[0] if len(said) == 1 and not more else ""

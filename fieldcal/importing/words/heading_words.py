@@ -1,0 +1,295 @@
+"""What the name of one column says: sensor, axis, unit, and of which of several IMUs.
+
+``ax [m/s^2]``, ``gyro_x (deg/s)``, ``imu0.AccX``, ``angular_velocity.z``, ``TimeUS``,
+``accelerometer_m_s2[0]``: words, an axis, and a unit in brackets or behind a sign that
+parts words. What is neither tells one IMU from another. "Linear acceleration" is weak:
+some mean one without gravity by it.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from fieldcal.importing.words.heading_units import TELLING, UNITS, unit_in
+from fieldcal.importing.words.rate_names import with_axis_of
+
+AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
+
+_SENSORS = {
+    "a": (
+        "a f acc accel accelerometer acceleration accs accl acce ac "
+        "beschleunigung aceleracion aceleracao accelerazione versnelling 加速度"
+    ).split(),
+    "g": (
+        "g w gyr gyro gyroscope gyros omega rate gy gyroskop giroscopio "
+        "drehrate winkelgeschwindigkeit 角速度 陀螺仪"
+    ).split(),
+    "m": "m mag magnetometer magnetic compass 磁场".split(),
+    "v": "gravity grav".split(),
+}
+_PHRASES = (
+    (("angular", "velocity"), "g"),
+    (("angular", "rate"), "g"),
+    (("angular", "vel"), "g"),
+    (("ang", "vel"), "g"),
+    (("rotation", "rate"), "g"),
+    (("gyro", "rotation"), "g"),
+    (("velocidad", "angular"), "g"),
+    (("specific", "force"), "a"),
+    (("rate", "of", "turn"), "g"),
+    (("linear", "acceleration"), "linear"),
+    (("linear", "accel"), "linear"),
+    (("accelerometer", "acceleration"), "a"),
+)
+_GAINS = (
+    (("delta", "angle"), "g"),
+    (("delta", "theta"), "g"),
+    (("delta", "velocity"), "a"),
+    (("delta", "vel"), "a"),
+)
+"""Names of what angle and velocity gained since the row before."""
+
+_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
+          "epoch", "epoc", "unixtime", "datetime", "zeit", "tiempo", "temps", "tempo",
+          "tijd", "时间", "sow", "tow")  # fmt: skip
+_SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot")
+"""Words of a time where a unit of time stands beside them."""
+
+_STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
+          ("time", "step"), ("sample", "interval"))  # fmt: skip
+"""Names of the time that passed since the row before."""
+
+_TEMPERATURES = ("temp", "temperature", "tmp", "temper", "temperatur", "temperatura",
+                 "温度")  # fmt: skip
+_WITHOUT_GRAVITY = ("user", "lin", "linear", "free", "dyn", "dynamic", "world",
+                    "earth")  # fmt: skip
+"""Words of accelerations that may lack gravity, or lie in axes of the Earth."""
+
+SCATTER = ("std", "sd", "stdev", "stddev", "sigma", "rms", "var", "variance", "noise")
+"""Words of columns that hold how much values scatter."""
+
+MEAN = ("mean", "avg", "average")
+
+REFERENCE = ("true", "truth", "ref", "reference", "expected", "ideal")
+"""Words of columns that hold what an output ought to be."""
+
+_ANGLES = {"rad": "rad/s", "deg": "deg/s"}
+"""Units of rates of which the name says the angle alone: PX4's ``gyro_rad[0]``."""
+
+_NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
+"""Words of angles that are no rates."""
+
+_WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
+_FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
+"""Words that tell no IMU from another where all of one kind have them."""
+
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
+_BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
+_BRACKETED_AXIS = re.compile(r"[\[(]([xyzXYZ])[\])]")
+_CAPITAL = re.compile(r"(?<=[A-Za-z0-9])[A-Z]")
+_PER = re.compile("Per(?=[A-Z])")
+_BARE = re.compile("[\u0300-\u036f]")
+"""Accents, once they are apart from their letters."""
+
+_INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
+"""Axes of an array: ``gyro_rad[0]``, or ``gyro_rad.00`` as PlotJuggler writes it."""
+
+
+class Meaning(NamedTuple):
+    """What a name says.
+
+    Attributes
+    ----------
+    kind : of `UNITS`; "" for an axis of which no sensor is said
+    axis : x, y or z, or nothing
+    unit : None where none is said
+    label : what else the name says, such as which IMU
+    weak : whether something else may be meant
+
+    """
+
+    kind: str
+    axis: str
+    unit: str | None
+    label: tuple[str, ...] = ()
+    weak: bool = False
+
+
+def meaning(name: str, unit: str = "") -> Meaning | None:
+    """Say what a name means; None if it names no channel.
+
+    Parameters
+    ----------
+    name : of a column
+    unit : what the file says of it elsewhere, or nothing
+
+    >>> meaning("imu1_GyroX (dps)")
+    Meaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
+    """
+    name = _BARE.sub("", unicodedata.normalize("NFD", name))
+    name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
+    if (whole := _WHOLE.get(name.lower())) is not None:
+        return Meaning(whole, "", None)
+    for bare, said in _ways(name, unit):
+        found = _of_words([w.lower() for w in _WORD.findall(bare)], said)
+        if found is None or (said is not None and said not in UNITS[found.kind]):
+            continue
+        if found.kind or said is not None:
+            found = _of_angle(found)
+            return found._replace(
+                kind=found.kind or _kind_of(said),
+                weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
+            )
+    return None
+
+
+def _of_angle(found: Meaning) -> Meaning:
+    """The meaning of a rate of whose unit the name says the angle."""
+    words = [w for w in found.label if w in _ANGLES]
+    if (
+        found.kind != "g"
+        or found.unit
+        or len(words) != 1
+        or {*_NO_RATE} & {*found.label}
+    ):
+        return found
+    label = tuple(w for w in found.label if w not in words)
+    return found._replace(unit=_ANGLES[words[0]], label=label)
+
+
+def _kind_of(unit: str | None) -> str:
+    return next(kind for kind in "ag" if unit in UNITS[kind])
+
+
+def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
+    """Ways to part a name from its unit."""
+    if indexed := _INDEX.fullmatch(name):
+        name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
+    elif bracketed := _BRACKETS.fullmatch(name):
+        yield bracketed.group(1), unit_in(bracketed.group(2))
+        return
+    cuts = [cut.span() for cut in re.finditer("[_ .]", name)]
+    for a, b in cuts:
+        axis = re.fullmatch(r"(.*)[_ .]([xyzXYZ])", name[b:])
+        inner = axis.group(1) if axis else name[b:]
+        bare = f"{name[:a]}_{axis.group(2)}" if axis else name[:a]
+        if (said := unit_in(inner.replace("_", "/"))) is not None:
+            yield bare, said
+    for cut in _CAPITAL.finditer(name):
+        # of "GyroXRadPerSec" the end; a letter alone is an axis
+        if (said := unit_in(_PER.sub("/", name[cut.start() :]))) in TELLING:
+            yield name[: cut.start()], said
+    yield name, unit_in(unit)
+
+
+def _of_words(words: list[str], unit: str | None) -> Meaning | None:
+    if not words:
+        return None
+    words = with_axis_of(words)
+    if "t" in words and unit == "deg C":
+        return Meaning("temperature", "", unit, tuple(w for w in words if w != "t"))
+    if (step := _step(words, unit)) is not None:
+        return step
+    for phrase, kind in (*_PHRASES, *_GAINS):
+        if (at := _place(words, phrase)) is not None:
+            rest = words[:at] + words[at + len(phrase) :]
+            # of gains as well, what was measured itself goes before them
+            weak = kind == "linear" or (phrase, kind) in _GAINS
+            return _with_axis("a" if kind == "linear" else kind, rest, unit, weak)
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        kind = next((k for k, names in _SENSORS.items() if word[:-1] in names), "")
+        # of "GyX" the axis is the X
+        apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
+        if kind and word[-1] in "xyz" and not apart:
+            return Meaning(kind, word[-1], unit, tuple(rest))
+        kind = next((k for k, names in _SENSORS.items() if word[1:] in names), "")
+        if kind and word[0] in "xyz" and len(word) > len("xg"):
+            return Meaning(kind, word[0], unit, tuple(rest))
+    for i, word in enumerate(words):
+        rest = words[:i] + words[i + 1 :]
+        kind = next((k for k, names in _SENSORS.items() if word in names), "")
+        # a letter stands before its axis: "x_g" is an axis in g
+        if kind and (len(word) > 1 or (rest[i:] and rest[i] in AXES)):
+            found = _with_axis(kind, rest, unit)
+            if found is not None:
+                return found
+    if (time := _time(words, unit)) is not None:
+        return time
+    for word in _TEMPERATURES:
+        if word in words:
+            label = tuple(w for w in words if w != word)
+            return Meaning("temperature", "", unit, label)
+    if (alone := axis_alone(words)) is not None:
+        return Meaning("", alone[0], unit, alone[1])
+    # whatever it is called, an axis in rad/s is one of a gyroscope
+    return _with_axis("", words, unit) if unit in TELLING else None
+
+
+def axis_alone(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
+    """An axis of no said sensor, and what of it is meant: ``x_mean``, ``y``, ``std_z``.
+
+    None where any other word is there.
+    """
+    label = tuple(w for w in words if w in (*MEAN, *SCATTER, *REFERENCE))
+    rest = [w for w in words if w not in (*label, "axis")]
+    return (rest[0], label) if rest in (["x"], ["y"], ["z"]) else None
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name without its unit, in small letters."""
+    bracketed = _BRACKETS.fullmatch(name.strip())
+    bare = bracketed.group(1) if bracketed else name
+    return [w.lower() for w in _WORD.findall(bare)]
+
+
+def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:
+    n = len(phrase)
+    places = range(len(words) - n + 1)
+    return next((i for i in places if tuple(words[i : i + n]) == tuple(phrase)), None)
+
+
+def _with_axis(
+    kind: str, rest: list[str], unit: str | None, weak: bool = False
+) -> Meaning | None:
+    """The meaning with the last axis among its other words; None if there is none."""
+    letters = [i for i, word in enumerate(rest) if word in "xyz" and len(word) == 1]
+    if not letters:
+        return None
+    at = letters[-1]
+    return Meaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
+
+
+def _step(words: list[str], unit: str | None) -> Meaning | None:
+    """The meaning of the time since the row before."""
+    for names in _STEPS:
+        if (at := _place(words, names)) is not None:
+            rest = words[:at] + words[at + len(names) :]
+            inner = [u for w in rest if (u := unit_in(w)) in UNITS["dt"]]
+            if len(inner) == len(rest):
+                return Meaning("dt", "", unit or (inner[-1] if inner else None))
+    return None
+
+
+def _time(words: list[str], unit: str | None) -> Meaning | None:
+    """The meaning of a time: by its name, or by a unit of time that is all of it."""
+    said = unit if unit in UNITS["t"] else None
+    named = [w for w in words if w in _TIMES]
+    rest = [w for w in words if w not in _TIMES]
+    inner = [w for w in rest if unit_in(w) in UNITS["t"]]
+    if named or (len(inner) == len(rest) == 1 and len(rest[0]) > 1):
+        said = said or (unit_in(inner[-1]) if inner else None)
+        label = tuple(w for w in rest if w not in inner)
+        return Meaning("t", "", said if unit is None or said else unit, label)
+    since = said or (unit_in(inner[-1]) if inner else None)
+    if since and set(rest) - set(inner) and set(rest) <= {*inner, *_SINCE}:
+        return Meaning("t", "", since, tuple(w for w in rest if w not in inner))
+    return None
+
+
+def bare_label(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Words of a label that can tell one IMU from another."""
+    return tuple(w for w in words if w not in _FILLERS)

@@ -11,12 +11,12 @@ both, and either may put out 16 bits.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fieldcal.calibration import limits
 from fieldcal.calibration.names import ParameterName, sensor_of
-from fieldcal.calibration.parameters import COMPONENTS, Nominal
+from fieldcal.calibration.parameters import COMPONENTS
 from fieldcal.calibration.plausible import UNSEEN
 from fieldcal.core.grade import GRADES, Grade
 from fieldcal.core.samples import Array
@@ -44,7 +44,7 @@ class GradeShown:
         names: Sequence[str],
         values: Array,
         sigma: Array,
-        nominal: Nominal,
+        nominal: Mapping[str, Array],
     ) -> GradeShown:
         """The best grade, from the stated one on, that has units like this one.
 
@@ -53,7 +53,7 @@ class GradeShown:
         stated : what the device is said to be
         names : (k,) full names
         values, sigma : (k,) as a `Calibration` has them
-        nominal : that they are changes from
+        nominal : (3,) by group, that they are changes from, as the device sends it
 
         """
         coarser = GRADES[GRADES.index(stated) :: -1]
@@ -71,7 +71,7 @@ def _beyond(
     names: Sequence[str],
     values: Array,
     sigma: Array,
-    nominal: Nominal,
+    nominal: Mapping[str, Array],
 ) -> Iterator[str]:
     """Each parameter that no unit of a grade has, in words."""
     bounds = limits.read(grade)
@@ -81,8 +81,8 @@ def _beyond(
         if tolerance is None:
             continue
         most = tolerance + (bounds.repeat(parameter.group) or 0.0)
-        usual = getattr(nominal, parameter.group)[parameter.axis]
-        scale = getattr(nominal, f"{sensor_of(parameter.group)}_scale")
+        usual = nominal[parameter.group][parameter.axis]
+        scale = nominal[f"{sensor_of(parameter.group)}_scale"]
         size = abs(scale[parameter.axis])
         off = float(value - usual) / size
         if abs(off) - UNSEEN * float(s) / size > most:

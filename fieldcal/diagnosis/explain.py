@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.calibration.grade_shown import GradeShown
-from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.core.sampling import rate_of
@@ -205,8 +204,7 @@ def _as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> 
                 value = nominal[group][c % 3] + state.estimate[at]
                 found.append((float(value), float(sigma[at])))
     values, error = np.array(found).reshape(-1, 2).T
-    usual = Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()})
-    shows = GradeShown.of(about.grade, names, values, error, usual)
+    shows = GradeShown.of(about.grade, names, values, error, about.sent)
     if not shows.because:
         return
     said, likely = (factory_errors(about, g).by_effect for g in (None, shows.grade))

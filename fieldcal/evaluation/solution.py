@@ -42,6 +42,7 @@ from fieldcal.evaluation.rounding_mode import (
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
+from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
@@ -208,7 +209,7 @@ def solved_as(
     if note:
         asked["angle_sigma_deg"], notes = angles, [note, *notes]
         found = solve(laid.observations, recorded=recorded, **asked)
-    shows = _grade(found, laid.observations)
+    shows = _grade(found, about)
     if shows.because and not printed:
         asked["factory"] = factory_errors(device, shows.grade)
         found = solve(laid.observations, recorded=recorded, **asked)
@@ -249,20 +250,20 @@ def _as_shown(
     )
 
 
-def _grade(found: Calibration, seen: Observations) -> GradeShown:
+def _grade(found: Calibration, about: Description) -> GradeShown:
     """The grade that the device has by a result; the stated one of a bad result.
 
     Where neither the tilt of the base is found nor its level stated, accelerometers
     tell nothing: a tilt may be what is taken for their bias and scale factor.
     """
     if not found.good:
-        return GradeShown(seen.grade)
+        return GradeShown(about.grade)
     levelled = found.method == "scalar" or "level_sigma_deg" in found.info
     levelled |= bool({*TILTS} & {*found.groups})
     told = [levelled or sensor_of(group_of(n)) != "acc" for n in found.names]
     names = [name for name, tells in zip(found.names, told, strict=True) if tells]
     values, sigma = found.values[told], found.sigma[told]
-    return GradeShown.of(seen.grade, names, values, sigma, seen.nominal)
+    return GradeShown.of(about.grade, names, values, sigma, about.sent)
 
 
 def _insist(found: Calibration, session: Session, still: Rests) -> None:

@@ -58,6 +58,7 @@ class Description:
     quadratic, g_sensitivity : the same of `FactoryErrors`, SI units
     axes : the mounting, procedure axis x, y, z is device axis ...
     nominal : (3,) for each key of `units.NOMINAL`: what a simulation starts from
+    sent : the same as it is in samples that the device corrects before it sends them
     gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
     positions : as session.toml lists them
@@ -83,6 +84,7 @@ class Description:
     g_sensitivity: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
+    sent: Mapping[str, Array]
     gauge: Gauge
     model: Mapping[str, Mapping[str, Any]]
     positions: tuple[Position, ...]
@@ -237,8 +239,9 @@ def parse(raw: Mapping[str, Any]) -> Description:
     positions, windows = positions_of(raw.get("position", ()))
     axes = raw.get("frame", {}).get("mounting", ("+x", "+y", "+z"))
     mounting_matrix(axes)
-    nominal = nominal_of(raw.get("nominal", {}))
-    gauge = gauge_of(units, nominal)
+    usual = nominal_of(raw.get("nominal", {}))
+    gauge = gauge_of(units, usual)
+    nominal = {n: v / gauge.size[n.startswith("gyr")] for n, v in usual.items()}
     grade: Grade = device.get("grade", "tactical")
     moving = UnderWay.at(*_velocity(site), float(np.deg2rad(latitude)), height)
     level = _known(site.get("level_deg"))
@@ -259,7 +262,8 @@ def parse(raw: Mapping[str, Any]) -> Description:
         angle_setting_deg=_known(site.get("angle_setting_deg")),
         **{name: _known(device.get(name)) for name in FACTORY},
         axes=tuple(axes),
-        nominal={n: v / gauge.size[n.startswith("gyr")] for n, v in nominal.items()},
+        nominal=nominal,
+        sent=nominal,
         gauge=gauge,
         model=_model(raw.get("model", {})),
         positions=positions,

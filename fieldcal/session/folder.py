@@ -29,7 +29,7 @@ from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.session import description, sample_files
 from fieldcal.session.clock import SteadyClock, steadied
 from fieldcal.session.description import Description
-from fieldcal.session.installed import in_one_calibration, stretches
+from fieldcal.session.installed import as_sent, in_one_calibration, stretches
 from fieldcal.session.marks import ADDED, MARKS, read_marks
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
@@ -68,7 +68,9 @@ class Session:
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
         says += _unconfirmed(about.raw)
-        return cls(folder, _with_windows(_with_added(about, marks), marks), tuple(says))
+        about = _with_windows(_with_added(about, marks), marks)
+        about = replace(about, sent=as_sent(about.nominal, marks))
+        return cls(folder, about, tuple(says))
 
     @property
     def positions(self) -> tuple[Position, ...]:

@@ -106,6 +106,29 @@ def in_one_calibration(
     return whole, said
 
 
+def as_sent(
+    nominal: Mapping[str, Array], marks: Iterable[Mapping[str, Any]]
+) -> dict[str, Array]:
+    """What a sensor of nominal errors would send, corrected as `in_one_calibration` is.
+
+    Parameters
+    ----------
+    nominal : biases and scales of the sensor, (3,) each, SI
+    marks : of the session
+
+    """
+    last = ([None, *stretches(marks)])[-1]
+    if last is None or last.taken_out or last.used is None:
+        return dict(nominal)
+    o, k, w = (np.array(last.used[n], float) for n in NOTHING)
+    return {
+        **nominal,
+        "acc_bias": (nominal["acc_bias"] - o) * k,  # U = (r - o) k
+        "acc_scale": nominal["acc_scale"] * k,
+        "gyr_bias": nominal["gyr_bias"] - w,
+    }
+
+
 def _from_to(block: Block, used: Mapping[str, Any], goal: Mapping[str, Any]) -> Block:
     o, k, w = (np.array(used[n], float) for n in NOTHING)
     to, scale, rate = (np.array(goal[n], float) for n in NOTHING)

@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from fieldcal.calibration.grade_shown import GradeShown
-from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.grade import Grade
 
+USUAL = {
+    "acc_bias": np.zeros(3), "acc_scale": np.ones(3),
+    "gyr_bias": np.zeros(3), "gyr_scale": np.ones(3),
+}  # fmt: skip
 NAMES = ("acc_bias.x", "acc_scale.x", "gyr_bias.z", "angle_offset.alpha0_deg")
 
 
 def shown(stated: Grade, *values: float, sigma: float = 1e-6) -> GradeShown:
     """Of the parameters above, in this order."""
     return GradeShown.of(
-        stated, NAMES, np.array([*values, 7.0]), np.full(4, sigma), Nominal()
+        stated, NAMES, np.array([*values, 7.0]), np.full(4, sigma), USUAL
     )
 
 
@@ -44,7 +47,7 @@ def test_what_is_hardly_known_says_nothing() -> None:
 
 
 def test_outputs_in_counts_are_compared_in_their_units() -> None:
-    counts = Nominal((0.0,) * 3, (1000.0,) * 3, (0.0,) * 3, (1.0,) * 3)
+    counts = {**USUAL, "acc_scale": np.full(3, 1000.0)}
 
     def of(bias: float) -> str:
         values, sigma = np.array([bias]), np.array([1.0])

@@ -98,6 +98,6 @@ def test_residuals_over_what_they_follow(
 def test_what_to_do_next(tilted: Diagnosis) -> None:
     found = tilted
     cures = [text.partition(":")[0] for text in found.next]
-    assert cures[:2] == ["stuck at position 2", "base_tilt"]
+    assert cures[:2] == ["base_tilt", "stuck at position 2"]
     assert any('effects = ["base_tilt"]' in text for text in found.next)
     assert found.to_json()["next"] == list(found.next)

@@ -21,7 +21,7 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch
-from fieldcal.session.installed import NOTHING, in_one_calibration
+from fieldcal.session.installed import NOTHING, as_sent, in_one_calibration
 from fieldcal.session.marks import read_marks
 
 TURNED = {"alpha_deg": 45, "beta_deg": 5}
@@ -197,3 +197,26 @@ def test_samples_before_a_change_are_as_if_it_had_been_there() -> None:
     same = [marks[0], {**marks[0], "at_s": 3.0}]
     assert in_one_calibration(recorded, same) == (recorded, ())
     assert NOTHING.keys() == used[0].keys()
+
+
+def test_what_an_autopilot_takes_out_is_no_error_of_the_device() -> None:
+    nominal = {
+        "acc_bias": np.array([0.1, 0.0, 0.0]), "acc_scale": np.array([1.0, 1.1, 1.0]),
+        "gyr_bias": np.zeros(3), "gyr_scale": np.ones(3),
+    }  # fmt: skip
+    used = {
+        "acc_offset": [0.5, 0, 0], "acc_scale": [1, 1.02, 1], "gyr_offset": [0, 0, 0.04]
+    }  # fmt: skip
+    mark: dict[str, Any] = {"event": "device", "installed": {"in_samples": used}}
+    sent = as_sent(nominal, [mark])
+    force = np.array([3.0, -4.0, 8.0])
+    by_sensor = nominal["acc_bias"] + nominal["acc_scale"] * force
+    np.testing.assert_allclose(
+        sent["acc_bias"] + sent["acc_scale"] * force,
+        (by_sensor - used["acc_offset"]) * used["acc_scale"],
+    )
+    np.testing.assert_allclose(sent["gyr_bias"], [0, 0, -0.04])
+    mark["installed"]["taken_out"] = True
+    for marks in ([], [mark]):
+        for name, value in as_sent(nominal, marks).items():
+            np.testing.assert_array_equal(value, nominal[name])

@@ -42,7 +42,6 @@ from fieldcal.evaluation.rounding_mode import (
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
-from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded

@@ -167,7 +167,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     unit = np.abs(nominal.scale)
     dictionary = Dictionary(
         rows.x, rows.used, origins(source, rows), common, unit, turned,
-        Wander.of(rows, unit),
+        Wander.of(rows, unit), rows.alike,
     )  # fmt: skip
     dictionary.unfitted = tuple(_factory(dictionary, about, prepared))
     grain = grain_of(source.block, spans(source.block, about))

@@ -105,9 +105,19 @@ def _no_wonder(recording: CheckedSamples, c: int, first: int, last: int) -> bool
         return not any(c in one.axes for one in dead if not one.absent)
     step = float(grids_of(recording.block)[c])
     step_of = step / max(float(recording.noise[c]), 1e-300)
-    if step_of > 2 and recording.still[first:last].all():
+    # a turn begins slowly: its first samples may read as those of the rest before
+    if step_of > 2 and _turned(recording, c, first, last) < FEWEST:
         return True
     return step_of > 1 and _usual(recording, c, step, first, last)
+
+
+def _turned(recording: CheckedSamples, c: int, first: int, last: int) -> int:
+    """Samples of a run outside windows in which the sensor's other axes show a turn."""
+    beside = [i for i in range(c - c % 3, c - c % 3 + 3) if i != c]
+    axes = np.array([recording.channel(i)[first:last] for i in beside])
+    usual, noise = np.median(axes, axis=1), recording.noise[beside]
+    away = np.abs(axes - usual[:, None]) > TURNED * noise[:, None]
+    return int((away.any(axis=0) & ~recording.still[first:last]).sum())
 
 
 def _usual(

@@ -11,6 +11,7 @@ from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
+from fieldcal.importing.units.missing_numbers import MissingNumbers
 from fieldcal.importing.units.scales import FEWEST
 from fieldcal.session.text_files import COLUMNS
 
@@ -120,15 +121,17 @@ class ColumnReader:
     def __init__(self, wanted: ReadOptions) -> None:
         self._wanted = wanted
         self._times = RowTimes(wanted)
+        self._missing = MissingNumbers()
 
     @property
     def says(self) -> list[str]:
-        """What the user must know of the times, a sentence each."""
-        return self._times.says
+        """What the user must know of times and missing values, a sentence each."""
+        return [*self._times.says, *self._missing.says]
 
     def block(self, columns: Mapping[str, Array], n: int) -> Block:
         """Samples of the next n rows; what is not there is unknown."""
         wanted = self._wanted
+        columns = self._missing.without(columns)
 
         def triad(kind: str, scale: float) -> Array:
             there = [(i, columns.get(kind + axis)) for i, axis in enumerate("xyz")]

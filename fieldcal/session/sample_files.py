@@ -111,6 +111,8 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         if not _agrees(whole.metadata):
             read(path)  # which says so
         names = [n for n in whole.schema_arrow.names if n in COLUMNS]
+        if len(set(names)) < len(names):
+            read(path)
         yield from whole.iter_batches(batch_size=PART, columns=names)
     else:
         yield from rows_of_text(path)
@@ -168,7 +170,10 @@ def _read_parquet(path: Path) -> pa.Table:
         if not _agrees(file.metadata):
             raise pa.ArrowInvalid("its numbers of rows contradict each other")
         # no checksum covers the names: what was changed there may be no text
-        return table.select([n for n in table.column_names if n in COLUMNS])
+        names = [n for n in table.column_names if n in COLUMNS]
+        if len(set(names)) < len(names):
+            raise pa.ArrowInvalid("two of its columns have one name")
+        return table.select(names)
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
             raise

@@ -106,7 +106,9 @@ class Given(Dictionary):
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
-        super().__init__(rows.x, rows.used, since, common, unit, turns, wander)
+        super().__init__(
+            rows.x, rows.used, since, common, unit, turns, wander, rows.alike
+        )
         has = {group_of(n) for n in self.names}
         if has & set(TILTS):
             has |= set(TILTS)

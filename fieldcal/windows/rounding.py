@@ -25,7 +25,13 @@ the samples is one step to each side:
 
     var U <= p q^2,   f = 2 p - 3 p^2 / 2                                        (4)
 
-Source: B. Widrow and I. Kollar, Quantization Noise, chapter 4; (3) and (4) are worked
+Two means that are v apart lie at places in their steps that are v apart as well, so
+that their errors have the covariance
+
+    sum over h = 1, 2, .. of (q / (pi h))^2 / 2 * exp(-4 pi^2 h^2 s^2 / q^2)
+                             * cos(2 pi h v / q)                                 (5)
+
+Source: B. Widrow and I. Kollar, Quantization Noise, chapter 4; (3) to (5) are worked
 out here.
 """
 
@@ -66,13 +72,37 @@ def of_mean(step: Array, sampled: Array) -> Array:
     >>> np.sqrt([still[0], noisy[0]]).round(4)
     array([0.2887, 0.0084])
     """
+    variance: Array = step**2 * _waves(step, sampled)[0].sum(axis=-1)  # (2)
+    return variance
+
+
+def of_two_means(step: float, sampled: float, apart: Array) -> Array:
+    """Covariance, (...), of the errors of two means that are some `apart`, (5).
+
+    >>> of_two_means(1.0, 0.0, np.array([0.0, 0.5, 1.0])).round(3)
+    array([ 0.083, -0.042,  0.083])
+    """
+    share = apart / step
+    h = np.arange(1.0, WAVES + 1)
+    cosines = np.cos(2 * np.pi * np.multiply.outer(share, h))
+    whole = share - np.floor(share)
+    waves, size = _waves(np.asarray(step), np.asarray(sampled))
+    sawtooth = (whole**2 - whole + 1 / 6) / 2  # what all waves add up to if none fades
+    rest = (sawtooth - cosines @ size[:-1]) * waves[-1] / size[-1]
+    covariance: Array = step**2 * (cosines @ waves[:-1] + rest)  # (5)
+    return covariance
+
+
+def _waves(step: Array, sampled: Array) -> tuple[Array, Array]:
+    """Terms of (2) of a step of one, (..., h), and their sizes (h,) if none fades.
+
+    The last of them is all the rest.
+    """
     h = np.arange(1.0, WAVES + 2)
     size = 1 / (2 * (np.pi * h) ** 2)
     size[-1] = 1 / 12 - size[:-1].sum()
     s = noise_before_rounding(sampled, step) / np.where(step > 0, step, 1.0)
-    fading = np.exp(-((2 * np.pi * h * s[..., None]) ** 2))
-    variance: Array = step**2 * (fading @ size)  # (2)
-    return variance
+    return size * np.exp(-((2 * np.pi * h * s[..., None]) ** 2)), size
 
 
 def of_few(step: Array, sampled: Array) -> Array:

@@ -491,6 +491,19 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, bytes]:
     return block, (folder / "s" / "samples.parquet").read_bytes()
 
 
+def test_a_column_that_damage_gave_the_name_of_another_is_refused(
+    tmp_path: Path, kept: tuple[Block, bytes]
+) -> None:
+    at = kept[1].index(b"\x02ay", len(kept[1]) - 4000)  # in the schema, at the end
+    whole = kept[1][:at] + b"\x02ax" + kept[1][at + 3 :]
+    path = tmp_path / "samples.parquet"
+    path.write_bytes(whole)
+    with pytest.raises(SessionError, match="is not a whole Parquet file"):
+        sample_files.read(path)
+    with pytest.raises(SessionError, match="is not a whole Parquet file"):
+        list(sample_files.blocks(path))
+
+
 @settings(max_examples=150, deadline=None)
 @given(
     near_end=st.booleans(), at=st.integers(0, 2**31 - 1), changed=st.integers(1, 255)

@@ -105,3 +105,17 @@ def test_single_steps_show_where_the_noise_is_lower() -> None:
 def test_examples() -> None:
     failed, tried = doctest.testmod(rounding, extraglobs={"np": np})
     assert tried and not failed
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.12, 0.3])
+@pytest.mark.parametrize("apart", [0.0, 0.2, 0.5, 1.8])
+def test_errors_of_two_means_have_the_covariance_that_it_says(
+    noise: float, apart: float
+) -> None:
+    places = np.linspace(-0.5, 0.5, 801)[:-1]
+    off, other = (
+        np.array([exact(noise, v + more)[0] for v in places]) for more in (0.0, apart)
+    )
+    sampled = 0.25 * np.sqrt(noise**2 + 1 / 12)
+    found = rounding.of_two_means(0.25, sampled, np.array([0.25 * apart]))
+    assert found[0] == pytest.approx(0.25**2 * np.mean(off * other), abs=2e-5)

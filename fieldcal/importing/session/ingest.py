@@ -171,12 +171,10 @@ def _fill(
 
 def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
     """Raise InputError if nothing can come of these rows."""
-    if not facts.rows:
-        raise InputError(f"{recording.path}: has no row that can be used")
     if not facts.measured:
         raise InputError(
-            f"{recording.path}: has no number of an accelerometer or gyroscope in"
-            f" {facts.rows} rows; name its columns with --columns"
+            f"{recording.path}: has no number of an accelerometer or gyroscope in any"
+            " row that can be used; name its columns with --columns"
         )
     if said := too_quick(facts.rate_hz):
         raise InputError(f"{recording.path}: {said}")

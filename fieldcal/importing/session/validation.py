@@ -2,7 +2,8 @@
 
 A row is refused whose time is not later than that of the row before, whose numbers are
 infinite or larger than any sensor's, or which holds nothing but zeros (a buffer that
-was never filled): a missing value is no zero. Rows are written a group at a time, and
+was never filled): a missing value is no zero. Rows without any number are no samples,
+and are left out as if they were not there. Rows are written a group at a time, and
 found again by their time.
 """
 
@@ -70,16 +71,17 @@ class RowValidator:
             bad |= rows
         bad |= self._backwards(block.t, bad)
         self._seen += len(block)
-        if not bad.any():
+        left = bad | _without_numbers(block)
+        if not left.any():
             return block
-        if not self._repair:
+        if bad.any() and not self._repair:
             raise InputError(
                 f"{self._name}: {self._sentence(*self._runs[0])}; mend the file, or"
                 " leave such rows out with --repair"
             )
         self.left_out += int(bad.sum())
-        parts = np.split(np.arange(len(block)), np.flatnonzero(np.diff(bad)) + 1)
-        return concat(block[r[0] : r[-1] + 1] for r in parts if not bad[r[0]])
+        parts = np.split(np.arange(len(block)), np.flatnonzero(np.diff(left)) + 1)
+        return concat(block[r[0] : r[-1] + 1] for r in parts if not left[r[0]])
 
     def _faults(self, block: Block) -> Iterator[tuple[str, str, Rows]]:
         empty = _all_zero(block)
@@ -165,6 +167,14 @@ def _all_zero(block: Block) -> Rows:
         axis=1
     )
     return empty
+
+
+def _without_numbers(block: Block) -> Rows:
+    """Rows that have no value of any sensor."""
+    none: Rows = np.isnan(block.acc[:, 0])
+    if none.any():
+        none &= np.isnan(block.six).all(axis=1) & np.isnan(block.temperature)
+    return none
 
 
 class SampleWriter:

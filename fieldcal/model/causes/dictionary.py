@@ -94,13 +94,14 @@ class Dictionary(ColumnTable):
         unit: Array,
         turns: bool,
         wander: Wander,
+        alike: Array | None = None,
     ) -> None:
         super().__init__(x, used, since, unit, wander)
         self.common, self.turns = common, turns
         self.earth = self.attitude = -1
         self.always: list[Group] = [
             *self._calibration(), *self._gravity(), *self._unoriented_earth(),
-            *self._attitudes(), *self._speeds(),
+            *self._attitudes(), *self._speeds(), *self._alike(alike),
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
@@ -253,6 +254,13 @@ class Dictionary(ColumnTable):
             at = self.add(General("earth anyhow", columns.earth_anyhow), 4)
             size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
             yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed=1.0)
+
+    def _alike(self, sizes: Array | None) -> Iterator[Group]:
+        """What rounding makes of all windows; on the way it averages out."""
+        if sizes is None or not len(some := np.flatnonzero(sizes)):
+            return
+        at = self.course("rounding", lambda x: np.ones((len(x.t), 1)), 1, False)
+        yield Group("rounding", "", at + some, sizes[some], fixed=1.0, random=True)
 
     def _is_free(self, p: int) -> bool:
         """Whether nobody knows where the force of a position points, or its axis."""

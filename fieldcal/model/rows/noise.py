@@ -11,7 +11,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
 from fieldcal.windows.noise import SHOWN, ChannelNoise, short_lag, steps_of
-from fieldcal.windows.rounding import least, of_few, of_mean
+from fieldcal.windows.rounding import least, of_few, of_mean, of_two_means
 
 
 def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> ChannelNoise:
@@ -36,6 +36,27 @@ def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
         off.append(np.maximum(of_mean(step, differences), of_few(step, differences)))
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
+
+
+def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array:
+    """What the errors of `rounding`, (w, 6), have in common in all windows, (6,).
+
+    A gyroscope at rest measures the same in each of them, and is off by the same if its
+    noise does not reach across a step.
+    """
+    out = np.zeros(6)
+    step = _steps(block, windows)[1]
+    _, pieces = _pieces(block, windows)
+    mean = np.array([piece.mean(axis=0) for piece in pieces])
+    sampled = np.array([short_lag(piece[:SHOWN]) for piece in pieces])
+    pairs = np.triu_indices(len(pieces), 1)
+    for c in np.flatnonzero(step > 0) if len(pairs[0]) else ():
+        apart = mean[pairs[0], c] - mean[pairs[1], c]
+        usual = float(np.nanmedian(np.nan_to_num(sampled[:, c])))
+        shared = of_two_means(step[c], usual, np.append(apart, 0.0))
+        share = np.nanmean(shared[:-1]) / shared[-1] if shared[-1] else 0.0
+        out[3 + c] = np.sqrt(max(share, 0.0) * np.mean(off[:, 3 + c] ** 2))
+    return out
 
 
 def _steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means, masked
 from fieldcal.model.rows.bounds import block_bounds, spans
-from fieldcal.model.rows.noise import rounding
+from fieldcal.model.rows.noise import rounding, rounding_alike
 from fieldcal.model.rows.orientation import (
     force_read,
     known_angles,
@@ -46,6 +46,7 @@ class Rows:
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
+    alike : (6,) standard deviation of an error that all windows share
     wander : rms of what a hand adds to the force across it within windows, m/s^2
 
     """
@@ -57,6 +58,7 @@ class Rows:
     length: Array
     noise: Array
     span: Array
+    alike: Array = field(default_factory=lambda: np.zeros(6))
     wander: float = 0.0
 
     @property
@@ -96,6 +98,18 @@ class RowSource:
     left: Array | None = None
     white: Array | None = None
 
+    @property
+    def whole(self) -> RowSource:
+        """The same of the samples of which every output may be used, if there are any.
+
+        The others are as if they had not been sent.
+        """
+        every = self.usable.all(axis=1)
+        if every.all() or not every.any():
+            return self
+        kept = {f.name: getattr(self.block, f.name)[every] for f in fields(Block)}
+        return replace(self, block=Block(**kept), usable=self.usable[every])
+
     @cached_property
     def rate(self) -> float:
         """Samples a second."""
@@ -126,7 +140,9 @@ def reduce(source: RowSource) -> Rows:
         noise,
         np.repeat(shaken.variance, rows, axis=0),
     )
-    off = np.repeat(rounding(block, windows[held]), rows, axis=0)
+    rounded = rounding(block, windows[held])
+    alike = rounding_alike(block, windows[held], rounded)
+    off = np.repeat(rounded, rows, axis=0)
     if source.left is not None:
         off = np.hypot(off, np.sqrt(source.left[out.x.position]))
     # the Earth turns a device of unknown orientation about any of its axes; one that
@@ -134,7 +150,7 @@ def reduce(source: RowSource) -> Rows:
     free = ~out.x.oriented & (len(held) > 1) & ~out.x.earth_seen
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
-    return replace(out, common=off)
+    return replace(out, common=off, alike=alike)
 
 
 def averaged(

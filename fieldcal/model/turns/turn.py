@@ -125,7 +125,7 @@ class Turn:
 
 
 class Turning:
-    """Follows the turns of a recording.
+    """Follows the turns of a recording, by the samples that may be used.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class Turning:
     """
 
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
-        self.source, self.rows, self.since = source, rows, since
+        self.source, self.rows, self.since = source.whole, rows, since
         self.legs = list(self._found())
         self.contradicted: list[tuple[int, int]] = []
 

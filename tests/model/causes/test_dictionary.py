@@ -14,7 +14,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns, smooth
 from fieldcal.model.causes.cause import CLOSURE, Cause, Group, triads_of
-from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
@@ -426,3 +426,22 @@ def test_flicker_is_noise_of_as_many_cosines_as_biases_wander_by() -> None:
         at = np.concatenate([WHOLE.wave(c) for c in some])
         np.testing.assert_array_equal(group.columns, at)
     assert all(c.told for c in WHOLE.causes if c.name != "flicker")
+
+
+def test_what_rounding_has_in_common_is_in_all_windows_and_in_no_turn() -> None:
+    x, size = ladder(), np.array([0.0, 0, 0, 2e-3, 0, 5e-4])
+    held = len(np.unique(x.position))
+    d = Dictionary(
+        x, np.ones((len(x), 6), bool), np.array([x.since_turn]), np.zeros((held, 6)),
+        UNIT, True, Wander.none(), size,
+    )  # fmt: skip
+    (group,) = [g for g in d.always if g.cause == "rounding"]
+    assert group.random and group.fixed == 1.0
+    np.testing.assert_array_equal(group.sizes(1.0), [2e-3, 5e-4])
+    flat = rows_of(x, np.hstack([x.f, x.w]))
+    for part in WindowSystem(flat, d).linearised(nominal()):
+        (at,) = np.nonzero(part.columns == group.columns[0])
+        there = part.design[:, at] / part.weight[:, None]
+        assert bool(there.size and there.all()) == (part.channel == 3)
+    timed = {one.name: one.timed for _, one in d.bases if isinstance(one, Course)}
+    assert not timed["rounding"]

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.noise import grain_of, noise_of, rounding
+from fieldcal.model.rows.noise import (
+    grain_of,
+    noise_of,
+    rounding,
+    rounding_alike,
+)
 
 RATE = 100.0
 WHITE = np.array([1e-2, 2e-2, 3e-2, 1e-4, 2e-4, 3e-4])
@@ -58,3 +65,35 @@ def test_the_more_noise_the_less_rounding_is_left() -> None:
     step = np.repeat([0.03, 1.0], 3) * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     off = rounding(recorded(step), WINDOWS)[0]
     assert 3e-4 < off[0] < 0.03 / 12**0.5 and off[1] < 1e-4
+
+
+def test_the_bias_at_rest_is_off_by_the_same_in_all_windows() -> None:
+    """Of noise far below a step their mean is no better than one of them."""
+    rng, pulls, apart = np.random.default_rng(11), [], []
+    windows = (np.arange(0, 2400, 200)[:, None] + [0, 190]).astype(np.intp)
+    for _ in range(60):
+        bias, noise = rng.uniform(-1, 1, 3), rng.uniform(0.03, 0.08)
+        rates = bias + noise * rng.standard_normal((2400, 3))
+        on_the_way = np.arange(2400) % 200 > 190
+        rates[on_the_way] += 40 * rng.standard_normal((108, 3))
+        acc = rng.normal(0, 9, (12, 3)).repeat(200, axis=0)
+        block = Block.of(np.arange(2400) / RATE, acc + rates, 0.01 * np.round(rates))
+        off = rounding(block, windows)
+        alike = rounding_alike(block, windows, off)
+        assert not alike[:3].any(), "no two rests are the same to accelerometers"
+        means = np.array([block.gyr[a:b].mean(axis=0) for a, b in windows])
+        own = (off[:, 3:] ** 2).mean(axis=0) / len(windows)
+        error = means.mean(axis=0) - 0.01 * bias
+        pulls.append(error / np.sqrt(alike[3:] ** 2 + own))
+        apart.append(error / np.sqrt(own))
+    assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.1
+    assert np.sqrt(np.mean(np.square(apart))) > 2.5
+
+
+def test_means_at_different_places_in_a_step_have_nothing_in_common() -> None:
+    block = recorded(np.repeat([0.0, 0.5], 3))
+    away = block.gyr + np.arange(6000)[:, None] / 6000 * 13.3
+    off = np.full((2, 6), 0.1)
+    found = rounding_alike(replace(block, gyr=0.5 * np.round(2 * away)), WINDOWS, off)
+    assert (found < 0.06).all()
+    assert not rounding_alike(block, WINDOWS[:1], off[:1]).any(), "one has its own"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.motion import moving
+from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import parse
 
 RATE, NOISE = 100.0, 1e-4
@@ -109,3 +112,24 @@ def test_without_all_samples_no_motion_is_followed() -> None:
         source.block.t[:] = t
         assert (moving(source, rows, (0, 1), *GAP) is not None) == found
         source.block.t[:] = np.arange(len(t)) / RATE
+
+
+def test_single_samples_that_may_not_be_used_are_as_if_they_were_missing() -> None:
+    """A turn is followed across them, and not across a second without any."""
+    source, rows = recorded(turning(2000, 2500))
+    lost = source.usable.copy()
+    lost[1700:2700:40, 4] = False
+    legs = [Turning(s, rows, np.zeros((1, len(rows.x)))).legs
+            for s in (source, replace(source, usable=lost))]  # fmt: skip
+    (pair, first, last), (other, begins, ends) = legs[0][0], legs[1][0]
+    assert pair == other
+    whole = replace(source, usable=lost).whole.block
+    assert len(whole) == len(source.block) - 25
+    t = source.block.t
+    assert whole.t[begins] == pytest.approx(t[first], abs=0.05)
+    assert whole.t[ends] == pytest.approx(t[last], abs=0.05)
+    lost[2200:2300] = False
+    broken = replace(source, usable=lost)
+    assert not Turning(broken, rows, np.zeros((1, len(rows.x)))).legs
+    nothing = replace(source, usable=np.zeros_like(lost))
+    assert source.whole is source and nothing.whole is nothing

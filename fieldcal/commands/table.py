@@ -96,7 +96,8 @@ def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
     }
     for group, parameters in truth.get("effects", {}).items():
         if isinstance(parameters, Mapping):
-            flat |= {f"{group}.{k}": float(v) for k, v in parameters.items()}
+            numbers = {k: v for k, v in parameters.items() if not isinstance(v, str)}
+            flat |= {f"{group}.{k}": float(v) for k, v in numbers.items()}
     return flat
 
 

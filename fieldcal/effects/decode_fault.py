@@ -7,7 +7,9 @@ Of a 16-bit count, high and low byte hi, lo:
     wrapped                  count - 65536 [count > 32767], and the other way about
 
 Each can be undone count by count; what was broken gets smoother by it, what was whole
-rougher. Source: model of this project; the usual slips in reading a register pair.
+rougher. Single samples that jump away and back by more than the device can move are
+none of these; each is replaced by the mean of those beside it. Source: model of this
+project; the usual slips in reading a register pair.
 
 >>> import numpy as np
 >>> course = np.arange(1000, 3000, 7)
@@ -25,6 +27,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
+from fieldcal.windows.spikes import without_spikes
 
 Counts = NDArray[np.int64]
 
@@ -48,6 +51,9 @@ NEARER = 10.0
 
 UNLIKELY = (5.0, 0.5)
 """Departure that no sensor at rest has, m/s^2 and rad/s."""
+
+MOVED = 10.0
+"""How many times that a device on its way may depart by: a knock, 5 g for a sample."""
 
 
 def undone(counts: Counts) -> tuple[str, Counts]:
@@ -92,13 +98,49 @@ class DecodeFault(Chain):
     covariate = "clusters 256 LSB apart, jumps at ±2^15"
     treatment = "mend"
     decided_by = "the byte order and width in the device's manual"
-    cure = "Correct byte order, width or sign in the decoder."
+    cure = (
+        "Correct byte order, width or sign in the decoder; single wild values come of"
+        " damaged frames: check the cable, its speed, and that checksums are looked at."
+    )
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
-        """Channels that become smooth when a slip is undone."""
-        found = (_fault(recording, c) for c in range(len(CHANNELS)))
+        """Channels that become smooth when a slip is undone, or without wild values."""
+        wild = _wild(recording)
+        found = (_fault(recording, c) or _of_wild(recording, c, wild[:, c])
+                 for c in range(len(CHANNELS)))  # fmt: skip
         return [fault for fault in found if fault is not None]
+
+
+def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
+    """Single samples that jump by more than the device can move, (n, 6)."""
+    six = recording.block.six
+    gone = np.isnan(without_spikes(recording.block).six) & np.isfinite(six)
+    apart = np.zeros_like(six)
+    apart[1:-1] = np.abs(six[1:-1] - (six[:-2] + six[2:]) / 2)
+    most = np.repeat(UNLIKELY, 3) * np.where(recording.still, 1.0, MOVED)[:, None]
+    return gone & (apart > most * np.abs(recording.scale))
+
+
+def _of_wild(
+    recording: CheckedSamples, c: int, wild: NDArray[np.bool_]
+) -> Fault | None:
+    """Wild values of one channel, and what they may have been."""
+    rows = np.flatnonzero(wild)
+    if not len(rows):
+        return None
+    six, t = recording.block.six, recording.block.t
+    size = float(np.abs(six[rows, c]).max())
+    six[rows, c] = (six[rows - 1, c] + six[rows + 1, c]) / 2
+    return Fault(
+        channel=CHANNELS[c],
+        values={"channel": CHANNELS[c], "kind": "wild"},
+        sigmas={},
+        from_s=float(t[rows[0]]),
+        to_s=float(t[rows[-1]]),
+        size=size,
+        mended=six,
+    )
 
 
 def _fault(recording: CheckedSamples, c: int) -> Fault | None:

@@ -3,6 +3,7 @@
 low_byte_signed   256 (r >> 8) + signed(r & 255): 256 too low in half of all cases
 bytes_swapped     the low byte taken for the high one
 wrapped           r beyond 2^15 comes out at the other end instead of clipped
+wild              one word in 500, drawn by its time, has its bits mixed up
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ from fieldcal.sim_device.effect import (
     rows,
 )
 
-KINDS = ("low_byte_signed", "bytes_swapped", "wrapped")
+KINDS = ("low_byte_signed", "bytes_swapped", "wrapped", "wild")
+RARE = 500
+"""Words of which one is wild."""
+
 ACC_FULL_SCALE = 16 * STANDARD_GRAVITY
 GYR_FULL_SCALE = float(np.deg2rad(2000))
 """What a device without a full scale of its own has."""
@@ -51,7 +55,8 @@ class SimulatedDecodeFault(SimulatedEffect):
                 raw = np.rint(x[row] * (32768 / full)).astype(np.int64)
                 if kind != "wrapped":
                     raw = np.clip(raw, -32768, 32767)
-                x[row] = _misread(raw, kind) * (full / 32768)
+                read = _wild(raw, t) if kind == "wild" else _misread(raw, kind)
+                x[row] = read * (full / 32768)
 
         return misread
 
@@ -75,3 +80,10 @@ def _misread(raw: NDArray[np.int64], kind: str) -> Array:
     else:
         word = raw
     return ((word + 32768) % 65536 - 32768).astype(float)
+
+
+def _wild(raw: NDArray[np.int64], t: Array) -> Array:
+    """16-bit words of which some have their bits mixed up, (n,)."""
+    drawn = np.rint(1e4 * t).astype(np.int64) * 2_654_435_761 % 2**32
+    bits = np.where(drawn % RARE == 0, drawn >> 16, 0)
+    return (((raw ^ bits) + 32768) % 65536 - 32768).astype(float)

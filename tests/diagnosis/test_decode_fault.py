@@ -34,7 +34,7 @@ def slip(kind: str, counts: Counts) -> Counts:
     return np.array(out)
 
 
-def with_six(block: Block, six: NDArray[np.float64]) -> Block:
+def with_six(block: Block, six: NDArray[np.floating]) -> Block:
     return replace(block, acc=six[:, :3], gyr=six[:, 3:])
 
 
@@ -61,6 +61,37 @@ def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
         np.testing.assert_allclose(told.block.six, whole, rtol=1e-6, atol=1e-9)
         tried += 1
     assert tried >= 3
+
+
+def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:
+    about = description.parse(tables(TACTICAL))
+    block = record(TACTICAL, ride(TACTICAL, seed=3))
+    rng, six = np.random.default_rng(4), block.six
+    full = np.repeat([16 * 9.80665, np.deg2rad(2000)], 3)
+    lost = rng.choice(np.arange(5, len(six) - 5, 4), 60, replace=False)
+    size = rng.uniform(0.4, 1, (60, 6)) * rng.choice([-1, 1], (60, 6))
+    six[lost] = size * full
+    told = check(with_six(block, six), about)
+    found = [f.values for i, f in told.faults if i == "decode_fault"]
+    assert found == [{"channel": c, "kind": "wild"} for c in CHANNELS]
+    kept = np.delete(np.arange(len(six)), lost)
+    np.testing.assert_array_equal(told.block.six[kept], block.six[kept])
+    beside = (block.six[lost - 1] + block.six[lost + 1]) / 2
+    np.testing.assert_allclose(told.block.six[lost], beside)
+
+
+@pytest.mark.parametrize("push", [2.0, 30.0])
+def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
+    """It moves the device; at rest 2 m/s^2 of one sample may as well be noise."""
+    about = description.parse(tables(TACTICAL))
+    ridden = ride(TACTICAL, seed=3)
+    block = record(TACTICAL, ridden)
+    held = ridden.held >= 0
+    at = np.flatnonzero(held if push < 5 else ~held)[40::400]
+    six = block.six
+    six[at, :3] += push
+    told = check(with_six(block, six), about)
+    assert "decode_fault" not in told.ids
 
 
 @pytest.mark.parametrize("steps", [0.05, 0.3, 1.2])

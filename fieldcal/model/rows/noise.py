@@ -47,16 +47,26 @@ def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array
     out = np.zeros(6)
     step = _steps(block, windows)[1]
     _, pieces = _pieces(block, windows)
-    mean = np.array([piece.mean(axis=0) for piece in pieces])
-    sampled = np.array([short_lag(piece[:SHOWN]) for piece in pieces])
+    mean = np.array([_mean_of_known(piece) for piece in pieces])
+    sampled = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
     pairs = np.triu_indices(len(pieces), 1)
-    for c in np.flatnonzero(step > 0) if len(pairs[0]) else ():
+    for c in np.flatnonzero(step > 0):
         apart = mean[pairs[0], c] - mean[pairs[1], c]
-        usual = float(np.nanmedian(np.nan_to_num(sampled[:, c])))
-        shared = of_two_means(step[c], usual, np.append(apart, 0.0))
-        share = np.nanmean(shared[:-1]) / shared[-1] if shared[-1] else 0.0
-        out[3 + c] = np.sqrt(max(share, 0.0) * np.mean(off[:, 3 + c] ** 2))
+        apart = apart[np.isfinite(apart)]
+        usual = float(np.median(sampled[:, c]))
+        *shared, own = of_two_means(step[c], usual, np.append(apart, 0.0))
+        if len(shared) and own > 0:
+            share = max(float(np.mean(shared)) / own, 0.0)
+            out[3 + c] = np.sqrt(share * np.mean(off[:, 3 + c] ** 2))
     return out
+
+
+def _mean_of_known(piece: Array) -> Array:
+    """Means of the samples (n, c) that there are; nan without any."""
+    known = np.isfinite(piece)
+    total = np.where(known, piece, 0.0).sum(axis=0)
+    mean: Array = total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    return mean
 
 
 def _steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -97,3 +97,14 @@ def test_means_at_different_places_in_a_step_have_nothing_in_common() -> None:
     found = rounding_alike(replace(block, gyr=0.5 * np.round(2 * away)), WINDOWS, off)
     assert (found < 0.06).all()
     assert not rounding_alike(block, WINDOWS[:1], off[:1]).any(), "one has its own"
+
+
+def test_samples_that_are_missing_do_not_hide_what_means_have_in_common() -> None:
+    block = recorded(np.repeat([0.0, 0.5], 3))
+    off = rounding(block, WINDOWS)
+    told = rounding_alike(block, WINDOWS, off)
+    assert (told[3:] > 0.1).all()
+    block.gyr[50:100, :2] = np.nan
+    np.testing.assert_allclose(rounding_alike(block, WINDOWS, off), told)
+    block.gyr[:2000, 2] = np.nan
+    assert rounding_alike(block, WINDOWS, off)[5] == 0, "one window is left"

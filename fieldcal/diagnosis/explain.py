@@ -25,6 +25,7 @@ from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.posterior.time_constants import elsewhere
 from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.change_points import change_points
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings
@@ -170,6 +171,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
         Wander.of(rows, unit), rows.alike,
     )  # fmt: skip
     dictionary.unfitted = tuple(_factory(dictionary, about, prepared))
+    dictionary.tried_at(change_points(rows).tolist())
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
     # what sways is taken out of windows and closures; on the way it shakes

@@ -41,6 +41,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.windows.cells import CELL, Between, CellRows, CellTable, hold_last
 from fieldcal.windows.dead_axis import LivingRows
@@ -75,6 +76,12 @@ LONGER = 2
 
 DRIFT = 4
 """Means of that many times T tell the slope."""
+
+CHANCE = 1e-3
+"""Chance of more scatter in a gap than noise makes, below which something was there."""
+
+CLOSE = 20
+"""Cells beside a gap by which samples in it are known: two seconds."""
 
 QUICK = 4
 """Order of the differences of rates that tell what is too quick for the samples."""
@@ -112,33 +119,56 @@ def joined_rests(
     out: list[Rest] = []
     for start, end in spans:
         last = out[-1] if out else None
-        if last and _goes_on(
+        gaps = last and _gaps(
             living, origin, living.of(between), last.pieces[-1], (start, end)
-        ):
-            out[-1] = Rest(last.start, end, (*last.without, (last.end, start)))
-        else:
+        )
+        if last is None or gaps is None:
             out.append(Rest(start, end))
+        else:
+            out[-1] = Rest(last.start, end, (*last.without, *gaps))
     return out
 
 
-def _goes_on(
+def _gaps(
     rows: CellRows,
     origin: Array,
     between: Between,
     first: tuple[float, float],
     later: tuple[float, float],
-) -> bool:
-    """Whether the device lies in one stretch as in the one before."""
+) -> list[tuple[float, float]] | None:
+    """What to leave out between two stretches in which the device lies alike, or None.
+
+    Nothing where a bias jumped and nobody touched the device.
+    """
     gap = (first[1], later[0])
     if gap[1] - gap[0] > LONGEST_S:
-        return False
+        return None
     began, ended, begins, ends = (cell_of(rows, t) for t in (*first, *later))
     before = table_of(rows[max(began, ended - BESIDE) : ended], origin)
     after = table_of(rows[begins + 1 : min(ends, begins + 1 + BESIDE)], origin)
     way = concat(list(between(gap[0] - CELL, gap[1] + CELL)))
     if min(len(before), len(after)) < 2 or _paused(way.t):
+        return None
+    if not as_before(before, way, after, gap) > SURE:
+        return None
+    return [] if _untouched(before, way.between(*gap), after) else [gap]
+
+
+def _untouched(before: CellTable, way: Block, after: CellTable) -> bool:
+    """Whether samples are as before up to some instant, and from it on as after."""
+    noise = hold_last(np.vstack([before.short, after.short])).mean(axis=0)
+    noise = noise + np.maximum(before.rounding, after.rounding) ** 2
+    one = before.origin + hold_last(before.means)[-CLOSE:].mean(axis=0)
+    other = after.origin + hold_last(after.means)[:CLOSE].mean(axis=0)
+    known = np.isfinite(one + other + noise) & (noise > 0)
+    six = way.six[:, known]
+    if not np.isfinite(six).all():
         return False
-    return as_before(before, way, after, gap) > SURE
+    early, late = (np.cumsum((np.square(six - level[known]) / noise[known]).sum(axis=1))
+                   for level in (one, other))  # fmt: skip
+    early, late = np.append(0.0, early), np.append(0.0, late)
+    least = float((early + late[-1] - late).min())
+    return chi2_tail(least, six.size) > CHANCE
 
 
 def _paused(t: Array) -> bool:

@@ -119,6 +119,24 @@ def test_a_jump_is_no_jump_of_the_bias_without_gyroscopes() -> None:
         assert len(rests(Block.of(calm.t, calm.acc))) == 1
 
 
+@pytest.mark.parametrize("touched", [False, True])
+def test_of_a_bias_that_jumps_untouched_nothing_is_left_out(touched: bool) -> None:
+    """A jump of a gyroscope's bias is cut at, and joined again where it jumped."""
+    rng, at = np.random.default_rng(8), 61.3
+    t = np.arange(round(120 * RATE)) / RATE
+    acc = [1.0, -5.0, 8.3] + 0.01 * rng.standard_normal((len(t), 3))
+    gyr = 0.01 + 5e-4 * rng.standard_normal((len(t), 3))
+    gyr[t > at, 1] += 4e-3
+    if touched:
+        s = np.maximum(t - at, 0.0)
+        acc[:, 2] += 0.3 * np.sin(2 * np.pi * 11 * s) * np.exp(-s / 0.2)
+    block = Block.of(t, acc, gyr)
+    assert len(still_stretches(block)) == 2
+    (rest,) = rests(block)
+    assert len(rest.without) == touched
+    assert rest.start < 2 and rest.end > 118
+
+
 def test_what_went_on_in_a_pause_nobody_knows() -> None:
     block = recorded(1)
     some = [block.between(0, 40.2), block.between(43.2, 200)]

@@ -288,6 +288,13 @@ class Dictionary(ColumnTable):
         new = at_points(self, group, [({name: float(v)}, group.origin) for v in values])
         return self.exchanged(cause, (*cause.variants, *new)), new
 
+    def tried_at(self, instants: Sequence[float]) -> None:
+        """Have effects that begin at an instant begin at these as well."""
+        for cause in self.causes:
+            begin = {g.params: g for g in cause.variants if _begins(g)}
+            for group in begin.values():
+                cause, _ = self.refined(cause, group, instants)
+
     def exchanged(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
         """A cause with other variants, in the place of the one that was."""
         more = replace(cause, variants=variants)
@@ -310,3 +317,10 @@ class Dictionary(ColumnTable):
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
         for cached in ("by_width", "chances", "typical"):
             self.__dict__.pop(cached, None)
+
+
+def _begins(group: Group) -> bool:
+    """Whether an instant is the shape of a group."""
+    return group.effect is not None and [s.kind for s in group.effect.shapes] == [
+        "instant"
+    ]

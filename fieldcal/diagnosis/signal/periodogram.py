@@ -134,7 +134,11 @@ def highest(
             odds += np.log(LOOKS * len(total))
             if odds < best:
                 best, peak = odds, _peak_at(hz, total / (count * len(some)), at)
-    return peak and replace(peak, noise=_noise_near(spectra[0], peak.hz, pieces.noise))
+    if peak is None:
+        return None
+    # a line in short windows reaches its neighbours
+    near = noise_near(spectra[0], peak.hz, pieces.noise)
+    return replace(peak, noise=np.minimum(near, pieces.noise))
 
 
 def _level(power: Array, count: int) -> Array:
@@ -143,15 +147,15 @@ def _level(power: Array, count: int) -> Array:
     return _on_a_slope(power, _floor(power) / (1 - 1 / (9 * count)) ** 3)
 
 
-def _noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
+def noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
     """White noise as strong as the spectrum near a frequency, (6,).
 
-    At most that of the samples, since a line in short windows reaches its neighbours.
+    That of the samples, `white`, for outputs of which nothing is looked at.
     """
     noise, at = white.copy(), int(np.argmin(np.abs(spectrum.hz - hz)))
     for c in sorted({c for some in spectrum.together for c in some}):
         level = _level(spectrum.power[c], spectrum.count)[at]
-        noise[c] = min(noise[c], np.sqrt(level / spectrum.count))
+        noise[c] = np.sqrt(level / spectrum.count)
     return noise
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.change_points import clear_jumps
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.experience import Experience
 
@@ -48,14 +49,16 @@ def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
 def pieces_of(source: RowSource, rows: Rows) -> Pieces:
     """Windows of a recording that are long enough.
 
-    Outputs of which rows say nothing, as of gravity on a table that turns, are zero.
+    Outputs of which rows say nothing, as of gravity on a table that turns, are zero. A
+    bias that jumps is taken out: it has power at every frequency.
     """
     block, held = source.block, held_in(source, rows)
     times = tuple(block.t[a:b] for _, a, b in held)
+    cuts = np.ravel(clear_jumps(rows))
     samples = []
     for (row, a, b), t in zip(held, times, strict=True):
         usable = source.usable[a:b] & rows.used[row]
-        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable))
+        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable, cuts))
     x = places_of(rows, held)
     return Pieces(x, tuple(samples), times, rows.noise, rate_of(block))
 
@@ -73,15 +76,21 @@ def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
     )
 
 
-def _flat(t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_]) -> Array:
-    """Samples without mean and slope, (n, 6); zero where not usable."""
+def _flat(
+    t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_], cuts: Array
+) -> Array:
+    """Samples without slope and the means between cuts, (n, 6); zero if not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
+    first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))
+    long = np.diff(np.append(first, len(t)))
+    s -= np.repeat(np.add.reduceat(s, first) / long, long)
     out = np.empty((len(t), 6))
     for c in range(6):
         values = (acc if c < 3 else gyr)[:, c % 3]
         known = usable[:, c] & np.isfinite(values)
         column = np.where(known, values, 0.0)
-        column -= column.sum() / max(int(known.sum()), 1)
+        many = np.add.reduceat(known.astype(float), first)
+        column -= np.repeat(np.add.reduceat(column, first) / np.maximum(many, 1), long)
         column *= known
         slope = (s @ column) / max(float((s * s) @ known), 1e-12)
         column -= slope * s

@@ -6,6 +6,9 @@ is tried as well: of the means of m rows on either side the largest difference
 
     |mean of m after - mean of m before| / sqrt(var of both),   m = 1, 2, 4, 8      (1)
 
+Beside a clear jump, the means differ by far more than the rows scatter about them; what
+comes and goes, as a line in the spectrum does, scatters about them as much.
+
 Source: moving-sum statistic for a change of the mean; Eichinger & Kirch 2018,
 Bernoulli 24(1).
 """
@@ -14,19 +17,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import Rows
 
 WIDTHS = (1, 2, 4, 8)
 """Rows on either side: a jump amid flicker shows best in some of them."""
 
+CLEAR = 16.0
+"""Standard deviations of the difference, by the scatter beside it, of a clear jump: a
+sine of any frequency comes to 12.7 at most, a ramp to 7.9."""
+
 
 def change_points(rows: Rows) -> Array:
     """The instant between rows at which each output changes most, (k,) s, k <= 6."""
-    held = np.flatnonzero(np.diff(rows.x.position))
-    windows = np.split(np.arange(len(rows.x.t)), held + 1)
     found: dict[int, tuple[float, float]] = {}
-    for window in windows:
+    for window in _windows(rows):
         for c in range(6):
             some = window[rows.used[window, c]]
             for m in WIDTHS:
@@ -38,6 +43,34 @@ def change_points(rows: Rows) -> Array:
                 at = _between(rows, some[k + m - 1], some[k + m])
                 found[c] = max(best, (float(size[k]), at))
     return np.unique([at for _, at in found.values()])
+
+
+def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
+    """Start and end of each row that a clear jump lies in or next to, s.
+
+    Of each output of a window the largest.
+    """
+    found, m = set[tuple[float, float]](), WIDTHS[-1]
+    for window in _windows(rows):
+        for c in range(6):
+            some = window[rows.used[window, c]]
+            if len(some) < 2 * m + 1:
+                continue
+            beside = np.lib.stride_tricks.sliding_window_view(rows.y[some, c], m)
+            before, after = beside[: -m - 1], beside[m + 1 :]  # a row lies between
+            scatter = (before.var(axis=1, ddof=1) + after.var(axis=1, ddof=1)) / m
+            change = after.mean(axis=1) - before.mean(axis=1)
+            k = int(np.argmax(np.abs(change) - CLEAR * np.sqrt(scatter)))
+            if abs(change[k]) > CLEAR * np.sqrt(scatter[k]):
+                start, end = rows.span[some[k + m]].tolist()
+                found.add((start, end))
+    return sorted(found)
+
+
+def _windows(rows: Rows) -> list[Index]:
+    """Rows of each window."""
+    turned = np.flatnonzero(np.diff(rows.x.position)) + 1
+    return np.split(np.arange(len(rows.x.t)), turned)
 
 
 def _changes(y: Array, variance: Array, m: int) -> Array:

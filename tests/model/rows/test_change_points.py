@@ -9,7 +9,7 @@ import pytest
 from small_sessions import SD, ladder, rows_of
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.change_points import change_points
+from fieldcal.model.rows.change_points import change_points, clear_jumps
 from fieldcal.model.rows.reduce import Rows
 
 
@@ -55,3 +55,18 @@ def test_without_rows_there_is_none() -> None:
     made = rows(np.zeros((27, 6)))
     nothing = np.zeros((27, 6)) + np.nan
     assert len(change_points(replace(made, sd=nothing))) == 0
+
+
+@pytest.mark.parametrize("channel", [0, 4])
+def test_only_a_jump_is_a_clear_one(channel: int) -> None:
+    """What swings by as much is none, nor is what drifts."""
+    x = ladder(60)
+    y = SD * np.random.default_rng(6).standard_normal((len(x), 6))
+    span = np.column_stack([x.t - 0.25, x.t + 0.25])
+    row = np.arange(len(x))
+    for course in (np.sin(row / 3.0), np.sin(row / 12.0), row / 60.0):
+        moved = y + 30 * SD * course[:, None]
+        assert clear_jumps(replace(rows_of(x, moved), span=span)) == []
+    y[80:120, channel] += 40 * SD[channel]
+    (found,) = clear_jumps(replace(rows_of(x, y), span=span))
+    assert found in [tuple(span[79]), tuple(span[80])]

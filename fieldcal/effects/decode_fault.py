@@ -24,10 +24,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
-from fieldcal.windows.spikes import without_spikes
+from fieldcal.windows.spikes import WILD, without_spikes
 
 Counts = NDArray[np.int64]
 
@@ -51,6 +52,9 @@ NEARER = 10.0
 
 UNLIKELY = (5.0, 0.5)
 """Departure that no sensor at rest has, m/s^2 and rad/s."""
+
+BESIDE = 10
+"""Samples to either side that tell whether something shakes the device."""
 
 MOVED = 10.0
 """How many times that a device on its way may depart by: a knock, 5 g for a sample."""
@@ -119,7 +123,16 @@ def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
     apart = np.zeros_like(six)
     apart[1:-1] = np.abs(six[1:-1] - (six[:-2] + six[2:]) / 2)
     most = np.repeat(UNLIKELY, 3) * np.where(recording.still, 1.0, MOVED)[:, None]
-    return gone & (apart > most * np.abs(recording.scale))
+    wild = gone & (apart > most * np.abs(recording.scale))
+    steps = np.arange(2, BESIDE + 2)
+    for c in np.flatnonzero(wild.any(axis=0)):
+        rows = np.flatnonzero(wild[:, c])
+        sides = (
+            np.clip(np.add.outer(rows, s), 0, len(six) - 1) for s in (steps, -steps)
+        )
+        usual = np.max([np.nanmedian(apart[near, c], axis=1) for near in sides], axis=0)
+        wild[rows, c] = apart[rows, c] > WILD * DEVIATION * usual
+    return wild
 
 
 def _of_wild(

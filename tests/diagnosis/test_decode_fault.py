@@ -80,6 +80,18 @@ def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:
     np.testing.assert_allclose(told.block.six[lost], beside)
 
 
+def test_what_shakes_a_device_is_no_wild_value() -> None:
+    """Random shaking of 4 m/s^2 in one window: each sample jumps."""
+    about = description.parse(tables(TACTICAL))
+    ridden = ride(TACTICAL, seed=3)
+    block, rng = record(TACTICAL, ridden), np.random.default_rng(2)
+    six, shaken = block.six, ridden.held == 4
+    six[shaken, :3] += rng.normal(0, 4.0, (shaken.sum(), 3))
+    six[shaken, 3:] += rng.normal(0, 0.4, (shaken.sum(), 3))
+    told = check(with_six(block, six), about)
+    assert "decode_fault" not in told.ids
+
+
 @pytest.mark.parametrize("push", [2.0, 30.0])
 def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
     """It moves the device; at rest 2 m/s^2 of one sample may as well be noise."""

@@ -181,7 +181,7 @@ class SessionRun:
             if remedy is None:
                 return
             self._remedies += 1
-            yield from note(f"NO-GO so far: {so_far.reasons[0]}. {remedy['says']}")
+            yield from note(f"NO-GO so far: {so_far.reasons[0]}; {remedy['says']}")
             for number in remedy["again"]:
                 yield Repeat(number)
             for place in remedy["positions"]:

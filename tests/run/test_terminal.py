@@ -127,6 +127,13 @@ def test_a_position_taken_is_ticked_off_with_its_sigma(
     assert "taken   ± 3.00 mm/s²" in screen(operator)
 
 
+@pytest.mark.parametrize("size", [(80, 24), (60, 20), (40, 15)])
+def test_while_the_next_position_is_chosen_it_says_so(size: tuple[int, int]) -> None:
+    operator = sized(*size)
+    operator.show(view("taken", 30.0, hold=operator._shown.hold))
+    assert "what comes next is being worked out" in screen(operator)
+
+
 def test_what_went_wrong_stays_until_the_position_is_taken(
     operator: ConsoleOperator,
 ) -> None:

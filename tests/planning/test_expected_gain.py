@@ -13,6 +13,7 @@ import pytest
 from fieldcal.core.positions import Position
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.search.inference import Inference
 from fieldcal.planning.expected_gain import ExpectedGain
 from fieldcal.session import description
 from fieldcal.sim_device.profile import Profile
@@ -192,6 +193,23 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
     assert likely.state.columns.max() >= len(posterior.search.gram.index)
     assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()
+
+
+def test_what_a_part_showed_may_be_contradicted_without_a_search_from_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tilt = [("base_tilt", {"about_x_deg": 0.5, "about_z_deg": -0.4})]
+    other = [("settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0})]
+    before, whole = explained(START[:2], other), explained(START, tilt)
+    assert {c.name for c, _ in before.best.set.members} == {"settling"}
+
+    def refused(*_: object) -> None:
+        raise AssertionError("searched from nothing")
+
+    monkeypatch.setattr(Inference, "_from_nothing", refused)
+    quick = explain(whole.prepared, before)
+    assert [c.name for c, _ in quick.best.set.members] == ["base_tilt"]
+    assert quick.best.set.keys == whole.best.set.keys
 
 
 @pytest.mark.parametrize("name, given", [

@@ -3,8 +3,9 @@
 It begins with home and both joints turned. After each window it is judged what the
 calibration is good for and what the recording may conceal; the next position is the one
 of the ladder that is expected to tell most of both (`fieldcal.planning.expected_gain`).
-It ends at GO with no position left that would tell much, at a cause that is certain and
-that no position mends, or at the largest number of positions.
+It ends at GO with no position left that would tell much, or where the operator leaves
+out what would; at a cause that is certain and that no position mends; or at the largest
+number of positions.
 """
 
 from __future__ import annotations
@@ -61,14 +62,16 @@ def plan(
     held = yield from hold_each(about.positions, seconds, sigma)
     positions = list(about.positions)
     refused = {p.degrees for i, p in enumerate(positions) if i not in held}
+    content = False
     while True:
         so_far: SoFar = yield Judge(quick=True)
         worth, places = _worth(so_far, about, positions, refused)
-        end = _end(so_far, worth, len(positions), most(about, "adaptive") or MOST)
+        allowed = most(about, "adaptive") or MOST
+        end = _end(so_far, worth, len(positions), allowed, content)
         if end and so_far.quick:  # it ends by nothing but a search in full
             so_far = yield Judge()
             worth, places = _worth(so_far, about, positions, refused)
-            end = _end(so_far, worth, len(positions), most(about, "adaptive") or MOST)
+            end = _end(so_far, worth, len(positions), allowed, content)
         if end:
             yield from note(end)
             return _ended(so_far, positions, held)
@@ -82,6 +85,7 @@ def plan(
         except Skipped as skipped:
             yield from note(str(skipped))
             refused.add(one.degrees)
+            content = so_far.enough
 
 
 def _run(about: Description) -> dict[str, Any]:
@@ -125,8 +129,13 @@ def _allowed(so_far: SoFar) -> dict[str, float]:
     return {n: so_far.limits.sigma(group_of(n)) or np.inf for n in names}
 
 
-def _end(so_far: SoFar, worth: Worth | None, held: int, most: int) -> str:
-    """Why it ends here, for the operator; empty if it goes on."""
+def _end(
+    so_far: SoFar, worth: Worth | None, held: int, most: int, content: bool
+) -> str:
+    """Why it ends here, for the operator; empty if it goes on.
+
+    `content` is whether the operator left out what was asked for beyond GO.
+    """
     count = f"after {held} positions"
     if worth is None:
         why = so_far.laid.examined[1] or "there is none left to choose from"
@@ -134,6 +143,8 @@ def _end(so_far: SoFar, worth: Worth | None, held: int, most: int) -> str:
     little = float(worth.gain.max()) < LITTLE
     if so_far.enough and little:
         return f"{count} all is known that was asked for"
+    if so_far.enough and content:
+        return "it is GO, and what would tell more was left out"
     name = _named(so_far)
     if name and not _uncertain(so_far):
         return f"{count} it is clear what is wrong: {name}"
@@ -178,7 +189,7 @@ def _why(so_far: SoFar, worth: Worth | None, place: int) -> str:
     told = worth.foremost(place) if worth else ""
     what = f"the {title(told)}" if "." in told else f"whether there is {told}"
     if so_far.enough:
-        return f"GO so far; the next position tells {what}"
+        return f"GO so far; the next position tells {what}; s pressed twice ends here"
     lacking = ", ".join(so_far.failed).replace("_", " ") or so_far.says
     return f"not GO yet ({lacking}); the next position tells {what}"
 

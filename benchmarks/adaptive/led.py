@@ -45,6 +45,7 @@ class Run:
     Attributes
     ----------
     held : positions
+    until_go : of them, when it was GO for the first time; nan where it never was
     go, named : whether it ended at GO; whether what is concealed is named, and no more
     off : standard uncertainties that the worst parameter is off by
     error : rms of the force in positions that were not taken, m/s^2
@@ -53,6 +54,7 @@ class Run:
     """
 
     held: int
+    until_go: float
     go: bool
     named: bool
     off: float
@@ -117,21 +119,25 @@ def led(bench: Bench, run: Mapping[str, Any], places: Any, seed: int) -> Run:
     named = _named(bench.session, end)
     found = end.found
     if found is None:
-        return Run(len(end.laid.still.rows), False, named, 0.0, np.nan, ())
+        held = len(end.laid.still.rows)
+        return Run(held, np.nan, False, named, 0.0, np.nan, ())
     go = found.good and bool(found.info["decision"]["go"])
     error = _held_out(
         bench, virtual, hand, dict(zip(found.names, found.values, strict=True))
     )
     off = _off(bench.session, found)
-    return Run(len(end.laid.still.rows), go, named, off, error, tuple(one.choices))
+    held, choices = len(end.laid.still.rows), tuple(one.choices)
+    until_go = float(np.fmin(one.until_go, held if go else np.nan))
+    return Run(held, until_go, go, named, off, error, choices)
 
 
 class Timed(SessionRun):
-    """A run that notes what each choice takes, until it is shown."""
+    """A run that notes what each choice takes, until it is shown, and the first GO."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.choices: list[float] = []
+        self.until_go = np.nan
 
     def _plan(self) -> Any:
         plan, since = super()._plan(), np.nan
@@ -144,6 +150,9 @@ class Timed(SessionRun):
                     self.choices.append(time.process_time() - since)
                     since = np.nan
                 reply = yield step
+                if isinstance(reply, SoFar) and reply.enough:
+                    now = len(reply.laid.still.rows)
+                    self.until_go = float(np.fmin(self.until_go, now))
                 step = plan.send(reply)
         except StopIteration as done:
             return done.value

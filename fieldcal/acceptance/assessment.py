@@ -231,9 +231,9 @@ def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
             taken.append(int(mark["position"]))
         elif mark.get("event") == "rejoined" and taken:
             said.append(
-                f"the device's clock restarted after position {taken[-1] + 1}: if the"
-                " device lost power, its bias may have changed; record all positions"
-                " without a restart"
+                f"the recording was interrupted after position {taken[-1] + 1}: if the"
+                " device lost power meanwhile, its bias may have changed; record all"
+                " positions without a restart"
             )
     counted = sum(int(m.get("restarts", 0)) for m in marks if m.get("event") == "link")
     if counted:

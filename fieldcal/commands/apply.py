@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = """\
   fieldcal apply bench-7/2026-03-01 calibrated.csv
-  fieldcal apply bench-7/today calibrated.parquet --calibration bench-7/2026-03-01
+  fieldcal apply bench-7/today calibrated.csv --calibration bench-7/2026-03-01
 """
 
 

@@ -43,11 +43,11 @@ RARE = (
 )
 
 EXAMPLE = """\
-  fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --acc-unit g --gyr-unit deg/s
+  fieldcal import log.csv --columns t,ax,ay,az,gx,gy,gz --gyr-unit deg/s
   fieldcal import imu0.log.gz --columns ax,ay,az,gx,gy,gz --rate 100 -o imu0
   fieldcal import flight.ulg --list
   fieldcal import flight.bin --instance IMU.0
-  fieldcal import drive.log --options "dbc=imu.dbc&map=ax=Accel.X,ay=Accel.Y,az=Accel.Z"
+  fieldcal import drive.log --options "dbc=imu.dbc&map=ax=A.X,ay=A.Y,az=A.Z"
 """
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_operator import operator_of
 from fieldcal.commands.run_page import LOCAL, served, told_end
-from fieldcal.commands.run_results import write_junit
+from fieldcal.commands.run_results import broken_off, write_junit
 from fieldcal.commands.run_task import make_task
 from fieldcal.commands.run_waits import (
     PATIENCE,
@@ -50,8 +48,8 @@ RARE = (
     *FACTORY,
 )
 
-INTERRUPTED = 130
-"""Exit code of a run that was stopped."""
+INTERRUPTED, BROKEN = 130, 70
+"""Exit codes of a run that was stopped, and of an error that nobody foresaw."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -166,6 +164,9 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         code, said = INTERRUPTED, "interrupted"
         raise
+    except Exception as error:
+        code, said = BROKEN, f"broke on {type(error).__name__}"
+        raise
     finally:
         if args.headless:
             report("end", exit_code=code, error=said)
@@ -201,7 +202,7 @@ def _shown_on(
         found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
         told_end(page, (), error)
-        _broken_off(args, task, folder, error)
+        broken_off(args, task, folder, error)
         raise
     if args.junit:
         write_junit(args.junit, task, folder, found.to_json())
@@ -232,22 +233,6 @@ def _names_none(args: argparse.Namespace) -> bool:
 
     said = args.device or args.virtual is not None or args.resume
     return not said and args.procedure in procedures.names()
-
-
-def _broken_off(
-    args: argparse.Namespace, task: Task, folder: Path, error: BaseException
-) -> None:
-    """Say what is kept, if anything was begun."""
-    from fieldcal.session.marks import MARKS
-
-    if not os.path.exists(folder / MARKS):  # False where nobody may look
-        return
-    sys.stderr.write(
-        f"what was recorded is kept in {folder}; to go on:"
-        f" fieldcal run --resume {shlex.quote(str(folder))}\n"
-    )
-    if args.junit:
-        write_junit(args.junit, task, folder, None, str(error) or "interrupted")
 
 
 def _record(

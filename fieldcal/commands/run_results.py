@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
+import os
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -114,3 +118,41 @@ def write_junit(
     ])  # fmt: skip
     positions = [*about.positions, *filter(None, [planned(about)])]
     junit.write(path, task.procedure, positions, marks, result, said)
+
+
+def broken_off(
+    args: argparse.Namespace, task: Task, folder: Path, error: BaseException
+) -> None:
+    """Say what is kept, if anything was recorded."""
+    from fieldcal.session.marks import MARKS
+
+    if not os.path.exists(folder / MARKS):  # False where nobody may look
+        return
+    if args.junit:
+        write_junit(args.junit, task, folder, None, str(error) or "interrupted")
+    if args.resume or not _discarded(folder):
+        sys.stderr.write(
+            f"what was recorded is kept in {folder}; to go on:"
+            f" fieldcal run --resume {shlex.quote(str(folder))}\n"
+        )
+
+
+def _discarded(folder: Path) -> bool:
+    """Remove a session of which no sample ever came; whether that was so.
+
+    The next attempt would be refused the folder for the sake of nothing.
+    """
+    from fieldcal.session.arrow_stream import whole
+    from fieldcal.session.folder import DESCRIPTION
+    from fieldcal.session.marks import MARKS
+    from fieldcal.session.recorder import SAMPLES
+
+    with contextlib.suppress(OSError):
+        if whole((folder / SAMPLES).read_bytes()):
+            return False
+        for name in (SAMPLES, MARKS, DESCRIPTION):
+            (folder / name).unlink()
+        with contextlib.suppress(OSError):
+            folder.rmdir()  # whatever else is there stays
+        return True
+    return False

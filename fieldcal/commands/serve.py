@@ -14,7 +14,7 @@ RARE = ("history", "scheduler", "upload_mib", "jobs", "kept", "minutes", "known_
 
 EXAMPLE = """\
   fieldcal serve
-  fieldcal serve --listen 192.168.1.5:8080 --tokens tokens.txt --folder /srv/fieldcal
+  fieldcal serve --listen 192.168.1.5:8080 --tokens tokens.txt --folder all
   curl -H "Authorization: Bearer $TOKEN" --data-binary @unit-7.zip \\
     "http://127.0.0.1:8750/api/sessions?filename=unit-7.zip"
 """

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.rotation import logarithm
 from fieldcal.core.samples import Array
 
 EARTH_RATE = 7.292115e-5
@@ -79,11 +80,7 @@ def way(before: Array, alpha: Array, beta: Array) -> Array:
     >>> np.round(way(turn(0.0, 0.0), np.array([0.5]), np.zeros(1)), 12) + 0.0
     array([[0. , 0. , 0.5]])
     """
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
-
-    there = before @ np.swapaxes(turn(alpha, beta), -1, -2)
-    vectors: Array = Rotation.from_matrix(there).as_rotvec()
-    return vectors
+    return logarithm(before @ np.swapaxes(turn(alpha, beta), -1, -2))
 
 
 def in_turned_axes(

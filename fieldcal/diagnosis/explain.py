@@ -19,6 +19,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import of_size
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.held_out import HeldOut, in_question, turns_held_out
 from fieldcal.model.posterior.model_average import ModelAverage
 from fieldcal.model.posterior.probabilities import Posterior, Standing
@@ -38,6 +39,9 @@ from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
+
+TILTS = ("base_tilt", "angle_offset")
+"""Models of the tilt that every base has, of which a set has one."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,7 @@ class Explanation:
 def explain(prepared: Prepared, before: Explanation | None = None) -> Explanation:
     """Find what explains a recording, beginning with what explained a part of it."""
     inference = inference_of(prepared.source, prepared.rows, prepared)
-    found = inference.run(None if before is None else before.best.set.members)
+    found = inference.run(None if before is None else _begun(before))
     inference = found.inference
     windows = inference.system.linearised(found.state)
     best = Fitted(
@@ -155,6 +159,19 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     return Explanation(
         prepared, found, best, base_of(inference, prepared.rows), posterior
     )
+
+
+def _begun(before: Explanation) -> tuple[Member, ...]:
+    """What explained a part of a recording, and the tilt that every base has.
+
+    Two positions do not show it. Then something else did instead, which more positions
+    contradict, and it would be searched for from nothing.
+    """
+    members = before.best.set.members
+    if {cause.name for cause, _ in members} & set(TILTS):
+        return members
+    tilts = [c for c in before.dictionary.causes if c.name == TILTS[0]]
+    return (*members, *((cause, cause.variants[0]) for cause in tilts))
 
 
 def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference:

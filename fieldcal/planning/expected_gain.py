@@ -18,7 +18,8 @@ Over all explanations
 
 so that it counts alike what brings a parameter within its limit and what tells causes
 apart, and what is known well enough counts no more. Causes that the recording does not
-show are explanations as well, as likely as before and as large as it leaves them.
+show are explanations as well, as likely as before and as large as it leaves them. What
+the factory left is in every explanation: it is part of each uncertainty, too.
 Source: Lindley 1956 for the gain; Goldstein and Wooff, Bayes Linear Statistics, 2007,
 3.1, for (3).
 """
@@ -179,10 +180,12 @@ class ExpectedGain:
         ]
 
     def _with_common(self, one: Set, chance: float) -> tuple[Explained, float]:
-        """A set with tilt and angles beside its causes, and its weight, ln."""
+        """A set with all that every explanation has, and its weight, ln."""
+        members = {cause.name for cause, _ in one.members}
+        left = [g for g in self.dictionary.unfitted if g.part not in members]
         columns, sizes = self._common()
-        at = np.concatenate([columns, one.state.columns])
-        wide = np.concatenate([sizes, one.state.sizes])
+        at = np.concatenate([columns, one.state.columns, *(g.columns for g in left)])
+        wide = np.concatenate([sizes, one.state.sizes, *(g.typical for g in left)])
         state = Eliminated.of(self._rows(one), at, wide)
         names = frozenset(c.name for c, _ in one.members) - COMMON.keys()
         weight = float(np.log(chance)) - one.state.score + state.score

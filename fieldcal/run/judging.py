@@ -23,7 +23,8 @@ calibrations stay as they are."""
 def judged(folder: Path, limits: GradeLimits, before: SoFar | None = None) -> SoFar:
     """What the windows that a session has are good for.
 
-    Beginning with what was found of some of them `before` takes half the time.
+    Beginning with what was found of some of them `before` takes half the time: enough
+    for the choice of a position, and for no end.
 
     Raises
     ------

@@ -43,7 +43,7 @@ from fieldcal.run.plan_file import WARM_UP, Task
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import with_more
 from fieldcal.session.folder import RESULT, Session
-from fieldcal.session.marks import ADDED
+from fieldcal.session.marks import ADDED, MARKS, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
 
@@ -91,6 +91,7 @@ class SessionRun:
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
         self._so_far: SoFar | None = None
+        self._judged_windows = 0
         self._remedies = 0
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
@@ -144,9 +145,13 @@ class SessionRun:
 
     def _judged(self, quick: bool) -> SoFar:
         """What the windows taken so far are good for."""
-        before = self._so_far if quick else None
-        self._so_far = judged(self._recorder.folder, self._limits, before)
-        return self._so_far
+        folder, so_far = self._recorder.folder, self._so_far
+        windows = [m for m in read_marks(folder / MARKS) if m.get("event") == "window"]
+        known = len(windows) == self._judged_windows
+        if not so_far or not known or (so_far.quick and not quick):
+            so_far = judged(folder, self._limits, so_far if quick else None)
+        self._so_far, self._judged_windows = so_far, len(windows)
+        return so_far
 
     def _plan(self) -> Plan[Calibration]:
         task, about = self._task, with_more(self._task.about, self._added)
@@ -181,7 +186,7 @@ class SessionRun:
             if remedy is None:
                 return
             self._remedies += 1
-            yield from note(f"NO-GO so far: {so_far.reasons[0]}. {remedy['says']}")
+            yield from note(f"NO-GO so far: {so_far.reasons[0]}; {remedy['says']}")
             for number in remedy["again"]:
                 yield Repeat(number)
             for place in remedy["positions"]:

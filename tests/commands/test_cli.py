@@ -30,6 +30,7 @@ def test_every_command_has_help_with_an_example_and_the_exit_codes(
     said = capsys.readouterr().out
     assert f"fieldcal {name}" in said.split("example", 1)[1]
     assert "0 good, 1 bad" in said and len(said.splitlines()) <= 48
+    assert max(map(len, said.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("name", COMMANDS)

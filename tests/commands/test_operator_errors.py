@@ -24,6 +24,7 @@ from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
+from fieldcal.session.recorder import Recorder
 
 
 def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
@@ -55,6 +56,36 @@ def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     with VirtualMover(["--serial", "xsens"]) as device:
         said = failed(f"serial:{device.port}?format=mip", tmp_path / "s", capsys)
     assert said.endswith("these are no mip bytes; try format=xsens")
+
+
+@pytest.mark.usefixtures("soon_silent")
+@pytest.mark.parametrize("other", [False, True])
+def test_a_run_that_heard_nothing_is_not_in_the_way_of_the_next(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], other: bool
+) -> None:
+    """The same command again, with the format that it said."""
+    folder, report = tmp_path / "s", tmp_path / "run.xml"
+    if other:
+        folder.mkdir()
+        (folder / "notes.txt").write_text("mine")
+    words = [
+        "run",
+        "two_position",
+        "--headless",
+        "--patience",
+        "0",
+        "--junit",
+        str(report),
+    ]
+    with VirtualMover(["--serial", "xsens"]) as device:
+        url = f"serial:{device.port}?format=mip"
+        assert main([*words, "--device", url, "-o", str(folder)]) == 3
+    assert "to go on" not in capsys.readouterr().err
+    assert "try format=xsens" in report.read_text()
+    assert [p.name for p in tmp_path.glob("s/*")] == ["notes.txt"] * other
+    assert folder.exists() == other
+    with Recorder(folder, {"grade": "tactical"}):
+        pass
 
 
 @contextmanager

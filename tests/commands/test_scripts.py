@@ -11,6 +11,7 @@ import pytest
 from bench import five_positions
 
 from fieldcal.cli import COMMANDS, main
+from fieldcal.commands import run
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 
@@ -63,6 +64,25 @@ def test_events_have_a_time_and_an_end(
     assert [e["event"] for e in events].count("end") == 1
     error = events[-1]["error"]
     assert code not in (0, 1) or error is None or f"fieldcal run: {error}" in told
+
+
+def test_the_last_event_has_the_exit_code_of_what_nobody_foresaw(
+    session: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(run, "_shown_on", broken)
+    url = f"replay:{session}/samples.parquet?speed=max"
+    call = ["run", "two_position", "--device", url, "--headless"]
+    assert main([*call, "-o", str(tmp_path / "r")]) == 70
+    told = [line for line in capsys.readouterr().err.splitlines() if line[:1] == "{"]
+    end = json.loads(told[-1])
+    assert end["event"] == "end" and end["exit_code"] == 70
+    assert "ZeroDivisionError" in end["error"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh"])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from fieldcal.core.positions import Position
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.search.inference import Inference
 from fieldcal.planning.expected_gain import ExpectedGain
 from fieldcal.session import description
 from fieldcal.sim_device.profile import Profile
@@ -25,8 +27,14 @@ SECONDS = 15.0
 ANGLE = float(np.deg2rad(0.003))
 
 
+PERFECT = {"squareness": 1e-9, "quadratic": 1e-9, "g_sensitivity": 1e-12}
+"""A device in which the factory left next to nothing."""
+
+
 def explained(
-    positions: Sequence[Position], more: Sequence[tuple[str, dict[str, float]]] = ()
+    positions: Sequence[Position],
+    more: Sequence[tuple[str, dict[str, float]]] = (),
+    left: Mapping[str, float] = PERFECT,
 ) -> Explanation:
     """Windows of a device on the ladder, explained."""
     starts = 5.0 + 25.0 * np.arange(len(positions))
@@ -42,7 +50,11 @@ def explained(
         angles = {"alpha_deg": alpha, "beta_deg": beta}
         tables.append({**angles, "start_s": w[2], "end_s": w[3]})
     about = description.parse(
-        {"site": {"latitude_deg": 45.0, "height_m": 0.0}, "position": tables}
+        {
+            "site": {"latitude_deg": 45.0, "height_m": 0.0},
+            "device": {"grade": "tactical", **left},
+            "position": tables,
+        }
     )
     return explain(prepare(block, about))
 
@@ -80,11 +92,19 @@ def test_a_window_tells_what_was_expected_of_it(
     np.testing.assert_allclose(came, expected, rtol=0.35)
 
 
+@pytest.mark.parametrize("left", [
+    PERFECT,
+    {"squareness": 2e-4, "quadratic": 2e-5, "g_sensitivity": 1e-12},
+])  # fmt: skip
 def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
-    three: ExpectedGain,
+    left: Mapping[str, float],
 ) -> None:
-    """A dense fit of nine numbers, its derivatives by the forces themselves."""
+    """A dense fit, its derivatives by the forces themselves.
+
+    Of what the factory left it is known how large it may be.
+    """
     one = Position.deg(45, -5)
+    three = gain_of(explained(START, left=left))
     told = alone(three).of([one]).left[0, : len(ALLOWED)]
     noise = three.rows.noise[:3] / np.sqrt(SECONDS * 100.0)
     weighed = []
@@ -92,7 +112,8 @@ def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
         rows, angle = _row(place), _by_angles(place) * ANGLE
         cov = np.diag(noise**2) + angle @ angle.T
         weighed.append(np.linalg.solve(np.linalg.cholesky(cov), rows))
-    whole = np.vstack(weighed)
+    factory = 1 / np.array([left["squareness"]] * 6 + [left["quadratic"]] * 3)
+    whole = np.vstack([*weighed, np.hstack([np.zeros((9, 8)), np.diag(factory)])])
     limits = np.array(list(ALLOWED.values()))
     variance = np.diag(np.linalg.inv(whole.T @ whole))[:6].copy()
     variance[3:] += (3e-4 / 9.806) ** 2  # gravity is not known better
@@ -107,7 +128,7 @@ def _force(place: Position, tilt: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
 
 
 def _row(place: Position) -> np.ndarray:
-    """Derivatives by biases, scale factors and a tilt of the base, (3, 8)."""
+    """Derivatives by biases, scale factors, tilt, cross-coupling and K2, (3, 17)."""
     f, step = _force(place), 1e-5
     along_x = np.array([1.0, 0.0, 0.0])
     a, b = place.alpha or 0.0, place.beta or 0.0
@@ -120,7 +141,10 @@ def _row(place: Position) -> np.ndarray:
         turned = [x, np.cos(b) * y + np.sin(b) * off[2]]
         turned.append(np.cos(b) * off[2] - np.sin(b) * y)
         tilts.append(np.array(turned) / step)
-    return np.column_stack([np.eye(3), np.diag(f), *tilts])
+    crossed = np.zeros((3, 6))
+    for k, (i, j) in enumerate(permutations(range(3), 2)):
+        crossed[i, k] = f[j]
+    return np.column_stack([np.eye(3), np.diag(f), *tilts, crossed, np.diag(f**2)])
 
 
 def _by_angles(place: Position) -> np.ndarray:
@@ -169,6 +193,23 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
     assert likely.state.columns.max() >= len(posterior.search.gram.index)
     assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()
+
+
+def test_what_a_part_showed_may_be_contradicted_without_a_search_from_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tilt = [("base_tilt", {"about_x_deg": 0.5, "about_z_deg": -0.4})]
+    other = [("settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0})]
+    before, whole = explained(START[:2], other), explained(START, tilt)
+    assert {c.name for c, _ in before.best.set.members} == {"settling"}
+
+    def refused(*_: object) -> None:
+        raise AssertionError("searched from nothing")
+
+    monkeypatch.setattr(Inference, "_from_nothing", refused)
+    quick = explain(whole.prepared, before)
+    assert [c.name for c, _ in quick.best.set.members] == ["base_tilt"]
+    assert quick.best.set.keys == whole.best.set.keys
 
 
 @pytest.mark.parametrize("name, given", [

@@ -15,11 +15,12 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.run_results import first_result
 from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
+from fieldcal.evaluation.so_far import SoFar
 from fieldcal.history.store import History
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures import adaptive
-from fieldcal.run import plan_file
+from fieldcal.run import plan_file, session_run
 from fieldcal.run.judging import judged
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.session_run import SessionRun, recorded_averages, resume
@@ -141,6 +142,37 @@ def test_it_ends_at_go_also_if_it_was_stopped_on_the_way(bench: Bench) -> None:
     assert bench.hand.told[-1].endswith("all is known that was asked for")
     added = [m["position"] for m in bench.marks if m["event"] == "added"]
     assert added == list(range(2, max(bench.numbers) + 1))
+
+
+class Content(Hand):
+    """Leaves out what is asked for beyond GO."""
+
+    def wish(self) -> Wish | None:
+        return "skip" if self.told and self.told[-1].startswith("GO so far") else None
+
+
+def test_at_go_it_ends_if_a_further_position_is_left_out(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then nobody is asked for another one, and what ends it is judged in full once."""
+    full: list[int] = []
+
+    def counted(folder: Path, *given: Any) -> SoFar:
+        so_far = judged(folder, *given)
+        full.extend([len(so_far.laid.still.rows)] * (not so_far.quick))
+        return so_far
+
+    monkeypatch.setattr(session_run, "judged", counted)
+    bench.hand = Content(bench.hand.driver)
+    found = bench.run(ADAPTIVE, until_go=True)
+    asked = [t for t in bench.hand.told if "the next position tells" in t]
+    assert (
+        asked[-1].startswith("GO so far") and "s pressed twice ends here" in asked[-1]
+    )
+    assert not any(t.startswith("GO so far") for t in asked[:-1])
+    assert bench.hand.told[-1].startswith("it is GO")
+    assert found.info["decision"]["go"]
+    assert full == [2, max(bench.numbers)]
 
 
 def test_it_takes_no_more_positions_than_it_may_and_those_of_its_ladder(

@@ -10,15 +10,16 @@ import pytest
 from rich.console import Console
 
 from fieldcal.core.positions import FIVE, Position
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import ClockLine, Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
+from fieldcal.run.operator import terminal
 from fieldcal.run.operator.banner import drawable, large
 from fieldcal.run.operator.box import FIRST, picture, pictures
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
-from fieldcal.run.operator.widgets import HALF, RULER, inclinometer
+from fieldcal.run.operator.widgets import HALF, RULER, inclinometer, link
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -124,6 +125,13 @@ def test_a_position_taken_is_ticked_off_with_its_sigma(
 ) -> None:
     operator.show(view("taken", 30.0))
     assert "taken   ± 3.00 mm/s²" in screen(operator)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (60, 20), (40, 15)])
+def test_while_the_next_position_is_chosen_it_says_so(size: tuple[int, int]) -> None:
+    operator = sized(*size)
+    operator.show(view("taken", 30.0, hold=operator._shown.hold))
+    assert "what comes next is being worked out" in screen(operator)
 
 
 def test_what_went_wrong_stays_until_the_position_is_taken(
@@ -273,11 +281,42 @@ def test_the_scale_is_always_the_same() -> None:
     assert RULER.index("0") == bar.index("|")
 
 
+@pytest.mark.parametrize(("sigma", "shown"), [(0.3, "1"), (9.6, "10"), (43.0, "43")])
+def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
+    health = Health(samples=1234, clock=ClockLine(-20.2, sigma, 0.0, 1e-3))
+    text = link(view("averaging", health=health)).plain
+    assert text.endswith(f"clock -20 ± {shown} ppm")
+
+
 def test_leaving_out_is_asked_back() -> None:
     operator = sized(80, 24, "skip", "skip")
     assert operator.wish() is None
     assert "press s once more to leave α = 22.5°, β = 0° out" in screen(operator)
     assert operator.wish() == "skip"
+    assert "press s" not in screen(operator)
+
+
+def test_each_position_is_left_out_by_two_presses_of_its_own() -> None:
+    operator = sized(80, 24, "skip", "skip", "skip", "skip")
+    assert [operator.wish() for _ in range(4)] == [None, "skip", None, "skip"]
+
+
+def test_what_a_second_press_no_longer_does_is_not_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [1000.0]
+    monkeypatch.setattr(terminal, "monotonic", lambda: now[0])
+    operator = sized(80, 24, "skip")
+    assert operator.wish() is None
+    now[0] += 0.9 * terminal.ASKED_AGAIN
+    assert operator.wish() is None
+    assert "press s once more" in screen(operator)
+    now[0] += 0.2 * terminal.ASKED_AGAIN
+    assert operator.wish() is None
+    assert "press s" not in screen(operator)
+    operator._keyboard = Keys("skip")
+    assert operator.wish() is None
+    assert "press s once more" in screen(operator)
 
 
 @pytest.mark.parametrize(

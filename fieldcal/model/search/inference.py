@@ -67,7 +67,8 @@ class Inference(Refinement):
         Parameters
         ----------
         begin : of any dictionary, what it is to begin with instead of with nothing;
-            other states to begin from are then not looked for
+            other states to begin from are then not looked for, nor pairs of causes of
+            which neither is worth anything by itself
 
         """
         start: Array = np.zeros(self.dictionary.width)
@@ -79,12 +80,16 @@ class Inference(Refinement):
             state, values, found = self._from_nothing(state, values, search)
         about = dict.fromkeys([found, search.evaluated(())])
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
-        return self._until_it_stays(state, values, found, ())
+        return self._until_it_stays(state, values, found, thorough=begin is None)
 
     def _until_it_stays(
-        self, state: State, values: Array, found: Set, members: tuple[Member, ...]
+        self, state: State, values: Array, found: Set, thorough: bool
     ) -> Inferred:
-        """Settle and search in turn, from a set, and a state that has some members."""
+        """Settle and search in turn, from a set, about a state that has no members.
+
+        What costs much is tried if it is to be `thorough`, where the rest stays.
+        """
+        members: tuple[Member, ...] = ()
         seen: set[tuple[tuple[str, int], ...]] = set()
         for _ in range(PASSES):
             seen.add(Search.key(found.members))
@@ -99,7 +104,7 @@ class Inference(Refinement):
             search = Search(self.dictionary, self.gram(state, values, found))
             found = search.run(members, thorough=False)
             same = frozenset(c.key for c, _ in members)
-            if found.keys == same:  # what costs much is tried where it stays otherwise
+            if thorough and found.keys == same:
                 found = search.run(members)
             if found.keys == same:
                 own = search.evaluated(members, found.sizes)  # with its own shapes

@@ -59,6 +59,10 @@ class RunContent:
         """A sentence must not be missed."""
         self._told = [*(t for t in self._told if t != text), text][-TOLD:]
 
+    def withdrawn(self, text: str) -> None:
+        """A sentence holds no longer."""
+        self._told = [t for t in self._told if t != text]
+
     def alarmed(self, waited: float) -> None:
         """The reason for waiting is repeated after so many s."""
         self._reminder = reminder(waited)

@@ -63,4 +63,5 @@ class Instruction:
             return cls("NO SAMPLES", said, "red")
         if view.phase == "averaging":
             return cls("HOLD STILL", f"{number}: do not touch the device", "green")
-        return cls("TAKEN", number, "green")
+        said = f"{number}: what comes next is being worked out"
+        return cls("TAKEN", said, "green")

@@ -63,7 +63,7 @@ class ConsoleOperator:
         self._keyboard = keyboard
         self._shown = RunContent(title, positions, most)
         self._screen = Screen(console, self._shown, verification, self._has_keys)
-        self._skips = -ASKED_AGAIN
+        self._skips, self._asked = -ASKED_AGAIN, ""
         self._drawn = 0.0
         self._lines: set[str] = set()
         self._live: Live | None = None
@@ -118,12 +118,22 @@ class ConsoleOperator:
     def wish(self) -> Wish | None:
         """The key that was pressed, or the wish to wait for the mover."""
         pressed = self._keyboard.pressed() if self._keyboard else None
-        if pressed == "skip" and monotonic() - self._skips >= ASKED_AGAIN:
+        asked = monotonic() - self._skips < ASKED_AGAIN
+        if pressed == "skip" or not asked:
+            self._shown.withdrawn(self._asked)  # answered, or s would only ask again
+        if pressed == "skip" and not asked:
             self._skips, pressed = monotonic(), None
-            hold = self._shown.hold
-            name = hold.position.name if hold else "this position"
-            self.tell(f"press s once more to leave {name} out of the result")
+            self._ask_back()
+        elif pressed == "skip":
+            self._skips = -ASKED_AGAIN
         return pressed or ("wait" if self._mover.busy() else None)
+
+    def _ask_back(self) -> None:
+        """Ask whether the position is to be left out."""
+        hold = self._shown.hold
+        name = hold.position.name if hold else "this position"
+        self._asked = f"press s once more to leave {name} out of the result"
+        self.tell(self._asked)
 
     def show(self, view: OperatorView) -> None:
         """Draw the view, unless the last drawing is too recent."""

@@ -188,7 +188,7 @@ def link(view: OperatorView) -> Text:
     if health.restarts:
         parts.append(f"restarts: {health.restarts}")
     if health.clock and health.clock.real_time:
-        clock = health.clock
-        parts.append(f"clock {clock.fast_ppm:+.0f} ± {clock.sigma_ppm:.1g} ppm")
+        fast, sigma = health.clock.fast_ppm, np.ceil(health.clock.sigma_ppm)
+        parts.append(f"clock {fast:+.0f} ± {sigma:.0f} ppm")
     lost = health.missing or health.bad or health.restarts
     return Text("link: " + " · ".join(parts), style="yellow" if lost else "")

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.never_wrong.bench import drawn
-from benchmarks.never_wrong.judging import WRONG, Judged, judged, write
+from benchmarks.never_wrong.judging import (
+    WRONG,
+    Judged,
+    beyond_limit,
+    judged,
+    write,
+)
 from benchmarks.never_wrong.mistakes import session, spoilt
 
 LIMIT = 600.0
@@ -19,6 +25,17 @@ def of(folder: Path, seed: int, *names: str) -> Judged:
     bench = spoilt(drawn(rng), names, rng)
     write(folder, session(bench, names, rng))
     return judged(folder, bench.truth, bench.grade, False, LIMIT)
+
+
+def test_an_error_beyond_a_limit_counts_beside_the_chance_of_one() -> None:
+    """0.3173 and 0.0455: outside of one and of two standard uncertainties."""
+    limits, truth = {"acc_bias": 0.02}, {"acc_bias.x": 0.0, "acc_bias.y": 0.1}
+    one, two = ("acc_bias.x", 0.019, 0.02), ("acc_bias.y", 0.1, 0.01)
+    scale = ("acc_scale.x", 1.5, 0.1)  # no limit of its own
+    over, chance = beyond_limit([one, two, scale], truth, limits)
+    assert not over
+    assert chance == pytest.approx(1 - (1 - 0.3173) * (1 - 0.0455), abs=1e-4)
+    assert beyond_limit([one, ("acc_bias.y", 0.0797, 0.01)], truth, limits)[0]
 
 
 def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(

@@ -23,7 +23,10 @@ DEG_H = math.radians(1) / 3600
 
 def counted(found: Calibration) -> FactoryErrors:
     """What a result was made with, of its information."""
-    keys = ("square_sigma", "quadratic_sigma", "g_sensitivity_sigma")
+    keys = (
+        "square_sigma", "quadratic_sigma", "g_sensitivity_sigma",
+        "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma",
+    )  # fmt: skip
     return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
 
 
@@ -62,7 +65,8 @@ def _checks(
         size = 1e3 * left.quadratic * G0
         says = (
             f"this relies on accelerometers that are linear: K2 is 0 ± {size:.2g}"
-            f" mg/g², {by} (--quadratic); each ± includes it"
+            f" mg/g², {by} (--quadratic), and a kink at zero is as large at 1 g; each ±"
+            " includes both"
         )
         yield Check("linearity", None, says)
     if left.g_sensitivity and "gyr" in measured:
@@ -74,6 +78,22 @@ def _checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
+    yield from _per_k(left, measured, of_grade)
+
+
+def _per_k(left: FactoryErrors, measured: set[str], of_grade: str) -> Iterator[Check]:
+    """How much biases were taken to change by, while the device warms up."""
+    sizes = {
+        "acc": (left.acc_per_k, f"{1e3 * left.acc_per_k / G0:.2g} mg"),
+        "gyr": (left.gyr_per_k, f"{float(f'{left.gyr_per_k / DEG_H:.2g}'):g} deg/h"),
+    }
+    told = [text for s, (size, text) in sizes.items() if size and s in measured]
+    if told:
+        says = (
+            f"this relies on biases that change by 0 ± {' and '.join(told)} per K while"
+            f" the device warms up, as usual for {of_grade}; each ± includes it"
+        )
+        yield Check("warm-up", None, says)
 
 
 def _coarser(stated: str, shows: Mapping[str, str]) -> Check:

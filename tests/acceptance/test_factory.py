@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,7 +128,7 @@ PER_K = {"acc_per_k": 5e-4, "gyr_per_k": 1e-5}
 def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) -> None:
     """At the end of the recording; the course is that of a thermometer, or of a box."""
     rng, off, plain = np.random.default_rng(3), list[Array](), list[Array]()
-    warming = {} if shown else {"warming": np.zeros(27)}
+    warming: dict[str, Any] = {} if shown else {"warming": np.zeros(27)}
     x, wanted = ladder(**warming), Wanted(tilt="none")
     left = FactoryErrors(**PER_K, warming_k=1.25)
     course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)

@@ -14,8 +14,11 @@ from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
+
+NOWHERE: Point = (NO_SHAPE, 0)
+"""The only point of an effect that has no shape."""
 
 CHANGES = ("temperature_bias", "warm_up")
 """Effects by which biases change while a device that a factory made warms up."""
@@ -45,7 +48,7 @@ def _of_effect(
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
-def whole(table: ColumnTable, name: str, turned: bool, point: Point = ({}, 0)) -> Group:
+def whole(table: ColumnTable, name: str, turned: bool, point: Point = NOWHERE) -> Group:
     """An effect of the catalogue with its parameters, of typical size.
 
     Those that a turn of the whole device makes of others are left out if it is `turned`
@@ -73,7 +76,7 @@ def of_size(
     name: str,
     size: Array,
     turned: bool,
-    point: Point = ({}, 0),
+    point: Point = NOWHERE,
 ) -> Group:
     """The same as what a factory left, whose coefficients have a known size, SI."""
     one = whole(table, name, turned, point)

@@ -45,6 +45,22 @@ def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
     assert found.go and 0 < found.off < WRONG
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("seed", "mistake", "was"),
+    [
+        (90_000_018, (), 3.5),  # a warm-up that g-sensitivity took in
+        (90_000_036, (), 4.3),  # a kink at zero beside a K2 that is determined
+        (92_004_008, ("sway",), 3.6),  # attitudes at the ends of turns
+    ],
+)
+def test_what_is_off_is_in_the_uncertainties(
+    tmp_path: Path, seed: int, mistake: tuple[str, ...], was: float
+) -> None:
+    found = of(tmp_path / "s", seed, *mistake)
+    assert found.go and found.off < 0.75 * was
+
+
 @pytest.mark.parametrize(
     ("mistake", "why"),
     [

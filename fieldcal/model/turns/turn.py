@@ -33,6 +33,7 @@ from fieldcal.model.turns.attitude import (
 )
 from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
 from fieldcal.model.turns.motion import moving
+from fieldcal.model.turns.tremor import at_ends
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
 
@@ -57,7 +58,7 @@ class Turn:
     done : (m + 1,) u
     cut : (k + 1,) edges between the pieces
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
-    blur : rad, what sampling leaves open of the closure
+    blur : rad, what sampling leaves open of the closure, and swaying at its ends
     interval : s between samples
 
     """
@@ -134,7 +135,8 @@ class Turning:
 
     Attributes
     ----------
-    legs : the windows at both ends, and the bounds of the motion in samples
+    legs : the windows at both ends, the bounds of the motion in samples, and rad^2 by
+        which the device sways in both
     contradicted : the windows between which the gyroscopes say otherwise than the
         positions, by the state that turns were followed with last
 
@@ -145,7 +147,7 @@ class Turning:
         self.legs = list(self._found())
         self.contradicted: list[tuple[int, int]] = []
 
-    def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+    def _found(self) -> Iterator[tuple[tuple[int, int], int, int, float]]:
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
@@ -159,15 +161,17 @@ class Turning:
             ends = int(windows[p, 1]), int(windows[q, 0])
             stretch = moving(self.source, rows, (p, q), *ends)
             if stretch is not None:
-                yield (p, q), *stretch
+                sways = at_ends(self.source, *ends, windows[[p, q]])
+                yield (p, q), *stretch, sways
 
     def turns(self, state: State) -> Iterator[Turn]:
         """Every turn that the gyroscopes have followed, by a state."""
         ends = state.experienced(self.rows.x)
         self.contradicted = []
-        for pair, first, last in self.legs:
-            if (turn := self._turn(state, ends, pair, first, last)) is not None:
-                yield turn
+        for pair, first, last, sways in self.legs:
+            turn = self._turn(state, ends, pair, first, last)
+            if turn is not None:
+                yield replace(turn, blur=float(np.hypot(turn.blur, np.sqrt(sways))))
 
     def _turn(
         self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int

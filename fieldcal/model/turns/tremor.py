@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import RowSource
 
 EDGE_S = 10.0
@@ -28,7 +28,7 @@ LEAST = 16
 """Samples below which nothing is known."""
 
 
-def at_ends(source: RowSource, end: int, start: int, windows: Array) -> float:
+def at_ends(source: RowSource, end: int, start: int, windows: Index) -> float:
     """Variance (1) of a closure about the axis with most of it, rad^2.
 
     Parameters

@@ -18,7 +18,8 @@ def rates(size: float, hz: float, noise: float, seed: int) -> Array:
     along = np.array([0.0, 0.6, 0.8])
     wave = size * pulse * np.cos(pulse * t + seed)[:, None] * along
     white = np.random.default_rng(seed).normal(0, noise, (len(t), 3))
-    return 0.02 + wave + white  # a constant is the bias, and no swaying
+    out: Array = 0.02 + wave + white  # a constant is the bias, and no swaying
+    return out
 
 
 @pytest.mark.parametrize("hz", [0.7, 1.6, 4.0])

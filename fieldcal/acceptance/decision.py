@@ -94,6 +94,7 @@ def decide(
     verification = _verification(circumstances.verification, limits)
     checks = [
         _fit(found, limits),
+        *_examined(found),
         *_odd_positions(found, verification.ok is True),
         *_gyroscopes(found, limits),
         *_turns(found, limits),
@@ -200,6 +201,18 @@ def _agreement(
         says += f"; {small}"
         agree = True
     return Check(name, agree, says, chance, limits.fit_chance, "1")
+
+
+def _examined(found: Calibration) -> list[Check]:
+    """No GO by means alone: samples and turns might contradict them."""
+    why = found.info.get("unexamined")
+    if not why:
+        return []
+    says = (
+        f"neither samples nor turns could be examined, which might contradict the"
+        f" means of the windows: {why}"
+    )
+    return [Check("recording", False, says)]
 
 
 def _odd_positions(found: Calibration, verified: bool) -> list[Check]:

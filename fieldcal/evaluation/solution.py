@@ -222,6 +222,8 @@ def solved_as(
     found = _listed(with_provenance(found, about), laid.order)
     if not printed:
         found = with_rounding(found, laid.rounding)
+    if laid.examined[1] and not printed:
+        found = replace(found, info={**found.info, "unexamined": laid.examined[1]})
     if shown is None:
         return found
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))

@@ -41,8 +41,8 @@ GROUPED = {
         "a position off", "a repeated angle off", "gauge long",
         "two positions or angles off",
     ),
-    "table tilted; level and angles not said": (
-        "table tilted", "level and angles not said",
+    "table tilted; level not said or wrong; angles not said": (
+        "table tilted", "level and angles not said", "level said wrongly",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
         "latitude not said", "other hemisphere", "gravity said wrongly",

@@ -20,7 +20,7 @@ from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
-from fieldcal.acceptance.level import level_missing, tilt_is_found
+from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.turned import turns_disagree
@@ -102,7 +102,7 @@ def decide(
         *relies_on_factory(found, about, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
-        *_level(found, about),
+        *check_level(found, about),
         *check_change(found, limits, circumstances.family),
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
@@ -261,17 +261,6 @@ def _site(found: Calibration, about: Description) -> list[Check]:
         return []
     wrong = gravity_unknown(about) or gravity_contradicted(about)
     return [Check("site", False, wrong)] if wrong else []
-
-
-def _level(found: Calibration, about: Description) -> list[Check]:
-    """Whether the level of the base is known: an unseen tilt acts as a bias."""
-    if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return []
-    level = found.info.get("level_sigma_deg")
-    if level is None:
-        return [Check("level", False, level_missing(about))]
-    says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
-    return [Check("level", True, says)]
 
 
 def _verification(verification: Verification | None, limits: GradeLimits) -> Check:

@@ -188,6 +188,29 @@ def test_the_grade_says_what_nobody_states(
     assert (found.cross_coupling, found.quadratic, found.g_sensitivity) == left
 
 
+@pytest.mark.parametrize(
+    ("moves", "shows", "ok"),
+    [
+        (0.06, 1.0, False),  # 4 % by two thirds of the mistake, which shows by 0.7
+        (0.06, 20.0, None),  # which would be seen
+        (0.02, 1.0, None),  # which is not enough
+    ],
+)
+def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
+    moves: float, shows: float, ok: bool | None
+) -> None:
+    seen = observe(SIX_FACES, forces(SIX_FACES, G) * [1.0, 0.96, 1.0], sigma=1e-4)
+    result = solve(seen, tilt="none", factory=FactoryErrors(1e-3))
+    told = {"grade": "consumer", "because": "acc_scale.y is -0.04 from nominal"}
+    wrong: dict[str, Any] = {"joint": 0, "angle_deg": None, "position": 4}
+    wrong |= {"shows": shows, "moves": {"acc_scale.y": moves}}
+    info = {**result.info, "grade_shown": told, "wrong_angles": [wrong]}
+    checks = relies_on_factory(replace(result, info=info), ABOUT, TACTICAL)
+    (check,) = [c for c in checks if c.name == "grade"]
+    assert check.ok is ok
+    assert ("position 5 with a wrong α" in check.says) == (ok is False)
+
+
 def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
     """A percent of cross-coupling, and 0.5 % of 2 g off a line, both by hand."""
     rng = np.random.default_rng(7)

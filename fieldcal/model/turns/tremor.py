@@ -28,19 +28,19 @@ LEAST = 16
 """Samples below which nothing is known."""
 
 
-def at_ends(source: RowSource, end: int, start: int, windows: Index) -> float:
+def at_ends(source: RowSource, windows: Index) -> float:
     """Variance (1) of a closure about the axis with most of it, rad^2.
 
     Parameters
     ----------
     source : samples
-    end, start : of the windows before and after the turn, in samples
-    windows : (2, 2) bounds of both, in samples
+    windows : (2, 2) bounds of those before and after the turn, in samples
 
     """
     most = round(EDGE_S * source.rate)
-    before = slice(max(int(windows[0, 0]), end - most), end)
-    after = slice(start, min(int(windows[1, 1]), start + most))
+    (first, end), (start, last) = windows.tolist()
+    before = slice(max(first, end - most), end)
+    after = slice(start, min(last, start + most))
     scale = source.about.nominal["gyr_scale"]
     return sum(
         swaying(source.block.gyr[some] / scale, 1 / source.rate)

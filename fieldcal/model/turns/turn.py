@@ -135,8 +135,8 @@ class Turning:
 
     Attributes
     ----------
-    legs : the windows at both ends, the bounds of the motion in samples, and rad^2 by
-        which the device sways in both
+    legs : the windows at both ends, and the bounds of the motion in samples
+    sways : rad^2 by which the device sways in the windows at both ends
     contradicted : the windows between which the gyroscopes say otherwise than the
         positions, by the state that turns were followed with last
 
@@ -145,9 +145,11 @@ class Turning:
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
         self.source, self.rows, self.since = source.whole, rows, since
         self.legs = list(self._found())
+        windows = spans(source.block, source.about)
+        self.sways = {pair: at_ends(source, windows[[*pair]]) for pair, *_ in self.legs}
         self.contradicted: list[tuple[int, int]] = []
 
-    def _found(self) -> Iterator[tuple[tuple[int, int], int, int, float]]:
+    def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
@@ -161,17 +163,17 @@ class Turning:
             ends = int(windows[p, 1]), int(windows[q, 0])
             stretch = moving(self.source, rows, (p, q), *ends)
             if stretch is not None:
-                sways = at_ends(self.source, *ends, windows[[p, q]])
-                yield (p, q), *stretch, sways
+                yield (p, q), *stretch
 
     def turns(self, state: State) -> Iterator[Turn]:
         """Every turn that the gyroscopes have followed, by a state."""
         ends = state.experienced(self.rows.x)
         self.contradicted = []
-        for pair, first, last, sways in self.legs:
+        for pair, first, last in self.legs:
             turn = self._turn(state, ends, pair, first, last)
             if turn is not None:
-                yield replace(turn, blur=float(np.hypot(turn.blur, np.sqrt(sways))))
+                swayed = float(np.hypot(turn.blur, np.sqrt(self.sways[pair])))
+                yield replace(turn, blur=swayed)
 
     def _turn(
         self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int

@@ -8,6 +8,7 @@ be a pty, ``socket://192.168.1.5:4001``, or any other URL that pyserial knows.
 from __future__ import annotations
 
 import errno
+from collections.abc import Sequence
 from time import monotonic
 from typing import ClassVar
 
@@ -25,8 +26,8 @@ from fieldcal.drivers.tcp import POLL, Tcp
 
 SOCKET = "socket://"
 
-HEARD, RECENT = 4096, 1 << 14
-"""Chunks and bytes kept to tell what it is that comes, if it is not the format."""
+RECENT = 1 << 14
+"""Bytes kept to tell what it is that comes, if it is not the format."""
 
 REASONS = {
     errno.ENOENT: "there is no such port; plug it in, or see `fieldcal ports`",
@@ -139,7 +140,7 @@ class SerialImu(Driver):
                 self._heard = []
                 self._skew.add(block.t, block.t_host)
                 return block
-            self._heard = [*self._heard, *chunks][-HEARD:]
+            self._heard = recent([*self._heard, *chunks])
             if monotonic() >= deadline:
                 return None
 
@@ -148,7 +149,7 @@ class SerialImu(Driver):
         self._reader.close()
 
     def _garbage(self) -> str:
-        data = b"".join(chunk.data for chunk in self._heard)[-RECENT:]
+        data = b"".join(chunk.data for chunk in self._heard)
         known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
         if known is None and (heard := detect_autopilot(data)):
             query = f"&{heard.query}" if heard.query else ""
@@ -164,6 +165,22 @@ class SerialImu(Driver):
         name, like = known
         query = f"&{like.query}" if like.query else ""
         return f"these are no {self._format} bytes; try format={name}{query}"
+
+
+def recent(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """Return the last chunks: as few as hold `RECENT` bytes, or all.
+
+    What comes is judged by how many bytes came in which time, and a link that floods
+    with noise must not fill the memory.
+    """
+    kept: list[Chunk] = []
+    size = 0
+    for chunk in reversed(chunks):
+        if size >= RECENT:
+            break
+        kept.append(chunk)
+        size += len(chunk.data)
+    return kept[::-1]
 
 
 def reason(fault: BaseException) -> str:

@@ -6,8 +6,10 @@
 A third of the sessions is sound. Of the others, each has one mistake, and one in four a
 second. GO with a parameter more than five of its standard uncertainties off, or known
 worse than its limit, is wrong, and so is a session that takes longer than `--limit`
-seconds of processor time. Session
-k of seed N is session 0 of seed N + k, so a campaign can be run in slices.
+seconds of processor time. Limits are bounds on standard uncertainties, so a parameter
+may be off by more than its limit; the table has how many are, and how many the
+uncertainties lead one to expect. Session k of seed N is session 0 of seed N + k, so a
+campaign can be run in slices.
 """
 
 from __future__ import annotations
@@ -39,8 +41,8 @@ GROUPED = {
         "a position off", "a repeated angle off", "gauge long",
         "two positions or angles off",
     ),
-    "table tilted; level and angles not said": (
-        "table tilted", "level and angles not said",
+    "table tilted; level not said or wrong; angles not said": (
+        "table tilted", "level and angles not said", "level said wrongly",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
         "latitude not said", "other hemisphere", "gravity said wrongly",
@@ -134,31 +136,46 @@ def main() -> None:
                 folder, bench.truth, bench.grade, options.diagnose, options.limit
             )
         rows[names[0] if names else SOUND].append(one)
-        odd = one.wrong if one.go else not names
+        odd = one.wrong or one.over if one.go else not names
         if odd or one.late or options.each:
             what = "GO" if one.go else f"NO-GO ({one.caught}: {one.says})"
             print(
                 f"seed {seed} {bench.places}, {', '.join(names) or SOUND}: {what},"
-                f" {one.off:.1f} σ ({one.worst}) {one.verdict}",
+                f" {one.off:.1f} σ ({one.worst}){', beyond a limit' * one.over}"
+                f" {one.verdict}",
                 flush=True,
             )
     _print(rows)
 
 
 def _print(rows: dict[str, list[Judged]]) -> None:
-    print("| mistake | sessions | GO | GO, and wrong | refused by |")
-    print("|---|---|---|---|---|")
+    print(
+        "| mistake | sessions | GO | GO, and > 5 σ | GO, and off by more than a limit"
+        " (expected) | refused by |"
+    )
+    print("|---|---|---|---|---|---|")
     for kind, names in GROUPED.items():
         some = [one for name in names for one in rows.get(name, ())]
         if not some:
             continue
         caught = Counter(_check(one.caught) for one in some if not one.go)
         by = ", ".join(f"{what} {n}" for what, n in caught.most_common())
-        go, wrong = sum(one.go for one in some), sum(one.wrong for one in some)
-        print(f"| {kind} | {len(some)} | {go} | {wrong} | {by} |")
+        good = [one for one in some if one.go]
+        wrong = sum(one.wrong for one in good)
+        print(
+            f"| {kind} | {len(some)} | {len(good)} | {wrong} | {_over(good)} | {by} |"
+        )
     every = [one for some in rows.values() for one in some]
+    good = [one for one in every if one.go]
     print(f"wrong GO: {sum(one.wrong for one in every)} of {len(every)}")
+    print(f"GO, and off by more than a limit (expected): {_over(good)}")
     print(f"warnings of libraries that came through: {sum(o.leaked for o in every)}")
+
+
+def _over(good: Sequence[Judged]) -> str:
+    """How many are off by more than a limit, and how many are to be expected."""
+    expected = sum(one.chance for one in good)
+    return f"{sum(one.over for one in good)} ({expected:.1f})"
 
 
 def _check(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import signal
 import warnings
 from collections.abc import Iterator
@@ -29,7 +30,10 @@ LIMITS = {
     "consumer": {"acc_bias": 0.1, "acc_scale": 1e-2, "gyr_bias": 1.5e-3},
 }
 """Standard uncertainty up to which a parameter may be GO by what the device is called,
-m/s^2, 1 and rad/s. Of a recording from elsewhere nothing but honesty is asked."""
+m/s^2, 1 and rad/s. Of a recording from elsewhere nothing but honesty is asked.
+
+The error itself may be larger, as often as the uncertainty says. It is counted too, and
+beside it how many such errors the uncertainties lead one to expect."""
 
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
 
@@ -43,6 +47,8 @@ class Judged:
     go : whether it may be used
     off : standard uncertainties that the worst parameter is off by, and its name
     beyond : whether a parameter is not known as well as its limit asks for
+    over, chance : whether a parameter is off by more than its limit, and how probable
+        that is by the uncertainties
     caught : name of the check that refused it, or the first of several
     says : its sentence
     verdict : of `diagnose`, or its exit code
@@ -60,6 +66,8 @@ class Judged:
     verdict: str
     leaked: int
     late: bool = False
+    over: bool = False
+    chance: float = 0.0
 
     @property
     def wrong(self) -> bool:
@@ -138,11 +146,13 @@ def _judged(
     off, worst = 0.0, ""
     known = {name: sigma for name, _, sigma in _parameters(found)}
     decision = found.get("decision", {})
-    beyond = bool(decision) and any(
+    limits = LIMITS[grade] if decision else {}
+    beyond = any(
         not known.get(f"{group}.{axis}", np.inf) <= limit
-        for group, limit in LIMITS[grade].items()
+        for group, limit in limits.items()
         for axis in "xyz"
     )
+    over, chance = beyond_limit(_parameters(found), truth, limits)
     for name, value, sigma in _parameters(found):
         if name in truth:
             far = abs(value - truth[name]) / sigma
@@ -156,7 +166,29 @@ def _judged(
         answer, what, _, more = said(["diagnose", str(folder), "--json"])
         leaked += more
         verdict = str(what.get("verdict", f"exit {answer}"))
-    return Judged(code == 0, off, beyond, worst, caught, says, verdict, leaked)
+    return Judged(
+        code == 0, off, beyond, worst, caught, says, verdict, leaked, False, over,
+        chance,
+    )  # fmt: skip
+
+
+def beyond_limit(
+    found: list[tuple[str, float, float]],
+    truth: dict[str, float],
+    limits: dict[str, float],
+) -> tuple[bool, float]:
+    """Whether a parameter is off by more than its limit, and how probable that is.
+
+    The probability is that of a normal error with each standard uncertainty, in at
+    least one parameter, as if errors were independent.
+    """
+    over, within = False, 1.0
+    for name, value, sigma in found:
+        limit = limits.get(name.partition(".")[0])
+        if limit is not None and name in truth:
+            over = over or abs(value - truth[name]) > limit
+            within *= math.erf(limit / (math.sqrt(2) * sigma))
+    return over, 1.0 - within
 
 
 def _parameters(found: dict[str, Any]) -> list[tuple[str, float, float]]:

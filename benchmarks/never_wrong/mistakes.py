@@ -179,6 +179,11 @@ def level_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
     return _site(written, level_deg=None, angle_setting_deg=None)
 
 
+def level_said_wrongly(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The base is said to be level to 0.01 degrees, however it stands."""
+    return _site(written, level_deg=0.01)
+
+
 def default_mounting(written: Written, bench: Bench, rng: Rng) -> Written:
     """The device is mounted otherwise, and nobody says so."""
     about = {**written.about, "frame": {"mounting": ["+x", "+y", "+z"]}}
@@ -341,6 +346,7 @@ AFTER: dict[str, After] = {
     "cut toward zero": cut_toward_zero,
     "gravity said wrongly": gravity_said,
     "clipped": clipped,
+    "level said wrongly": level_said_wrongly,
 }
 
 

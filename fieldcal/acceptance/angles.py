@@ -15,7 +15,7 @@ fixture is named, it is believed, and the decision says that it relies on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -83,6 +83,24 @@ def unwitnessed(
         f"wrong angles would not be noticed: {worst.says} could move {most} by up to"
         f" {sigmas:.0f} σ"
     )
+
+
+def would_explain(found: Calibration, off: Mapping[str, float]) -> str:
+    """A mistake of an angle that moves a parameter as far unnoticed; else empty.
+
+    Parameters
+    ----------
+    found : the calibration
+    off : by full name, how far each parameter is from nominal
+
+    """
+    for each in found.info.get("wrong_angles", ()):
+        wrong = WrongAngles.from_json(each)
+        for name, size in off.items():
+            most = abs(wrong.moves.get(name, 0.0))
+            if size <= most and wrong.shows * size / most < SHOWN:
+                return wrong.says
+    return ""
 
 
 def stated(found: Calibration, about: Description, limits: GradeLimits) -> bool:

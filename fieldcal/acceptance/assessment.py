@@ -63,7 +63,7 @@ def assess(
         except FieldcalError as error:
             warnings.append(str(error))
     dead = broken(session.block.six)
-    taken_out = _taken_out(session, still, limits)
+    taken_out = _taken_out(found, session, still, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session, still.averages, marks),
@@ -95,7 +95,7 @@ def unassessed(
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
     wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
-    wrong += _taken_out(session, still, limits)
+    wrong += _taken_out(found, session, still, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))
     return replace(found, warnings=warnings, good=found.good and not wrong)
@@ -128,9 +128,13 @@ def _lacking(
     )
 
 
-def _taken_out(session: Session, still: Rests, limits: GradeLimits) -> list[str]:
+def _taken_out(
+    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+) -> list[str]:
+    """Whether biases were subtracted, where they are as large as those found."""
     held = still.at_rest(session).averages
-    repeat = limits.acc_bias_repeat, limits.gyr_bias_repeat
+    seen = np.nan_to_num(found.vector("acc_bias")[0])
+    repeat = np.hypot(limits.acc_bias_repeat, seen), limits.gyr_bias_repeat
     return biases_taken_out(held, session.block, repeat, limits.fit_chance)
 
 

@@ -56,7 +56,7 @@ SPECTRUM = 16
 def biases_taken_out(
     windows: Sequence[Average],
     block: Block,
-    repeat: tuple[float, float],
+    repeat: tuple[float | Array, float],
     least: float,
 ) -> list[str]:
     """Sentences about biases that the recording no longer contains.
@@ -65,8 +65,9 @@ def biases_taken_out(
     ----------
     windows : at rest
     block : the whole recording
-    repeat : from run to run of an accelerometer's and of a gyroscope's bias, 1 sigma,
-        m/s^2 and rad/s
+    repeat : spread of an accelerometer's and of a gyroscope's bias, 1 sigma, m/s^2 and
+        rad/s: from run to run, and of accelerometers as large as it is found; (3,) or
+        one for all
     least : probability below which chance is excluded
 
     """
@@ -120,7 +121,7 @@ def _chi2_about_zero(means: Array, sigma: Array) -> tuple[float, float]:
     return chi2, chi2_tail(chi2, len(means))
 
 
-def _chance_near_zero(sigma: Array, spread: float) -> float:
+def _chance_near_zero(sigma: Array, spread: float | Array) -> float:
     """Probability that offsets of a spread come so close to zero on all axes, (2)."""
     return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
 
@@ -149,7 +150,7 @@ def centred(block: Block) -> list[tuple[str, float]]:
 
 
 def centred_and_rounded(
-    windows: Sequence[Average], block: Block, repeat: float, least: float
+    windows: Sequence[Average], block: Block, repeat: float | Array, least: float
 ) -> float:
     """Probability that the means come so close to those that rounding leaves, (4).
 

@@ -20,7 +20,7 @@ from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
-from fieldcal.acceptance.level import level_missing, tilt_is_found
+from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.turned import turns_disagree
@@ -94,6 +94,7 @@ def decide(
     verification = _verification(circumstances.verification, limits)
     checks = [
         _fit(found, limits),
+        *_examined(found),
         *_odd_positions(found, verification.ok is True),
         *_gyroscopes(found, limits),
         *_turns(found, limits),
@@ -101,7 +102,7 @@ def decide(
         *relies_on_factory(found, about, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
-        *_level(found, about),
+        *check_level(found, about),
         *check_change(found, limits, circumstances.family),
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
@@ -202,6 +203,18 @@ def _agreement(
     return Check(name, agree, says, chance, limits.fit_chance, "1")
 
 
+def _examined(found: Calibration) -> list[Check]:
+    """No GO by means alone: samples and turns might contradict them."""
+    why = found.info.get("unexamined")
+    if not why:
+        return []
+    says = (
+        f"neither samples nor turns could be examined, which might contradict the"
+        f" means of the windows: {why}"
+    )
+    return [Check("recording", False, says)]
+
+
 def _odd_positions(found: Calibration, verified: bool) -> list[Check]:
     """Name a position that does not fit the others; without witnesses it is NO-GO."""
     doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
@@ -248,17 +261,6 @@ def _site(found: Calibration, about: Description) -> list[Check]:
         return []
     wrong = gravity_unknown(about) or gravity_contradicted(about)
     return [Check("site", False, wrong)] if wrong else []
-
-
-def _level(found: Calibration, about: Description) -> list[Check]:
-    """Whether the level of the base is known: an unseen tilt acts as a bias."""
-    if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return []
-    level = found.info.get("level_sigma_deg")
-    if level is None:
-        return [Check("level", False, level_missing(about))]
-    says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
-    return [Check("level", True, says)]
 
 
 def _verification(verification: Verification | None, limits: GradeLimits) -> Check:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from fieldcal.acceptance.angles import would_explain
 from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits, read
-from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import G0
 from fieldcal.session.description import Description
@@ -23,7 +24,10 @@ DEG_H = math.radians(1) / 3600
 
 def counted(found: Calibration) -> FactoryErrors:
     """What a result was made with, of its information."""
-    keys = ("square_sigma", "quadratic_sigma", "g_sensitivity_sigma")
+    keys = (
+        "square_sigma", "quadratic_sigma", "g_sensitivity_sigma",
+        "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma",
+    )  # fmt: skip
     return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
 
 
@@ -43,7 +47,7 @@ def _checks(
     if shows := found.info.get("grade_shown"):
         usual = read(shows["grade"]).factory
         of_grade = f"{shows['grade']} grade"
-        yield _coarser(about.grade, shows)
+        yield _coarser(found, about, shows)
 
     def whose(said: float | None, size: float, grade: float) -> str:
         stated = said is not None or size != grade
@@ -62,7 +66,8 @@ def _checks(
         size = 1e3 * left.quadratic * G0
         says = (
             f"this relies on accelerometers that are linear: K2 is 0 ± {size:.2g}"
-            f" mg/g², {by} (--quadratic); each ± includes it"
+            f" mg/g², {by} (--quadratic), and a kink at zero is as large at 1 g; each ±"
+            " includes both"
         )
         yield Check("linearity", None, says)
     if left.g_sensitivity and "gyr" in measured:
@@ -74,12 +79,45 @@ def _checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
+    yield from _per_k(left, measured, of_grade)
 
 
-def _coarser(stated: str, shows: Mapping[str, str]) -> Check:
-    """What is said of a device that is not as good as its grade."""
+def _per_k(left: FactoryErrors, measured: set[str], of_grade: str) -> Iterator[Check]:
+    """How much biases were taken to change by, while the device warms up."""
+    sizes = {
+        "acc": (left.acc_per_k, f"{1e3 * left.acc_per_k / G0:.2g} mg"),
+        "gyr": (left.gyr_per_k, f"{float(f'{left.gyr_per_k / DEG_H:.2g}'):g} deg/h"),
+    }
+    told = [text for s, (size, text) in sizes.items() if size and s in measured]
+    if told:
+        says = (
+            f"this relies on biases that change by 0 ± {' and '.join(told)} per K while"
+            f" the device warms up, as usual for {of_grade}; each ± includes it"
+        )
+        yield Check("warm-up", None, says)
+
+
+def _coarser(found: Calibration, about: Description, shows: Mapping[str, str]) -> Check:
+    """What is said of a device that is not as good as its grade.
+
+    It is no GO if a wrong angle may be all that there is: one parameter is then far
+    from nominal, and everything agrees.
+    """
+    off = {}
+    for name in found.names:
+        if f"{name} is" in shows["because"]:
+            parameter = ParameterName.of(name)
+            usual = about.sent[parameter.group][parameter.axis]
+            off[name] = abs(found.value(name) - float(usual))
+    if angle := would_explain(found, off):
+        says = (
+            f"{shows['because']}, which no device of {about.grade} grade has, or it is"
+            f" {angle}: nothing in the recording tells which; record that position"
+            f" again, or state --grade {shows['grade']} if that is what the device is"
+        )
+        return Check("grade", False, says)
     says = (
-        f"this is no device of {stated} grade: {shows['because']}; what is not"
+        f"this is no device of {about.grade} grade: {shows['because']}; what is not"
         f" estimated of it is taken to be as large as {shows['grade']} grade has it. If"
         f" that is what it is, state it (--grade {shows['grade']}), which has its own"
         " limits as well; if its data sheet says less, state that (--squareness,"

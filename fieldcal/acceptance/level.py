@@ -10,11 +10,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
+from fieldcal.core.chances import chi2_tail
 from fieldcal.session.description import Description
 
 BLIND = 2
 """Positions with known angles that cannot tell a tilt from a bias."""
+
+
+DOUBTED = 0.01
+"""Probability of what the positions show below which a stated level is not believed. A
+bias is off by half as many of its sigmas again as the tilt is of its own, and nothing
+is lost without the statement: the tilt is then estimated."""
 
 
 def tilt_is_found(found: Calibration) -> bool:
@@ -37,3 +45,26 @@ def level_unknown(about: Description) -> str:
     """Warning before a run that will be NO-GO for it; empty if the tilt is known."""
     known = sum(position.oriented for position in about.positions)
     return level_missing(about) if known <= BLIND and about.level_deg is None else ""
+
+
+def check_level(found: Calibration, about: Description) -> list[Check]:
+    """Whether the level of the base is known: an unseen tilt acts as a bias.
+
+    A stated level that the positions contradict is not.
+    """
+    shown = found.info.get("tilt_shown")
+    level = found.info.get("level_sigma_deg")
+    if shown and chi2_tail(shown["chi2"], shown["dof"]) < DOUBTED:
+        says = (
+            f"the base is level to ± {level:.2g}°, as stated, but the positions show a"
+            f" tilt of {shown['tilt_deg']:.2g}° (χ² = {shown['chi2']:.0f} with"
+            f" {shown['dof']} degrees of freedom): level the base and record again, or"
+            " leave the statement out (--level, level_deg), and the tilt is estimated"
+        )
+        return [Check("level", False, says)]
+    if tilt_is_found(found) or "acc_bias" not in found.groups:
+        return []
+    if level is None:
+        return [Check("level", False, level_missing(about))]
+    says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
+    return [Check("level", True, says)]

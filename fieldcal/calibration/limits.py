@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
-from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.factory import WARM_UP_S, FactoryErrors
 
 DEFAULTS = "limits.toml"
 
@@ -45,6 +45,8 @@ class GradeLimits:
     squareness: float
     quadratic: float
     g_sensitivity: float
+    acc_bias_per_k: float
+    gyr_bias_per_k: float
     temperature_min_c: float
     temperature_max_c: float
     temperature_span_k: float
@@ -55,7 +57,12 @@ class GradeLimits:
     @property
     def factory(self) -> FactoryErrors:
         """What the factory leaves of errors that are not estimated."""
-        return FactoryErrors(self.squareness, self.quadratic, self.g_sensitivity)
+        # a device that warms up faster than allowed is waited for: 2 sigma
+        warming_k = self.temperature_rate_k_min / 2 * WARM_UP_S / 60
+        return FactoryErrors(
+            self.squareness, self.quadratic, self.g_sensitivity,
+            self.acc_bias_per_k, self.gyr_bias_per_k, warming_k,
+        )  # fmt: skip
 
     def sigma(self, group: str) -> float | None:
         """Largest uncertainty of a group's parameters; None where none is set."""

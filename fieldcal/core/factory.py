@@ -3,20 +3,34 @@
 Each is an effect of the catalogue by its id, with one standard deviation that all of
 its coefficients share. Few positions cannot show them, so they are part of every
 uncertainty. The sizes of a grade are in ``limits.toml``.
+
+A data sheet states how far an output is from a straight line, but not the shape of the
+curve. All three shapes of IEEE Std 1293 are therefore counted where K2 is: a kink at
+zero that is as large as K2 at 1 g, and a K3 that is as large as K2 at 10 g,
+
+    k+- = K2 g,    K3 = K2 / (10 g)                                                 (1)
+
+A device that warms up has biases that change by their temperature coefficients. A
+thermometer shows the course. Otherwise it is that of a package, exp(-t / tau).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.gravity import G0
 
 FACTORY = ("squareness", "quadratic", "g_sensitivity")
 """Keys by which session.toml and ``limits.toml`` state them, in the order below."""
 
 LARGEST = {"cross_coupling": 1.0, "quadratic": 1e-2, "g_sensitivity": 1e-2}
 """From which on a value is in another unit: an output as large as its input."""
+
+
+WARM_UP_S = 300.0
+"""Time constant of a package that warms up, s: of 100 to 2000."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +42,8 @@ class FactoryErrors:
     cross_coupling : of the accelerometers, 1
     quadratic : K2 of the accelerometers, 1/(m/s^2)
     g_sensitivity : of the gyroscopes, (rad/s)/(m/s^2)
+    acc_per_k, gyr_per_k : temperature coefficients of biases, m/s^2/K and rad/s/K
+    warming_k : K that the device may still warm up by, where no thermometer shows it
 
     Raises
     ------
@@ -39,17 +55,32 @@ class FactoryErrors:
     cross_coupling: float = 0.0
     quadratic: float = 0.0
     g_sensitivity: float = 0.0
+    acc_per_k: float = 0.0
+    gyr_per_k: float = 0.0
+    warming_k: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, size in self.by_effect.items():
-            if not 0 <= size < LARGEST[name]:
+        for name, largest in LARGEST.items():
+            size = getattr(self, name)
+            if not 0 <= size < largest:
                 said = "squareness" if name == "cross_coupling" else name
                 raise InputError(
                     f"{said} {size:g} is none: give the 1σ of a coefficient in SI"
-                    f" units, 0 or more and below {LARGEST[name]:g}"
+                    f" units, 0 or more and below {largest:g}"
                 )
 
     @property
     def by_effect(self) -> Mapping[str, float]:
-        """Sizes by id of the effect."""
-        return asdict(self)
+        """Sizes of what depends on the force, by id of the effect."""
+        return {
+            "cross_coupling": self.cross_coupling,
+            "quadratic": self.quadratic,
+            "scale_asymmetry": self.quadratic * G0,  # (1)
+            "cubic": self.quadratic / (10 * G0),  # (1)
+            "g_sensitivity": self.g_sensitivity,
+        }
+
+    @property
+    def per_k(self) -> tuple[float, ...]:
+        """Temperature coefficients of the six biases."""
+        return (self.acc_per_k,) * 3 + (self.gyr_per_k,) * 3

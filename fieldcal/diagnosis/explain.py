@@ -16,7 +16,7 @@ from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import of_size
+from fieldcal.model.causes.effect_causes import CHANGES, factory_sizes, of_factory
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -201,12 +201,15 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
 def _factory(
     dictionary: Dictionary, about: Description, prepared: Prepared
 ) -> Iterator[Group]:
-    """What the factory left, but for what the simulation has already."""
-    known = {term.effect.id for term in prepared.known}
+    """What the factory left, but for what the simulation has already.
+
+    A warm-up is none of it: the search looks for it as for all that time changes.
+    """
+    known = {term.effect.id for term in prepared.known} | {*CHANGES}
     turned = not dictionary.x.oriented.any()
-    for name, size in factory_errors(about).by_effect.items():
-        if size and name not in known and dictionary.x.f.any():
-            yield of_size(dictionary, name, size, turned)
+    for one in of_factory(dictionary, factory_errors(about), turned):
+        if one.part not in known:
+            yield one
 
 
 def _as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> None:
@@ -226,7 +229,10 @@ def _as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> 
     shows = GradeShown.of(about.grade, names, values, error, about.sent)
     if not shows.because:
         return
-    said, likely = (factory_errors(about, g).by_effect for g in (None, shows.grade))
+    said, likely = (
+        factory_sizes(dictionary.x, factory_errors(about, grade))
+        for grade in (None, shows.grade)
+    )
     dictionary.unfitted = tuple(
         replace(g, typical=g.typical * likely[g.part] / said[g.part])
         for g in dictionary.unfitted

@@ -21,6 +21,7 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
     angles_set,
     misread,
@@ -214,6 +215,8 @@ def solved_as(
         found = solve(laid.observations, recorded=recorded, **asked)
         told = {"grade": shows.grade, "because": shows.because}
         found = replace(found, info={**found.info, "grade_shown": told})
+    if not printed:
+        found = with_tilt_shown(found, laid.observations, recorded, asked)
     if turns == "yes":
         _insist(found, session, still)
     # why it is bad comes first
@@ -222,6 +225,8 @@ def solved_as(
     found = _listed(with_provenance(found, about), laid.order)
     if not printed:
         found = with_rounding(found, laid.rounding)
+    if laid.examined[1] and not printed:
+        found = replace(found, info={**found.info, "unexamined": laid.examined[1]})
     if shown is None:
         return found
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))

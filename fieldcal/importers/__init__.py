@@ -66,6 +66,11 @@ def open_recording(
         raise InputError(f"{path}: is a folder; name the recording in it")
     if path.is_char_device():
         raise InputError(f"{path}: is a device and has no end; name a file")
+    if path.is_fifo():
+        raise InputError(
+            f"{path}: is a pipe, and a recording is read more than once; write what"
+            " comes through it to a file"
+        )
     first = head(path)
     if not first:
         raise InputError(f"{path}: is empty; copy it again from where it came")

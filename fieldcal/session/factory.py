@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fieldcal.calibration import limits
 from fieldcal.core.factory import FACTORY, FactoryErrors
 from fieldcal.core.grade import Grade
 from fieldcal.session.description import Description
+
+FIELDS = {name: "cross_coupling" if name == "squareness" else name for name in FACTORY}
+"""Attributes of `FactoryErrors` by the keys of session.toml."""
 
 
 def factory_errors(about: Description, grade: Grade | None = None) -> FactoryErrors:
@@ -13,10 +18,7 @@ def factory_errors(about: Description, grade: Grade | None = None) -> FactoryErr
 
     The grade is the device's own if none is given.
     """
-    usual = limits.read(grade or about.grade)
-    return FactoryErrors(
-        *(
-            getattr(usual, name) if (said := getattr(about, name)) is None else said
-            for name in FACTORY
-        )
-    )
+    usual = limits.read(grade or about.grade).factory
+    said = {name: getattr(about, name) for name in FACTORY}
+    stated = {FIELDS[name]: size for name, size in said.items() if size is not None}
+    return replace(usual, **stated)

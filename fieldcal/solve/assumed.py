@@ -72,8 +72,8 @@ class Asked:
             return _suitable_method(int(still.sum()), known)
         if self.method == "two_position" and (known != 2 or still.sum() != 2):
             raise NotObservable(
-                f"two positions with known angles are needed, not {known}: "
-                "with more of them use the joint estimate"
+                f"two positions with known angles are needed and no other, not {known}"
+                f" of {still.sum()}: with more of them use the joint estimate"
             )
         if self.method != "scalar" and known < still.sum():
             raise NotObservable(

@@ -31,7 +31,7 @@ from fieldcal.solve.averaging import (
 from fieldcal.solve.given import Given, Wanted
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
 from fieldcal.solve.settling import without_bad_windows
-from fieldcal.solve.shown import Shown
+from fieldcal.solve.shown import Shown, at_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ class Estimated:
     @property
     def ended_s(self) -> float | None:
         """When biases that change are as stated, s since the start."""
-        if not self.given.ending.any():
+        if not at_end(self.given, self.given.explanations).any():
             return None
         x = self.given.x
         return float((x.since_start + x.lasts / 2).max())

@@ -28,7 +28,7 @@ from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import of_size, whole
+from fieldcal.model.causes.effect_causes import CHANGES, of_factory, whole
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
@@ -128,7 +128,8 @@ class Given(Dictionary):
     @cached_property
     def ending(self) -> Array:
         """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        return at_end(self, self.explanations)
+        left = tuple(m for m in self.asked if m[1].part in CHANGES)
+        return at_end(self, (Shown(left, 1.0), *self.explanations))
 
     @property
     def groups(self) -> list[Group]:
@@ -158,7 +159,9 @@ class Given(Dictionary):
             yield self._estimated(w.tilt, known=w.level_deg)
         if w.cross:
             yield self._estimated("cross_coupling", turned=not oriented)
-        yield from self._factory(turned=not oriented)
+        left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))
+        for one in of_factory(self, left, turned=not oriented):
+            yield _given_cause(one)
         if w.gyro_cross:
             yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
@@ -194,14 +197,6 @@ class Given(Dictionary):
             return _given_cause(replace(one, fixed=free))
         size = np.full(len(one.params), known)
         return _given_cause(replace(one, typical=size, fixed=1.0))
-
-    def _factory(self, turned: bool) -> Iterator[Cause]:
-        """What the factory left of errors that nobody asked for."""
-        if not self.x.f.any():
-            return
-        for name, size in self.wanted.factory.by_effect.items():
-            if size and not (name == "cross_coupling" and self.wanted.cross):
-                yield _given_cause(of_size(self, name, size, turned))
 
     def _earth(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""

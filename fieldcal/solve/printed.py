@@ -85,6 +85,13 @@ def _refuse(observations: Observations, asked: Asked) -> None:
             f"the paper prints formulas for two angles, and {third[0]} has three: leave"
             " out --as-printed"
         )
+    still = ~observations.rotating & ~observations.oriented
+    if still.any():
+        unknown = observations.positions[int(np.argmax(still))].name
+        raise InputError(
+            f"the paper prints formulas for known angles, and those of {unknown} are"
+            " not stated: leave out --as-printed"
+        )
     if spun := [p.name for p in observations.positions if p.speed]:
         raise InputError(
             f"the paper prints formulas for known rates, and {spun[0]} turns about an"

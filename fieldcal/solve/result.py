@@ -155,6 +155,8 @@ def _info(
         "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
         "quadratic_sigma": wanted.factory.quadratic,
         "g_sensitivity_sigma": wanted.factory.g_sensitivity,
+        "acc_bias_per_k_sigma": wanted.factory.acc_per_k,
+        "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
     }
     if doubt := DoubtfulPosition.of(observations, found.bad):
         out["doubtful_position"] = doubt.to_json()

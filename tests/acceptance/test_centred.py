@@ -220,6 +220,8 @@ def test_the_chance_of_a_mean_that_rounding_leaves_is_as_written(mode: str) -> N
     block = Block.of(np.arange(len(acc)) / RATE, acc, np.zeros_like(acc))
     found = centred_and_rounded(windows, block, spread, LEAST)
     assert 0 < expected < 1 and found == pytest.approx(expected, rel=0.05)
+    large = np.array([1.0, 1.0, 1e3]) * spread  # a bias that is found on one axis
+    assert centred_and_rounded(windows, block, large, LEAST) < 0.02 * found
     block.acc[5, 1] = np.nan
     assert centred_and_rounded(windows, block, spread, LEAST) == 1.0
     block.acc[5, 1] = 0.0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from observed import observe
+from small_sessions import SD, ladder, nominal, rows_of
 
 from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.calibration import Calibration, limits
@@ -17,6 +19,8 @@ from fieldcal.core.samples import Array
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
+from fieldcal.solve.estimation import Recorded, estimated
+from fieldcal.solve.given import Wanted
 
 TACTICAL = limits.read("tactical")
 ABOUT = description.parse({"format": 1})
@@ -85,13 +89,15 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
-    """Of devices with K2 the plain estimate is far off, this one not; f^2 by hand."""
+    """Of devices with a curve the plain estimate is far off, this one not; by hand."""
     rng = np.random.default_rng(seed)
     off: list[Array] = []
     plain: list[Array] = []
     for _ in range(25):
         force = forces(FIVE, G)
-        bent = rng.normal(0, 2e-5, 3) * force * force
+        bent = rng.normal(0, 2e-5, 3) * force**2
+        bent += rng.normal(0, 1.961e-4, 3) * np.abs(force)  # as much at 1 g
+        bent += rng.normal(0, 2.039e-7, 3) * force**3  # as much at 10 g
         mean = force + bent + rng.normal(0, 1e-4, (len(FIVE), 3))
         seen = observe(FIVE, mean, sigma=1e-4)
         for left, pulls in ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain)):
@@ -101,6 +107,47 @@ def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
                 pulls.append((value - true) / sigma)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
     assert np.sqrt(np.mean(np.square(plain))) > 2
+
+
+def test_a_kink_is_not_taken_for_a_curve() -> None:
+    """Inclined axes tell K2, and a kink at zero would be in the bias beside it."""
+    inclined = tuple(Position.deg(a, b) for a in (45, -45, 135, -135) for b in (0, 35))
+    places = (*SIX_FACES, *inclined)
+    force = forces(places, G)
+    mean = force + 1.961e-4 * np.abs(force)
+    seen = observe(places, mean, sigma=1e-5)
+    result = solve(seen, tilt="none", factory=FactoryErrors(0.0, 2e-5))
+    value, sigma = result.vector("acc_bias")
+    assert (np.abs(value) < sigma).all() and (sigma < 1e-3).all()
+
+
+PER_K = {"acc_per_k": 5e-4, "gyr_per_k": 1e-5}
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) -> None:
+    """At the end of the recording; the course is that of a thermometer, or of a box."""
+    rng, off, plain = np.random.default_rng(3), list[Array](), list[Array]()
+    warming: dict[str, Any] = {} if shown else {"warming": np.zeros(27)}
+    x, wanted = ladder(**warming), Wanted(tilt="none")
+    left = FactoryErrors(**PER_K, warming_k=1.25)
+    course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)
+    end = 2e-3 * x.t[-1] if shown else 1.25 * np.exp(-x.since_start[-1] / 300)
+    for _ in range(20):
+        drift = rng.normal(0, np.repeat([5e-4, 1e-5], 3))
+        y = np.hstack([x.f, x.w]) + drift * course[:, None]
+        y += SD / 20 * rng.standard_normal(y.shape)
+        rows = rows_of(x, y)
+        recorded = Recorded(replace(rows, sd=rows.sd / 20), np.array([x.since_turn]))
+        for factory, pulls in ((left, off), (FactoryErrors(), plain)):
+            found = estimated(
+                recorded, None, nominal(), replace(wanted, factory=factory)
+            )
+            at = [found.names.index(f"gyr_bias.{axis}") for axis in "xyz"]
+            error = found.values[at] - (drift * end)[3:]
+            pulls.append(error / np.sqrt(np.diag(found.covariance)[at]))
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.25
+    assert np.sqrt(np.mean(np.square(plain))) > 2.5
 
 
 def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
@@ -137,7 +184,31 @@ def test_the_grade_says_what_nobody_states(
     device: dict[str, object], left: tuple[float, float, float]
 ) -> None:
     about = description.parse({"format": 1, "device": device})
-    assert factory_errors(about) == FactoryErrors(*left)
+    found = factory_errors(about)
+    assert (found.cross_coupling, found.quadratic, found.g_sensitivity) == left
+
+
+@pytest.mark.parametrize(
+    ("moves", "shows", "ok"),
+    [
+        (0.06, 1.0, False),  # 4 % by two thirds of the mistake, which shows by 0.7
+        (0.06, 20.0, None),  # which would be seen
+        (0.02, 1.0, None),  # which is not enough
+    ],
+)
+def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
+    moves: float, shows: float, ok: bool | None
+) -> None:
+    seen = observe(SIX_FACES, forces(SIX_FACES, G) * [1.0, 0.96, 1.0], sigma=1e-4)
+    result = solve(seen, tilt="none", factory=FactoryErrors(1e-3))
+    told = {"grade": "consumer", "because": "acc_scale.y is -0.04 from nominal"}
+    wrong: dict[str, Any] = {"joint": 0, "angle_deg": None, "position": 4}
+    wrong |= {"shows": shows, "moves": {"acc_scale.y": moves}}
+    info = {**result.info, "grade_shown": told, "wrong_angles": [wrong]}
+    checks = relies_on_factory(replace(result, info=info), ABOUT, TACTICAL)
+    (check,) = [c for c in checks if c.name == "grade"]
+    assert check.ok is ok
+    assert ("position 5 with a wrong α" in check.says) == (ok is False)
 
 
 def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:

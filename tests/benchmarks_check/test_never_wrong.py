@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.never_wrong.bench import drawn
-from benchmarks.never_wrong.judging import WRONG, Judged, judged, write
+from benchmarks.never_wrong.judging import (
+    WRONG,
+    Judged,
+    beyond_limit,
+    judged,
+    write,
+)
 from benchmarks.never_wrong.mistakes import session, spoilt
 
 LIMIT = 600.0
@@ -21,11 +27,38 @@ def of(folder: Path, seed: int, *names: str) -> Judged:
     return judged(folder, bench.truth, bench.grade, False, LIMIT)
 
 
+def test_an_error_beyond_a_limit_counts_beside_the_chance_of_one() -> None:
+    """0.3173 and 0.0455: outside of one and of two standard uncertainties."""
+    limits, truth = {"acc_bias": 0.02}, {"acc_bias.x": 0.0, "acc_bias.y": 0.1}
+    one, two = ("acc_bias.x", 0.019, 0.02), ("acc_bias.y", 0.1, 0.01)
+    scale = ("acc_scale.x", 1.5, 0.1)  # no limit of its own
+    over, chance = beyond_limit([one, two, scale], truth, limits)
+    assert not over
+    assert chance == pytest.approx(1 - (1 - 0.3173) * (1 - 0.0455), abs=1e-4)
+    assert beyond_limit([one, ("acc_bias.y", 0.0797, 0.01)], truth, limits)[0]
+
+
 def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
     tmp_path: Path,
 ) -> None:
     found = of(tmp_path / "six", 93_000_015)
     assert found.go and 0 < found.off < WRONG
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("seed", "mistake", "was"),
+    [
+        (90_000_018, (), 3.5),  # a warm-up that g-sensitivity took in
+        (90_000_036, (), 4.3),  # a kink at zero beside a K2 that is determined
+        (92_004_008, ("sway",), 3.6),  # attitudes at the ends of turns
+    ],
+)
+def test_what_is_off_is_in_the_uncertainties(
+    tmp_path: Path, seed: int, mistake: tuple[str, ...], was: float
+) -> None:
+    found = of(tmp_path / "s", seed, *mistake)
+    assert found.go and found.off < 0.75 * was
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,8 @@ from wires import wit_acc, wit_cycles, wit_gyr
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
-from fieldcal.drivers.serial_imu import SerialImu, reason
+from fieldcal.drivers.reader import Chunk
+from fieldcal.drivers.serial_imu import RECENT, SerialImu, reason, recent
 
 ACC, GYR, CYCLES = wit_acc(1), wit_gyr(1), wit_cycles(3000)
 
@@ -177,6 +178,16 @@ def test_garbage(pty: tuple[int, str], garbage: bytes) -> None:
             DeviceSilent, match="no format that is known; check the baud"
         ):
             next(imu.blocks(0.2))
+
+
+def test_of_a_flood_of_noise_little_is_kept() -> None:
+    """As much as tells a format, whatever the size of the pieces."""
+    for size in (1, 1000, 1 << 16):
+        chunks = [Chunk(0.01 * i, bytes(size)) for i in range(20_000 // size + 40)]
+        kept = recent(chunks)
+        assert kept == chunks[-len(kept) :]
+        assert RECENT <= sum(len(c.data) for c in kept) < RECENT + size
+    assert recent(chunks[:0]) == []
 
 
 def test_frames_without_a_sample(pty: tuple[int, str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,3 +99,19 @@ def test_solve_says_which_fact_it_cannot_use(
     assert says in said
     if not says:
         assert "beyond" not in said and "nobody said" not in said
+
+
+@pytest.mark.parametrize("effects", [[], ["nonsense"]])
+def test_what_could_not_be_examined_is_no_go(
+    effects: list[str],
+    block: Block,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Samples and turns might contradict the means, as with outputs exchanged."""
+    tables = {"run": {"procedure": "positions"}, "model": {"effects": effects}}
+    folder = write_session(tmp_path / "s", block, HELD, **tables)
+    main(["solve", str(folder), "--json"])
+    checks = json.loads(capsys.readouterr().out)["decision"]["checks"]
+    refused = {check["name"] for check in checks if check["ok"] is False}
+    assert ("recording" in refused) == bool(effects)

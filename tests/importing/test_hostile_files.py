@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -171,7 +172,14 @@ def test_a_device_is_no_file(capsys: pytest.CaptureFixture[str]) -> None:
         )
 
 
-def test_topics_that_differ_in_signs_havefolders_of_of_their_own() -> None:
+def test_a_pipe_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nobody writes into it: whoever opened it would wait for ever."""
+    os.mkfifo(tmp_path / "log.csv")
+    said = assert_refused("import", str(tmp_path / "log.csv"), capsys=capsys)
+    assert "to a file" in said
+
+
+def test_topics_that_differ_in_signs_have_folders_of_their_own() -> None:
     assert len({*folders_of(["/a/b", "/a_b", "/A_b", "a b", "..", "/"]).values()}) == 6
 
 

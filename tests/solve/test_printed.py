@@ -108,3 +108,7 @@ def test_what_the_print_has_not_is_refused() -> None:
     )
     with pytest.raises(NotObservable, match="^no sensor was measured; the print gives"):
         solve(observe(PLACES, NOWHERE), as_printed=True)
+    laid = (*FIVE, Position("on its side", None, None))
+    seen = np.vstack([outputs(FIVE), [9.81, 0.0, 0.0]])
+    with pytest.raises(InputError, match="those of on its side are not stated"):
+        solve(observe(laid, seen), as_printed=True)

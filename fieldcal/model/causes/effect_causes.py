@@ -8,13 +8,20 @@ from itertools import combinations
 
 import numpy as np
 
+from fieldcal.core.factory import WARM_UP_S, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.physics.effect import Effect, Motion, Sensor
+from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
+
+NOWHERE: Point = (NO_SHAPE, 0)
+"""The only point of an effect that has no shape."""
+
+CHANGES = ("temperature_bias", "warm_up")
+"""Effects by which biases change while a device that a factory made warms up."""
 
 
 def of_effects(table: ColumnTable) -> Iterator[Cause]:
@@ -41,11 +48,11 @@ def _of_effect(
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
-def whole(table: ColumnTable, name: str, turned: bool) -> Group:
+def whole(table: ColumnTable, name: str, turned: bool, point: Point = NOWHERE) -> Group:
     """An effect of the catalogue with its parameters, of typical size.
 
     Those that a turn of the whole device makes of others are left out if it is `turned`
-    as nobody knows.
+    as nobody knows. `point` is its shape, if it has one.
 
     Raises
     ------
@@ -58,17 +65,48 @@ def whole(table: ColumnTable, name: str, turned: bool) -> Group:
         raise TypeError(f"{name} has no equation")
     some = [j for j, p in enumerate(effect.params)
             if not (turned and p.name in effect.turned_into)]  # fmt: skip
-    at = effect_columns(table, effect, [({}, 0)])[0][some]
+    at = effect_columns(table, effect, [point])[0][some]
     typical = np.array([effect.params[j].typical for j in some])
     size = typical * units_of(table, effect)[some]
-    return Group(name, "", at, size, effect, params=tuple(some), in_state=True)
+    return Group(name, "", at, size, effect, *point, params=tuple(some), in_state=True)
 
 
-def of_size(table: ColumnTable, name: str, size: float, turned: bool) -> Group:
+def of_size(
+    table: ColumnTable,
+    name: str,
+    size: Array,
+    turned: bool,
+    point: Point = NOWHERE,
+) -> Group:
     """The same as what a factory left, whose coefficients have a known size, SI."""
-    one = whole(table, name, turned)
-    wide = size * units_of(table, catalogue()[name])[list(one.params)]
+    one = whole(table, name, turned, point)
+    wide = (size * units_of(table, catalogue()[name]))[list(one.params)]
     return replace(one, cause="factory", part=name, typical=wide, fixed=1.0)
+
+
+def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Group]:
+    """What a factory left of errors that are not estimated.
+
+    Biases follow a thermometer if one shows a change, and the warm-up of a package
+    otherwise.
+    """
+    if not table.x.f.any():
+        return []
+    shapes = {"warm_up": {"tau_s": WARM_UP_S}}
+    return [
+        of_size(table, name, size, turned, (shapes.get(name, {}), 0))
+        for name, size in factory_sizes(table.x, left).items()
+        if size.any()
+    ]
+
+
+def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
+    """One sigma of each effect that a factory left, SI: one for all, or (6,)."""
+    sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
+    per_k = np.array(left.per_k)
+    if x.warms:
+        return sizes | {"temperature_bias": per_k}
+    return sizes | {"warm_up": per_k * left.warming_k}
 
 
 def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:

@@ -33,6 +33,7 @@ from fieldcal.model.turns.attitude import (
 )
 from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
 from fieldcal.model.turns.motion import moving
+from fieldcal.model.turns.tremor import at_ends
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
 
@@ -57,7 +58,7 @@ class Turn:
     done : (m + 1,) u
     cut : (k + 1,) edges between the pieces
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
-    blur : rad, what sampling leaves open of the closure
+    blur : rad, what sampling leaves open of the closure, and swaying at its ends
     interval : s between samples
 
     """
@@ -135,6 +136,7 @@ class Turning:
     Attributes
     ----------
     legs : the windows at both ends, and the bounds of the motion in samples
+    sways : rad^2 by which the device sways in the windows at both ends
     contradicted : the windows between which the gyroscopes say otherwise than the
         positions, by the state that turns were followed with last
 
@@ -143,6 +145,8 @@ class Turning:
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
         self.source, self.rows, self.since = source.whole, rows, since
         self.legs = list(self._found())
+        windows = spans(source.block, source.about)
+        self.sways = {pair: at_ends(source, windows[[*pair]]) for pair, *_ in self.legs}
         self.contradicted: list[tuple[int, int]] = []
 
     def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
@@ -166,8 +170,10 @@ class Turning:
         ends = state.experienced(self.rows.x)
         self.contradicted = []
         for pair, first, last in self.legs:
-            if (turn := self._turn(state, ends, pair, first, last)) is not None:
-                yield turn
+            turn = self._turn(state, ends, pair, first, last)
+            if turn is not None:
+                swayed = float(np.hypot(turn.blur, np.sqrt(self.sways[pair])))
+                yield replace(turn, blur=swayed)
 
     def _turn(
         self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int

@@ -1,0 +1,52 @@
+"""Whether the recording contradicts how level the base is stated to be.
+
+A stated level of standard uncertainty s is a prior of the tilt. A tilt that is not
+there by the statement is taken for biases, and the fit is as good as before. The same
+rows without the statement give the tilt t with covariance C, and
+
+    chi2 = t^T (C + s^2 I)^-1 t                                                   (1)
+
+has as many degrees of freedom as t has axes, if the statement is true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import group_of
+from fieldcal.solve import Observations, solve
+from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.given import TILTS
+
+
+def with_tilt_shown(
+    found: Calibration,
+    observations: Observations,
+    recorded: Recorded | None,
+    asked: Mapping[str, Any],
+) -> Calibration:
+    """The same with the tilt that the positions show, where the level is stated.
+
+    Parameters
+    ----------
+    found : the result with the stated level
+    observations, recorded, asked : what it was made from
+
+    """
+    level = found.info.get("level_sigma_deg")
+    if level is None or found.method in ("two_position", "scalar"):
+        return found
+    free = solve(observations, recorded=recorded, **{**asked, "level_sigma_deg": None})
+    at = [i for i, name in enumerate(free.names) if group_of(name) in TILTS]
+    if not at:
+        return found
+    tilt = free.values[at]
+    covariance = free.covariance[np.ix_(at, at)] + level**2 * np.eye(len(at))
+    chi2 = float(tilt @ np.linalg.solve(covariance, tilt))  # (1)
+    shown = {"chi2": chi2, "dof": len(at), "tilt_deg": float(np.linalg.norm(tilt))}
+    return replace(found, info={**found.info, "tilt_shown": shown})

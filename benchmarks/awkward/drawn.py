@@ -103,9 +103,14 @@ def _handling(rng: np.random.Generator, kind: str) -> Handling:
 
 
 def _spoilt(log: Log, handling: Handling, rng: np.random.Generator) -> Log:
-    """What recorders do: bursts, pauses, a clock that is set, clipping, dead bands."""
+    """What recorders do: bursts, pauses, a clock that is set, clipping, dead bands.
+
+    Rows that are marked as without a value, and damaged ones, are written so later.
+    """
     t, acc, gyr = log.t, [a.copy() for a in log.acc], [w.copy() for w in log.gyr]
-    spoils = rng.choice(["", "", "bursts", "jump", "clipped", "dead band"])
+    spoils = rng.choice(
+        ["", "", "bursts", "jump", "clipped", "dead band", "marked", "wild"]
+    )
     if spoils == "bursts" and log.kind in ("samples", "several"):
         t = t + np.floor(t / 5.0) * 300.0
     if spoils == "clipped":
@@ -176,6 +181,7 @@ def _as_text(log: Log, folder: Path, rng: np.random.Generator) -> Log:
         many = f"imu{i}_" if len(log.acc) > 1 else ""
         columns += _three(f"{many}a", acc_unit, a * ACC[acc_unit] + zero, rng)
         columns += _three(f"{many}g", gyr_unit, w * GYR[gyr_unit], rng)
+    columns = _lost(columns, str(log.said["spoilt"]), rng)
     warm = None
     if rng.random() < 0.4 and head not in ("grouped", "axis (unit)", "txwx"):
         warm = _thermometer(log, columns, rng)
@@ -183,6 +189,24 @@ def _as_text(log: Log, folder: Path, rng: np.random.Generator) -> Log:
     log.answers.update(_answers(log, columns, head))
     kept = None if head == "none" else warm
     return replace(log, path=path, warm=kept, timed=timed)
+
+
+def _lost(columns: Columns, spoilt: str, rng: np.random.Generator) -> Columns:
+    """Columns of which some rows have no value, or any."""
+    if spoilt not in ("marked", "wild"):
+        return columns
+    n = len(columns[0][2])
+    rows = rng.choice(n, max(1, n // 150), replace=False)
+    number = float(rng.choice([-999.0, 9999.0, -1.0, -32768.0]))
+    out: Columns = []
+    for name, unit, values in columns:
+        whole = values.copy()
+        if name != "t":
+            most = 10 * np.abs(values).max()
+            wild = rng.uniform(-most, most, len(rows))
+            whole[rows] = number if spoilt == "marked" else wild
+        out.append((name, unit, whole))
+    return out
 
 
 def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:

@@ -15,7 +15,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import group_of
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import GYR, Array
+from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.solve import least_squares
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.closed import Closed
@@ -85,17 +85,18 @@ def _refuse(observations: Observations, asked: Asked) -> None:
             f"the paper prints formulas for two angles, and {third[0]} has three: leave"
             " out --as-printed"
         )
-    still = ~observations.rotating & ~observations.oriented
-    if still.any():
-        unknown = observations.positions[int(np.argmax(still))].name
-        raise InputError(
-            f"the paper prints formulas for known angles, and those of {unknown} are"
-            " not stated: leave out --as-printed"
-        )
     if spun := [p.name for p in observations.positions if p.speed]:
         raise InputError(
             f"the paper prints formulas for known rates, and {spun[0]} turns about an"
             " axis that nobody knows: leave out --as-printed"
+        )
+    felt = np.isfinite(observations.mean[:, ACC]).all(axis=1)
+    nowhere = felt & ~observations.rotating & ~observations.oriented
+    if nowhere.any():
+        unknown = observations.positions[int(np.argmax(nowhere))].name
+        raise InputError(
+            f"the paper prints formulas for known angles, and those of {unknown} are"
+            " not stated: leave out --as-printed"
         )
 
 

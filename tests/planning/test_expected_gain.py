@@ -112,8 +112,9 @@ def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
         rows, angle = _row(place), _by_angles(place) * ANGLE
         cov = np.diag(noise**2) + angle @ angle.T
         weighed.append(np.linalg.solve(np.linalg.cholesky(cov), rows))
-    factory = 1 / np.array([left["squareness"]] * 6 + [left["quadratic"]] * 3)
-    whole = np.vstack([*weighed, np.hstack([np.zeros((9, 8)), np.diag(factory)])])
+    curves = left["quadratic"] * np.array([1.0, 9.80665, 1 / 98.0665])
+    factory = 1 / np.array([left["squareness"]] * 6 + np.repeat(curves, 3).tolist())
+    whole = np.vstack([*weighed, np.hstack([np.zeros((15, 8)), np.diag(factory)])])
     limits = np.array(list(ALLOWED.values()))
     variance = np.diag(np.linalg.inv(whole.T @ whole))[:6].copy()
     variance[3:] += (3e-4 / 9.806) ** 2  # gravity is not known better
@@ -128,7 +129,10 @@ def _force(place: Position, tilt: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
 
 
 def _row(place: Position) -> np.ndarray:
-    """Derivatives by biases, scale factors, tilt, cross-coupling and K2, (3, 17)."""
+    """Derivatives by biases, scale factors, tilt, cross-coupling and curves, (3, 23).
+
+    These are K2, a kink at zero and K3.
+    """
     f, step = _force(place), 1e-5
     along_x = np.array([1.0, 0.0, 0.0])
     a, b = place.alpha or 0.0, place.beta or 0.0
@@ -144,7 +148,8 @@ def _row(place: Position) -> np.ndarray:
     crossed = np.zeros((3, 6))
     for k, (i, j) in enumerate(permutations(range(3), 2)):
         crossed[i, k] = f[j]
-    return np.column_stack([np.eye(3), np.diag(f), *tilts, crossed, np.diag(f**2)])
+    curves = [np.diag(f**2), np.diag(np.abs(f)), np.diag(f**3)]
+    return np.column_stack([np.eye(3), np.diag(f), *tilts, crossed, *curves])
 
 
 def _by_angles(place: Position) -> np.ndarray:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.chances import DEVIATION
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.windows.spikes import WILD, without_spikes
@@ -55,6 +55,9 @@ UNLIKELY = (5.0, 0.5)
 
 BESIDE = 10
 """Samples to either side that tell whether something shakes the device."""
+
+AT_ONCE = 1 << 16
+"""Samples looked at together: an hour of them need not be in memory once more."""
 
 MOVED = 10.0
 """How many times that a device on its way may depart by: a knock, 5 g for a sample."""
@@ -118,19 +121,32 @@ class DecodeFault(Chain):
 
 def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Single samples that jump by more than the device can move, (n, 6)."""
-    six = recording.block.six
-    gone = np.isnan(without_spikes(recording.block).six) & np.isfinite(six)
+    n, edge, still = len(recording.block), BESIDE + 3, recording.still
+    out = np.zeros((n, 6), dtype=bool)
+    for first in range(0, n, AT_ONCE):
+        some = slice(max(first - edge, 0), min(first + AT_ONCE + edge, n))
+        most = np.repeat(UNLIKELY, 3) * np.where(still[some], 1.0, MOVED)[:, None]
+        found = _wild_in(recording.block[some], most * np.abs(recording.scale))
+        out[first : first + AT_ONCE] = found[first - some.start :][:AT_ONCE]
+    return out
+
+
+def _wild_in(block: Block, most: Array) -> NDArray[np.bool_]:
+    """The same of a part of the samples, of jumps that are at `most` likely, (n, 6)."""
+    six = block.six
     apart = np.zeros_like(six)
     apart[1:-1] = np.abs(six[1:-1] - (six[:-2] + six[2:]) / 2)
-    most = np.repeat(UNLIKELY, 3) * np.where(recording.still, 1.0, MOVED)[:, None]
-    wild = gone & (apart > most * np.abs(recording.scale))
-    steps = np.arange(2, BESIDE + 2)
+    wild: NDArray[np.bool_] = np.nan_to_num(apart) > most
+    if not wild.any():
+        return wild
+    wild &= np.isnan(without_spikes(block).six)
+    apart, steps = np.nan_to_num(apart), np.arange(2, BESIDE + 2)
     for c in np.flatnonzero(wild.any(axis=0)):
         rows = np.flatnonzero(wild[:, c])
         sides = (
             np.clip(np.add.outer(rows, s), 0, len(six) - 1) for s in (steps, -steps)
         )
-        usual = np.max([np.nanmedian(apart[near, c], axis=1) for near in sides], axis=0)
+        usual = np.max([np.median(apart[near, c], axis=1) for near in sides], axis=0)
         wild[rows, c] = apart[rows, c] > WILD * DEVIATION * usual
     return wild
 

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.bounds import spans
@@ -143,7 +144,7 @@ class Turning:
     """
 
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
-        self.source, self.rows, self.since = source.whole, rows, since
+        self.source, self.rows, self.since = _on_the_way(source), rows, since
         self.legs = list(self._found())
         windows = spans(source.block, source.about)
         self.sways = {pair: at_ends(source, windows[[*pair]]) for pair, *_ in self.legs}
@@ -239,6 +240,14 @@ class Turning:
             latitude=ends.latitude, f=f,
         )  # fmt: skip
         return replace(out, w=w, w_dot=accelerations(t, w))
+
+
+def _on_the_way(source: RowSource) -> RowSource:
+    """The same; without samples that may not be used, if any lie between windows."""
+    lost: NDArray[np.bool_] = ~np.all(source.usable, axis=1)
+    for first, last in spans(source.block, source.about):
+        lost[first:last] = False
+    return source.whole if lost.any() else source
 
 
 def only(x: Experience, rows: Sequence[int]) -> Experience:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.awkward.motion import Floats, G, Handling, Moved, moved, outputs
 from benchmarks.awkward.written import NAMED, Columns, heading, write
@@ -181,20 +182,30 @@ def _as_text(log: Log, folder: Path, rng: np.random.Generator) -> Log:
         many = f"imu{i}_" if len(log.acc) > 1 else ""
         columns += _three(f"{many}a", acc_unit, a * ACC[acc_unit] + zero, rng)
         columns += _three(f"{many}g", gyr_unit, w * GYR[gyr_unit], rng)
-    columns = _lost(columns, str(log.said["spoilt"]), rng)
+    columns, lost = _lost(columns, str(log.said["spoilt"]), rng)
     warm = None
     if rng.random() < 0.4 and head not in ("grouped", "axis (unit)", "txwx"):
         warm = _thermometer(log, columns, rng)
     path = write(folder, columns, head, rng, log.said)
     log.answers.update(_answers(log, columns, head))
-    kept = None if head == "none" else warm
-    return replace(log, path=path, warm=kept, timed=timed)
+    # rows that are marked as without a value are no samples
+    acc, gyr = (
+        [np.delete(x, lost, axis=0) for x in some] for some in (log.acc, log.gyr)
+    )
+    known = None if head == "none" or warm is None else np.delete(warm, lost)
+    return replace(
+        log, path=path, t=np.delete(log.t, lost), acc=acc, gyr=gyr, warm=known,
+        timed=timed,
+    )  # fmt: skip
 
 
-def _lost(columns: Columns, spoilt: str, rng: np.random.Generator) -> Columns:
-    """Columns of which some rows have no value, or any."""
+def _lost(
+    columns: Columns, spoilt: str, rng: np.random.Generator
+) -> tuple[Columns, NDArray[np.intp]]:
+    """Columns of which some rows have no value, or any; and which have none."""
+    none = np.zeros(0, dtype=np.intp)
     if spoilt not in ("marked", "wild"):
-        return columns
+        return columns, none
     n = len(columns[0][2])
     rows = rng.choice(n, max(1, n // 150), replace=False)
     number = float(rng.choice([-999.0, 9999.0, -1.0, -32768.0]))
@@ -206,7 +217,7 @@ def _lost(columns: Columns, spoilt: str, rng: np.random.Generator) -> Columns:
             wild = rng.uniform(-most, most, len(rows))
             whole[rows] = number if spoilt == "marked" else wild
         out.append((name, unit, whole))
-    return out
+    return out, rows if spoilt == "marked" else none
 
 
 def _answers(log: Log, columns: Columns, head: str) -> dict[str, list[str]]:

@@ -36,6 +36,9 @@ MOST = 5
 OFF = 0.12
 """Logarithm of a scale beyond what sensors as delivered are out by."""
 
+WILD = 10.0
+"""Times what is usual, from which a row is one that was damaged."""
+
 BASE_KB = 60_000
 """What reading any file takes beside its rows, most of it pyarrow's pools."""
 
@@ -207,4 +210,6 @@ def _scale(truth: Array, found: Array) -> float:
     got = found - np.median(found, axis=0)
     if not np.isfinite(got).all() or np.std(true) < 0.02:
         return 1.0
-    return float((true * got).sum() / (true * true).sum())
+    size = np.linalg.norm(got, axis=1)
+    whole = size < WILD * np.quantile(size, 0.95)  # others were damaged
+    return float((true * got)[whole].sum() / (true * true)[whole].sum())

@@ -59,8 +59,9 @@ BESIDE = 10
 AT_ONCE = 1 << 16
 """Samples looked at together: an hour of them need not be in memory once more."""
 
-MOVED = 10.0
-"""How many times that a device on its way may depart by: a knock, 5 g for a sample."""
+MOVED = (np.inf, 10.0)
+"""How many times that a device on its way may depart by: put down, it is stopped within
+a sample by any force, but its rate does not come and go within one."""
 
 
 def undone(counts: Counts) -> tuple[str, Counts]:
@@ -122,10 +123,10 @@ class DecodeFault(Chain):
 def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Single samples that jump by more than the device can move, (n, 6)."""
     n, edge, still = len(recording.block), BESIDE + 3, recording.still
-    out = np.zeros((n, 6), dtype=bool)
+    out, moved = np.zeros((n, 6), dtype=bool), np.repeat(MOVED, 3)
     for first in range(0, n, AT_ONCE):
         some = slice(max(first - edge, 0), min(first + AT_ONCE + edge, n))
-        most = np.repeat(UNLIKELY, 3) * np.where(still[some], 1.0, MOVED)[:, None]
+        most = np.where(still[some, None], 1.0, moved) * np.repeat(UNLIKELY, 3)
         found = _wild_in(recording.block[some], most * np.abs(recording.scale))
         out[first : first + AT_ONCE] = found[first - some.start :][:AT_ONCE]
     return out

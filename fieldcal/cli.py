@@ -19,15 +19,11 @@ from importlib import import_module
 from typing import Protocol, TextIO, cast
 
 from fieldcal.commands import found
-from fieldcal.commands.help import EXIT_CODES, CommandParser
+from fieldcal.commands.help import BROKEN, EXIT_CODES, INTERRUPTED, CommandParser
 from fieldcal.commands.spelling import spell_out
 
 COMMANDS = found()
 """Name, what it does, module."""
-
-INTERRUPTED = 130
-BROKEN = 70
-"""What sysexits.h calls EX_SOFTWARE: no verdict and no wrong input ends with it."""
 
 
 class CommandModule(Protocol):

@@ -24,8 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.never_wrong.bench import drawn
+from benchmarks.never_wrong.bench_mistakes import BEFORE, spoilt
 from benchmarks.never_wrong.judging import Judged, judged, write
-from benchmarks.never_wrong.mistakes import AFTER, BEFORE, session, spoilt
+from benchmarks.never_wrong.mistakes import AFTER, session
 
 USUAL, SEED, LONGEST = 150, 84_000_000, 60.0
 SOUND = "none"

@@ -104,11 +104,10 @@ def _coarser(found: Calibration, about: Description, shows: Mapping[str, str]) -
     from nominal, and everything agrees.
     """
     off = {}
-    for name in found.names:
-        if f"{name} is" in shows["because"]:
-            parameter = ParameterName.of(name)
-            usual = about.sent[parameter.group][parameter.axis]
-            off[name] = abs(found.value(name) - float(usual))
+    for name in shows["beyond"]:
+        parameter = ParameterName.of(name)
+        usual = about.sent[parameter.group][parameter.axis]
+        off[name] = abs(found.value(name) - float(usual))
     if angle := would_explain(found, off):
         says = (
             f"{shows['because']}, which no device of {about.grade} grade has, or it is"

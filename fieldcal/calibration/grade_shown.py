@@ -30,12 +30,15 @@ class GradeShown:
     Attributes
     ----------
     grade : by which what is not estimated is sized
-    because : which parameters are beyond the stated grade; empty where none is
+    because : which parameters are beyond the stated grade, in words; empty where none
+        is
+    beyond : their full names
 
     """
 
     grade: Grade
     because: str = ""
+    beyond: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -58,12 +61,14 @@ class GradeShown:
         """
         coarser = GRADES[GRADES.index(stated) :: -1]
         for grade in coarser:
-            beyond = list(_beyond(grade, names, values, sigma, nominal))
+            beyond = dict(_beyond(grade, names, values, sigma, nominal))
             if grade == stated:
-                because = join(beyond)
+                told = beyond
             if not beyond:
                 break
-        return cls(grade, because if grade != stated else "")
+        if grade == stated:
+            return cls(grade)
+        return cls(grade, join(list(told.values())), tuple(told))
 
 
 def _beyond(
@@ -72,8 +77,8 @@ def _beyond(
     values: Array,
     sigma: Array,
     nominal: Mapping[str, Array],
-) -> Iterator[str]:
-    """Each parameter that no unit of a grade has, in words."""
+) -> Iterator[tuple[str, str]]:
+    """Each parameter that no unit of a grade has, and the same in words."""
     bounds = limits.read(grade)
     for name, value, s in zip(names, values, sigma, strict=True):
         parameter = ParameterName.of(name)
@@ -88,4 +93,5 @@ def _beyond(
         if abs(off) - UNSEEN * float(s) / size > most:
             unit = COMPONENTS[parameter.group][1].replace("m/s^2", "m/s²")
             shown = "" if unit == "1" else f" {unit}"
-            yield f"{name} is {off:+.2g}{shown} from nominal, more than {most:g}{shown}"
+            says = f"is {off:+.2g}{shown} from nominal, more than {most:g}{shown}"
+            yield name, f"{name} {says}"

@@ -10,6 +10,10 @@ import sys
 from collections.abc import Collection, Sequence
 from typing import Any
 
+BROKEN, INTERRUPTED = 70, 130
+"""What sysexits.h calls EX_SOFTWARE, which is no verdict and no wrong input; and what a
+shell says of Ctrl-C."""
+
 EXIT_CODES = """\
 exit codes:
   0    good

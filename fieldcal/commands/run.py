@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.help import BROKEN, INTERRUPTED
 from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_operator import operator_of
 from fieldcal.commands.run_page import LOCAL, served, told_end
@@ -47,9 +48,6 @@ RARE = (
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
     *FACTORY,
 )
-
-INTERRUPTED, BROKEN = 130, 70
-"""Exit codes of a run that was stopped, and of an error that nobody foresaw."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

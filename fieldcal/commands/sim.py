@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.help import INTERRUPTED
 from fieldcal.core.errors import InputError
 from fieldcal.core.grade import GRADES
 
@@ -37,8 +38,6 @@ RARE = (
     *("mounting", "turn_time", "angle_offset", "acc_scale", "gyr_scale"),
     *("acc_noise", "gyr_noise", "grade", "latitude", "truth"),
 )
-
-INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ far as they were calm.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -213,8 +213,7 @@ def solved_as(
     if shows.because and not printed:
         asked["factory"] = factory_errors(device, shows.grade)
         found = solve(laid.observations, recorded=recorded, **asked)
-        told = {"grade": shows.grade, "because": shows.because}
-        found = replace(found, info={**found.info, "grade_shown": told})
+        found = replace(found, info={**found.info, "grade_shown": asdict(shows)})
     if not printed:
         found = with_tilt_shown(found, laid.observations, recorded, asked)
     if turns == "yes":

@@ -111,8 +111,6 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         if not _agrees(whole.metadata):
             read(path)  # which says so
         names = [n for n in whole.schema_arrow.names if n in COLUMNS]
-        if len(set(names)) < len(names):
-            read(path)
         yield from whole.iter_batches(batch_size=PART, columns=names)
     else:
         yield from rows_of_text(path)
@@ -168,12 +166,11 @@ def _read_parquet(path: Path) -> pa.Table:
         file = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
         table = file.read()
         if not _agrees(file.metadata):
-            raise pa.ArrowInvalid("its numbers of rows contradict each other")
+            raise pa.ArrowInvalid(
+                "what it says of its rows and columns is contradictory"
+            )
         # no checksum covers the names: what was changed there may be no text
-        names = [n for n in table.column_names if n in COLUMNS]
-        if len(set(names)) < len(names):
-            raise pa.ArrowInvalid("two of its columns have one name")
-        return table.select(names)
+        return table.select([n for n in table.column_names if n in COLUMNS])
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
             raise
@@ -183,8 +180,13 @@ def _read_parquet(path: Path) -> pa.Table:
 
 
 def _agrees(about: Any) -> bool:
-    """Whether a Parquet file says everywhere how many rows it has; no checksum does."""
-    rows = 0
+    """Whether a Parquet file tells its rows and columns apart; no checksum covers that.
+
+    It says everywhere how many rows it has, and no two of its columns have one name.
+    """
+    names, rows = [n for n in about.schema.names if n in COLUMNS], 0
+    if len(set(names)) < len(names):
+        return False
     for i in range(about.num_row_groups):
         group = about.row_group(i)
         parts = [group.column(j) for j in range(group.num_columns)]

@@ -201,7 +201,8 @@ def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
 ) -> None:
     seen = observe(SIX_FACES, forces(SIX_FACES, G) * [1.0, 0.96, 1.0], sigma=1e-4)
     result = solve(seen, tilt="none", factory=FactoryErrors(1e-3))
-    told = {"grade": "consumer", "because": "acc_scale.y is -0.04 from nominal"}
+    told = {"grade": "consumer", "because": "acc_scale.y is -0.04 from nominal",
+            "beyond": ("acc_scale.y",)}  # fmt: skip
     wrong: dict[str, Any] = {"joint": 0, "angle_deg": None, "position": 4}
     wrong |= {"shows": shows, "moves": {"acc_scale.y": moves}}
     info = {**result.info, "grade_shown": told, "wrong_angles": [wrong]}

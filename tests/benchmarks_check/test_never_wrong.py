@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.never_wrong.bench import drawn
+from benchmarks.never_wrong.bench_mistakes import spoilt
 from benchmarks.never_wrong.judging import (
     WRONG,
     Judged,
@@ -15,7 +16,7 @@ from benchmarks.never_wrong.judging import (
     judged,
     write,
 )
-from benchmarks.never_wrong.mistakes import session, spoilt
+from benchmarks.never_wrong.mistakes import session
 
 LIMIT = 600.0
 

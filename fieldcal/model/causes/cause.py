@@ -106,6 +106,12 @@ class Group:
         own = (self.origin, self.position, self.shape)
         return [g for g in others if (g.origin, g.position, g.shape) == own]
 
+    @property
+    def begins(self) -> bool:
+        """Whether its shape is the instant from which it is there."""
+        shapes = self.effect.shapes if self.effect and self.shape else ()
+        return [s.kind for s in shapes] == ["instant"]
+
     def apart(self, other: Group) -> float:
         """How far the shape of one alike is from its own."""
         return max((abs(other.shape[k] - v) / max(abs(v), 1e-9)
@@ -143,8 +149,7 @@ class Cause:
 
         Those of the instants next to it; none where the effect has no instant.
         """
-        shapes = other.effect.shapes if other.effect and other.shape else ()
-        if other.cause != self.name or [s.kind for s in shapes] != ["instant"]:
+        if other.cause != self.name or not other.begins:
             return ()
         apart = [g.apart(other) for g in self.variants]
         least = min(apart)

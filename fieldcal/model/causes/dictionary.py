@@ -291,7 +291,7 @@ class Dictionary(ColumnTable):
     def tried_at(self, instants: Sequence[float]) -> None:
         """Have effects that begin at an instant begin at these as well."""
         for cause in self.causes:
-            begin = {g.params: g for g in cause.variants if _begins(g)}
+            begin = {g.params: g for g in cause.variants if g.begins}
             for group in begin.values():
                 cause, _ = self.refined(cause, group, instants)
 
@@ -317,10 +317,3 @@ class Dictionary(ColumnTable):
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
         for cached in ("by_width", "chances", "typical"):
             self.__dict__.pop(cached, None)
-
-
-def _begins(group: Group) -> bool:
-    """Whether an instant is the shape of a group."""
-    return group.effect is not None and [s.kind for s in group.effect.shapes] == [
-        "instant"
-    ]

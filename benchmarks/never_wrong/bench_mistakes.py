@@ -1,0 +1,158 @@
+"""Mistakes of a hand and a fixture, and benches and devices that are not as usual.
+
+Each takes a bench on which nothing was recorded yet, and spoils one thing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.never_wrong.bench import Bench, wrongly_set
+from benchmarks.never_wrong.device import Device
+
+Rng = np.random.Generator
+Before = Callable[[Bench, Rng], Bench]
+
+
+def _one(bench: Bench, rng: Rng) -> int:
+    return int(rng.integers(len(bench.angles)))
+
+
+# -- of the hand and the fixture
+
+
+def repeated_angle(bench: Bench, rng: Rng) -> Bench:
+    """One angle of the fixture is off by 0.02 to 0.2 degrees wherever it is set."""
+    off, joint = np.zeros_like(bench.off), int(rng.integers(2))
+    values = bench.angles[:, joint].copy()
+    values[bench.stated or len(values) :] = 0.0  # laid by hand
+    one = rng.choice(np.unique(values[values != 0]))
+    off[values == one, joint] = np.deg2rad(
+        np.exp(rng.uniform(np.log(0.02), np.log(0.2)))
+    )
+    return wrongly_set(bench, off)
+
+
+def gauge_long(bench: Bench, rng: Rng) -> Bench:
+    """The gauge that sets the angles is 0.05 to 0.5 % long."""
+    off = np.deg2rad(bench.angles) * rng.uniform(5e-4, 5e-3)
+    off[bench.stated or len(off) :] = 0.0  # laid by hand
+    return wrongly_set(bench, off)
+
+
+def position_off(bench: Bench, rng: Rng) -> Bench:
+    """One position is set 0.3 to 10 degrees off."""
+    off = np.zeros_like(bench.off)
+    size = np.deg2rad(np.exp(rng.uniform(np.log(0.3), np.log(10))))
+    off[_one(bench, rng), rng.integers(2)] = size * rng.choice([-1, 1])
+    return wrongly_set(bench, off)
+
+
+def no_witness(bench: Bench, rng: Rng) -> Bench:
+    """The device is not laid on its faces, though angles need a witness."""
+    known = len(bench.angles) - bench.faces
+    return replace(bench, faces=0, off=bench.off[:known])
+
+
+def table_tilted(bench: Bench, rng: Rng) -> Bench:
+    """The base is 0.1 to 2 degrees out of level, and nobody says so."""
+    tilt = np.deg2rad(rng.uniform(0.1, 2, 2)) * rng.choice([-1, 1], 2)
+    return replace(bench, tilt=tuple(tilt.tolist()))
+
+
+def two_off(bench: Bench, rng: Rng) -> Bench:
+    """Two positions are off, or two repeated angles."""
+    kind = position_off if rng.integers(2) else repeated_angle
+    return kind(kind(bench, rng), rng)
+
+
+# -- what nobody knows of the device and of the bench
+
+
+def low_cost(bench: Bench, rng: Rng) -> Bench:
+    """A low-cost device; one in two is called tactical."""
+    return replace(
+        bench,
+        device=Device.low_cost(rng),
+        acc_bias=rng.normal(0, 0.3, 3),
+        acc_scale=1 + rng.normal(0, 1.2e-2, 3),
+        gyr_bias=rng.normal(0, 0.05, 3),
+        gyr_scale=1 + rng.normal(0, 1.2e-2, 3),
+        grade=str(rng.choice(["tactical", "consumer"])),
+    )
+
+
+def _acting(bench: Bench, **sizes: Any) -> Bench:
+    return replace(bench, acting=replace(bench.acting, **sizes))
+
+
+def _size(rng: Rng, least: float, most: float) -> float:
+    """Any order of magnitude between two is as likely."""
+    return float(np.exp(rng.uniform(np.log(least), np.log(most))))
+
+
+def shaken(bench: Bench, rng: Rng) -> Bench:
+    """The bench vibrates."""
+    return _acting(bench, shaken=_size(rng, 0.01, 1.0), hum_hz=_size(rng, 3, 80))
+
+
+def swaying(bench: Bench, rng: Rng) -> Bench:
+    """The bench sways, or a hand trembles."""
+    sway = float(np.deg2rad(_size(rng, 0.003, 0.3)))
+    return _acting(bench, swaying=sway, sway_hz=_size(rng, 0.2, 5))
+
+
+def filtered(bench: Bench, rng: Rng) -> Bench:
+    """The outputs are behind a filter."""
+    return _acting(bench, filtered=_size(rng, 3e-3, 0.1))
+
+
+def delayed(bench: Bench, rng: Rng) -> Bench:
+    """The gyroscopes are late."""
+    return _acting(bench, delayed=_size(rng, 2e-3, 0.05))
+
+
+def on_an_arm(bench: Bench, rng: Rng) -> Bench:
+    """The device is not in the axes of the fixture."""
+    return _acting(bench, arm=tuple(rng.normal(0, 0.15, 3).tolist()))
+
+
+def stays(bench: Bench, rng: Rng) -> Bench:
+    """Biases keep something of the last turn, 0.03 to 0.2 mg."""
+    return _acting(bench, stays=_size(rng, 3e-4, 2e-3))
+
+
+def wandering(bench: Bench, rng: Rng) -> Bench:
+    """Biases wander by 0.01 to 0.2 mg and 0.2 to 10 deg/h in 100 s."""
+    walk = {"acc_walk": _size(rng, 1e-4, 2e-3), "gyr_walk": _size(rng, 1e-6, 5e-5)}
+    return _acting(bench, **walk)
+
+
+BEFORE: dict[str, Before] = {
+    "a repeated angle off": repeated_angle,
+    "gauge long": gauge_long,
+    "a position off": position_off,
+    "table tilted": table_tilted,
+    "faces left out": no_witness,
+    "two positions or angles off": two_off,
+    "low-cost device": low_cost,
+    "vibration": shaken,
+    "sway": swaying,
+    "filter": filtered,
+    "delay of the gyroscopes": delayed,
+    "lever arm": on_an_arm,
+    "bias that a turn leaves": stays,
+    "wandering biases": wandering,
+}
+
+
+def spoilt(bench: Bench, names: tuple[str, ...], rng: Rng) -> Bench:
+    """The bench with the mistakes that are made before anything is recorded."""
+    for name in names:
+        if name in BEFORE:
+            bench = BEFORE[name](bench, rng)
+    return bench

@@ -260,6 +260,8 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
         If it is none, has nothing left to take, or was not recorded by a run.
 
     """
+    from fieldcal.acceptance.assessment import verification_window
+
     session = Session.open(folder)
     tables = dict(session.about.raw)
     if "run" not in tables:
@@ -272,6 +274,9 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
     if _finished(marks) and (folder / RESULT).exists():
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
+        last = len(session.positions)
+        if remedy["positions"] and verification_window(marks, last) is not None:
+            again += (last,)  # what verified goes behind the positions besides, anew
         tables["position"] = [*tables.get("position", ()), *remedy["positions"]]
         run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
     fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
@@ -315,7 +320,7 @@ def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
     except (OSError, ValueError, AttributeError):
         decision = {}
     remedy = decision.get("remedy")
-    if isinstance(remedy, Mapping) and planned(session.about) is None:
+    if isinstance(remedy, Mapping):
         return remedy
     if decision.get("go") is False and (left_out := positions_left_out(session)):
         return {"again": left_out, "positions": ()}

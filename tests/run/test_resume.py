@@ -159,6 +159,33 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
         resume(folder)
 
 
+def test_what_verified_a_no_go_is_taken_anew_behind_what_its_remedy_adds(
+    tmp_path: Path,
+) -> None:
+    folder, besides = tmp_path / "s", {"alpha_deg": 45.0, "beta_deg": -5.0}
+    verified = {**TABLES, "run": {"procedure": "two_position", "verify": True}}
+    with Recorder(folder, verified) as recorder:
+        recorder.append(still(0.0, 60.0, 1000.0))
+        recorder.flush()
+        for number in range(3):  # the last verifies
+            start = 1.0 + 12.0 * number
+            recorder.mark("window", position=number, start_s=start, end_s=start + 10)
+        recorder.mark("finished")
+    remedy = {"says": "", "again": [], "positions": [besides], "seconds": 10.0}
+    decision = {"go": False, "remedy": remedy}
+    (folder / "result.json").write_text(json.dumps({"decision": decision}))
+    session, tables, again = resume(folder)
+    assert again == (2,) and len(tables["position"]) == 3
+    with Recorder(folder, None) as recorder:
+        recorder.mark("repeated", position=2)
+        recorder.mark("added", position=2, name="besides", **besides)
+    now = Session.open(folder)
+    assert now.windows == (*session.windows, None)
+    task = plan_file.task(tables, "s")
+    assert task.verification is not None
+    assert sorted(recorded_averages(now, task)) == [0, 1]
+
+
 def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     recorded(tmp_path / "s")
     with pytest.raises(SessionError, match="--resume"):

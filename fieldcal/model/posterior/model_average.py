@@ -7,13 +7,16 @@ weight w_s,
     mean = sum_s w_s mean_s
     cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
 
-A parameter that a set does not have is 0 in it. An effect x that may be in the device
-and is not in the set, of the covariance Q, moves the estimate by -C_s G_sx x, so that
+A parameter that a set does not have is 0 in it. An effect x that every device has a
+little of, and that is not in the set, is eliminated with it. Of the covariance Q before
+the rows are seen, M and b' what they say of it after the set is eliminated (see
+`model.evidence`),
 
-    C_s + C_s G_sx Q G_xs C_s                                                       (2)
+    P = (Q^-1 + M)^-1
+    mean_s - C_s G_sx P b'  and  C_s + C_s G_sx P G_xs C_s                          (2)
 
-stands for C_s. Sources: J. Hoeting and others, Bayesian model averaging: a tutorial,
-1999, (1) to (3); Schmidt 1966, on considered parameters, (2).
+stand for mean_s and C_s. Sources: J. Hoeting and others, Bayesian model averaging: a
+tutorial, 1999, (1) to (3); for (2), the inverse of a partitioned matrix.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.evidence.gram import Eliminated, inverse_of, root_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT
@@ -117,17 +121,27 @@ def averaged(
         pick = np.zeros((len(at), len(one.state.columns)))
         for row, some in zip(pick, at, strict=True):
             row[some] = 1.0
-        means.append(pick @ one.state.estimate)
-        covs.append(pick @ one.state.inverse @ pick.T)
         names = {cause.name for cause, _ in one.members}
-        for group in unfitted:
-            if group.part not in names:
-                shared = one.state.rows.matrix(one.state.columns, group.columns)
-                moved = pick @ one.state.inverse @ shared * group.typical
-                covs[-1] += moved @ moved.T  # (2)
+        left = [group for group in unfitted if group.part not in names]
+        shift, wider = _with(one, pick, left) if left else (0.0, 0.0)
+        means.append(pick @ one.state.estimate + shift)
+        covs.append(pick @ one.state.inverse @ pick.T + wider)
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     mean: Array = weight @ np.array(means)
     off = np.array(means) - mean
     cov = np.einsum("s,sij->ij", weight, np.array(covs))
     return mean, cov + (weight[:, None] * off).T @ off  # (1)
+
+
+def _with(one: Set, pick: Array, left: Sequence[Group]) -> tuple[Array, Array]:
+    """By how much a mean shifts and a covariance grows with what a set leaves out."""
+    columns = np.concatenate([group.columns for group in left])
+    typical = np.concatenate([group.typical for group in left])
+    state = Eliminated.of(one.state.rows, one.state.columns, one.state.sizes)
+    inner, pull = state.rest(columns, typical)
+    inner.flat[:: len(columns) + 1] += 1.0
+    half = inverse_of(root_of(inner))
+    shared = state.rows.matrix(state.columns, columns) * typical
+    moved = pick @ state.inverse @ shared @ half.T
+    return -moved @ (half @ pull), moved @ moved.T  # (2)

@@ -73,34 +73,41 @@ def test_what_a_set_was_not_given_makes_its_numbers_uncertain() -> None:
     assert whole[1, 1] > 2.0 * own[1, 1]
 
 
-def test_what_is_in_no_set_moves_numbers_by_as_much_as_they_are_less_certain() -> None:
-    """Against estimates from rows that have it, of which nobody knows that they do."""
-    value = np.array([3e-5, 2e-5, -3e-5])
+def test_what_is_in_no_set_counts_as_if_it_were() -> None:
+    """As all of it in one: by the rows that it was drawn in, and so by its pulls."""
     (cause, group), rng = (QUADRATIC, QUADRATIC.variants[0]), np.random.default_rng(9)
-    off = SESSION.noise(rng) + SESSION.design[:, :, group.columns] @ value
+    told = np.append(BIAS, group.columns)
     left = ASYMMETRY.variants[0]
-    left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 1e-2))
-    there = SESSION.search(off).evaluated(((cause, group),))
-    plain = of_columns([(there, 1.0)], BIAS)
-    mean, cov = of_columns([(there, 1.0)], BIAS, [left])
-    moved = []
-    for column, size in zip(left.columns, left.typical, strict=True):
-        other = SESSION.search(off + SESSION.design[:, :, column] * size)
-        again = Eliminated.of(
-            other.weighed(there.sizes.instability),
-            there.state.columns,
-            there.state.sizes,
-        )
-        at = [int(np.flatnonzero(there.state.columns == c)[0]) for c in BIAS]
-        moved.append((again.estimate - there.state.estimate)[at])
-    np.testing.assert_allclose(mean, plain[0])
-    expected = plain[1] + np.array(moved).T @ np.array(moved)
-    np.testing.assert_allclose(cov, expected, rtol=1e-6)
-    assert cov[0, 0] > 1.1 * plain[1][0, 0]
+    left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 2e-3))
+    off = SESSION.noise(rng) + SESSION.design[:, :, group.columns] @ np.full(3, 1e-5)
+    first = SESSION.search(off).evaluated(((cause, group),))
+    columns, sizes = first.state.columns, first.state.sizes
+    at = [int(np.flatnonzero(columns == c)[0]) for c in told]
+    steady, pulls = (0,) * len(first.sizes.instability), []
+    for _ in range(200):
+        drawn, more = (s * rng.standard_normal(len(s)) for s in (sizes, left.typical))
+        off = SESSION.noise(rng) + SESSION.design[:, :, columns] @ drawn
+        off += SESSION.design[:, :, left.columns] @ more
+        rows = SESSION.search(off).weighed(steady)
+        there = replace(first, state=Eliminated.of(rows, columns, sizes))
+        mean, cov = of_columns([(there, 1.0)], told, [left])
+        wrong = mean - drawn[at]
+        pulls.append(wrong @ np.linalg.solve(cov, wrong) / len(told))
+    assert np.mean(pulls) == pytest.approx(1.0, abs=0.15)
+    whole = Eliminated.of(
+        there.state.rows,
+        np.concatenate([columns, left.columns]),
+        np.concatenate([sizes, left.typical]),
+    )
+    np.testing.assert_allclose(mean, whole.estimate[at], rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(cov, whole.inverse[np.ix_(at, at)], rtol=1e-6)
+    plain = of_columns([(there, 1.0)], told)[1]
+    ratio = np.diag(cov) / np.diag(plain)
+    assert ratio.max() > 1.5
     # a set that has it knows it
     has = SESSION.search(off).evaluated(((ASYMMETRY, ASYMMETRY.variants[0]),))
-    known = of_columns([(has, 1.0)], BIAS, [left])[1]
-    np.testing.assert_array_equal(known, of_columns([(has, 1.0)], BIAS)[1])
+    known = of_columns([(has, 1.0)], told, [left])[1]
+    np.testing.assert_array_equal(known, of_columns([(has, 1.0)], told)[1])
 
 
 def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:

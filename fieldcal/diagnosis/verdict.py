@@ -251,8 +251,9 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
         if explanation.rows.used[:, first : first + 3].any():
             spare = _degrees_of_freedom(explanation, first)
             if spare <= 1:
+                spares = "1 degree" if spare == 1 else "0 degrees"
                 out.append(
-                    f"{max(spare, 0)} degrees of freedom in the means of the {name}:"
+                    f"{spares} of freedom in the means of the {name}:"
                     " their residual says nothing about the fit; take more positions"
                 )
     loose = [

@@ -11,10 +11,14 @@ so close to zero, with an error s of each axis over all windows, with a chance o
     P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
 
 If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant, and
-the product of (1) and (2) is the probability that this is chance. The removal settles
-in some seconds after a turn, so the second half of each window is used. It also removes
-slow noise, so sigma is that of the noise at all frequencies: the median of the
-periodogram over ln 2.
+the product of (1) and (2) is the probability that this is chance. What a turn put out
+is removed again in some seconds, so the means are c of
+
+    W(t) = c + d exp(-t / tau)                                                     (5)
+
+in each window, with the tau that all windows have the least residual with. The removal
+also takes out slow noise, so sigma is that of the noise at all frequencies: the median
+of the periodogram over ln 2.
 
 If a program subtracts the mean of a whole recording of N samples with noise s, a mean
 as small as the one that is left, m, has by chance the probability
@@ -36,6 +40,7 @@ SI.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import erf
 
 import numpy as np
@@ -48,6 +53,12 @@ from fieldcal.windows import Average
 
 LEAST = 2
 """Fewest windows for (1)."""
+
+LAGS = np.geomspace(0.25, 16.0, 49)
+"""Time constants that are tried, s."""
+
+CELLS = 256
+"""Most means of a window in which (5) is fitted."""
 
 SPECTRUM = 16
 """Fewest samples for a periodogram."""
@@ -100,9 +111,7 @@ def tracked(
 
     1 if they are significantly different from zero, or too few were measured.
     """
-    halves = [_second_half_mean(block, w) for w in windows]
-    means = np.array([mean for mean, _ in halves]).reshape(-1, 3)
-    sigma = np.array([error for _, error in halves]).reshape(-1, 3)
+    means, sigma = _settled_means([block.between(w.start, w.end) for w in windows])
     seen = np.isfinite(means) & (sigma > 0)
     if (count := int(seen.sum())) < 3 * LEAST or not seen.any(axis=0).all():
         return 1.0, ""
@@ -126,16 +135,65 @@ def _chance_near_zero(sigma: Array, spread: float | Array) -> float:
     return float(np.minimum(4 * sigma / np.sqrt(2 * np.pi) / spread, 1.0).prod())
 
 
-def _second_half_mean(block: Block, window: Average) -> tuple[Array, Array]:
-    """Mean of the gyroscopes in the second half of a window, (3,), and its error."""
-    middle = (window.start + window.end) / 2
-    gyr = block.between(middle, window.end).gyr
-    mean = gyr.mean(axis=0) if len(gyr) else np.full(3, np.nan)
-    if len(gyr) < SPECTRUM:
-        return mean, np.zeros(3)
-    power = np.abs(np.fft.rfft(gyr - mean, axis=0)[1:-1]) ** 2
-    level = np.median(power, axis=0) / len(gyr) / np.log(2.0)
-    return mean, np.sqrt(level / len(gyr))
+def _settled_means(held: Sequence[Block]) -> tuple[Array, Array]:
+    """What gyroscopes settle to in windows, c of (5), and its error, (w, 3) each."""
+    cells = [_Cells.of(one) for one in held if len(one) >= SPECTRUM]
+    if not cells:
+        return np.empty((0, 3)), np.empty((0, 3))
+
+    every = [[one.settled(lag) for one in cells] for lag in LAGS]
+    left = [np.nansum([chi2 for _, _, chi2 in found]) for found in every]
+    best = every[int(np.argmin(left))]
+    return np.array([c for c, _, _ in best]), np.array([s for _, s, _ in best])
+
+
+@dataclass(frozen=True, slots=True)
+class _Cells:
+    """Gyroscopes at rest in a window, as means of as many samples each.
+
+    Attributes
+    ----------
+    t : (k,) s since the window began
+    gyr : (k, 3) rad/s
+    noise : (3,) rad/s, that white noise leaves in each mean
+
+    """
+
+    t: Array
+    gyr: Array
+    noise: Array
+
+    @classmethod
+    def of(cls, one: Block) -> _Cells:
+        """The means of a window, at most `CELLS`.
+
+        An exponential is in the mean of a cell as in its middle, but for a factor that
+        all cells share.
+        """
+        each = -(-len(one) // CELLS)
+        count = len(one) // each
+        t, gyr = one.t[: count * each] - one.t[0], one.gyr[: count * each]
+        level = _white_noise(one.gyr) / np.sqrt(each)
+        means = gyr.reshape(count, each, 3).mean(axis=1)
+        return cls(t.reshape(count, each).mean(axis=1), means, level)
+
+    def settled(self, lag: float) -> tuple[Array, Array, Array]:
+        """Get c of (5), its error, and chi2 of what is left (0 without noise)."""
+        design = np.ones((len(self.t), 2))
+        design[:, 1] = np.exp(-self.t / lag)
+        inner = np.linalg.inv(design.T @ design)
+        fit = inner @ (design.T @ self.gyr)
+        left = ((self.gyr - design @ fit) ** 2).sum(axis=0)
+        some = self.noise > 0
+        chi2 = np.divide(left, self.noise**2, out=np.zeros(3), where=some)
+        return fit[0], self.noise * np.sqrt(inner[0, 0]), chi2
+
+
+def _white_noise(gyr: Array) -> Array:
+    """Noise of a sample at all frequencies, (3,)."""
+    power = np.abs(np.fft.rfft(gyr - gyr.mean(axis=0), axis=0)[1:-1]) ** 2
+    level: Array = np.sqrt(np.median(power, axis=0) / len(gyr) / np.log(2.0))
+    return level
 
 
 def centred(block: Block) -> list[tuple[str, float]]:

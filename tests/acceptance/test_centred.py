@@ -76,7 +76,7 @@ def test_so_noisy_a_device_may_be_at_zero_by_chance() -> None:
 
 def test_a_bias_that_is_tracked_leaves_nothing() -> None:
     rng = np.random.default_rng(2)
-    for seconds in (0.5, 1.0, 3.0):
+    for seconds in (0.5, 1.0, 3.0, 6.0):
         windows, block = at_rest(rng, -7e-3, seconds)
         chance, what = tracked(windows, block, REPEAT, LEAST)
         assert chance < LEAST and "18 means" in what
@@ -159,10 +159,15 @@ def test_the_chance_of_gyroscopes_at_zero_is_that_of_chi2_and_of_the_spread(
 ) -> None:
     windows, block = at_rest(np.random.default_rng(seed), 0.0)
     block.gyr[:] *= 4.0
-    half = np.array([block.gyr[COUNT * k + COUNT // 2 : COUNT * (k + 1)].mean(axis=0)
-                     for k in range(6)])  # fmt: skip
-    sigma = 4.0 * NOISE / np.sqrt(COUNT / 2)
-    square = float(np.sum((half / sigma) ** 2))
+    noise, t = 4.0 * NOISE, np.arange(COUNT) / RATE
+    found = []
+    for lag in np.geomspace(0.25, 16.0, 100):
+        design = np.column_stack([np.ones(COUNT), np.exp(-t / lag)])
+        fit, left, *_ = np.linalg.lstsq(design, np.hstack(np.split(block.gyr, 6)))
+        sigma = noise * np.sqrt(np.linalg.inv(design.T @ design)[0, 0])
+        found.append((left.sum(), fit[0], sigma))
+    _, settled, sigma = min(found, key=lambda one: one[0])
+    square = float(np.sum((settled / sigma) ** 2))
     spread = float(np.hypot(1e-4, EARTH / np.sqrt(3)))
     expected = chi2.cdf(square, 18) * near_zero(np.full(3, sigma / np.sqrt(6)), spread)
     chance, what = tracked(windows, block, 1e-4, LEAST)
@@ -227,3 +232,15 @@ def test_the_chance_of_a_mean_that_rounding_leaves_is_as_written(mode: str) -> N
     block.acc[5, 1] = 0.0
     block.acc[:, 0] += 1e-3 * rng.standard_normal(len(acc))
     assert centred_and_rounded(windows, block, spread, LEAST) == 1.0
+
+
+def test_few_digits_of_what_was_on_a_grid_of_its_own() -> None:
+    """Steps of 2.39 thousandths, written in thousandths: never two neighbours."""
+    rng = np.random.default_rng(10)
+    for _ in range(20):
+        windows, block = faces(rng, 0.05)
+        own = np.round(block.acc / 2.39e-3) * 2.39e-3
+        block.acc[:] = np.round(own, 3)
+        assert centred_and_rounded(windows, block, 0.05, LEAST) > LEAST
+        block.acc[:] = np.round(own - own.mean(axis=0), 3)
+        assert centred_and_rounded(windows, block, 0.05, LEAST) < LEAST

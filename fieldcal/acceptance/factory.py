@@ -26,7 +26,7 @@ def counted(found: Calibration) -> FactoryErrors:
     """What a result was made with, of its information."""
     keys = (
         "square_sigma", "quadratic_sigma", "g_sensitivity_sigma",
-        "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma",
+        "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma", "acc_hysteresis_sigma",
     )  # fmt: skip
     return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
 
@@ -70,6 +70,13 @@ def _checks(
             " includes both"
         )
         yield Check("linearity", None, says)
+    if left.hysteresis and "acc" in measured:
+        says = (
+            "this relies on accelerometers in which a turn leaves 0 ±"
+            f" {1e3 * left.hysteresis / G0:.2g} mg, as usual for {of_grade}; each ±"
+            " includes it"
+        )
+        yield Check("hysteresis", None, says)
     if left.g_sensitivity and "gyr" in measured:
         by = whose(about.g_sensitivity, left.g_sensitivity, usual.g_sensitivity)
         felt = float(f"{left.g_sensitivity * G0 / DEG_H:.2g}")  # 180, and not 1.8e+02

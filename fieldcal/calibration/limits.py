@@ -47,6 +47,7 @@ class GradeLimits:
     g_sensitivity: float
     acc_bias_per_k: float
     gyr_bias_per_k: float
+    acc_hysteresis: float
     temperature_min_c: float
     temperature_max_c: float
     temperature_span_k: float
@@ -61,7 +62,7 @@ class GradeLimits:
         warming_k = self.temperature_rate_k_min / 2 * WARM_UP_S / 60
         return FactoryErrors(
             self.squareness, self.quadratic, self.g_sensitivity,
-            self.acc_bias_per_k, self.gyr_bias_per_k, warming_k,
+            self.acc_bias_per_k, self.gyr_bias_per_k, self.acc_hysteresis, warming_k,
         )  # fmt: skip
 
     def sigma(self, group: str) -> float | None:

@@ -10,6 +10,9 @@ zero that is as large as K2 at 1 g, and a K3 that is as large as K2 at 10 g,
 
     k+- = K2 g,    K3 = K2 / (10 g)                                                 (1)
 
+A suspension keeps something of how it was bent last: biases of accelerometers have
+hysteresis.
+
 A device that warms up has biases that change by their temperature coefficients. A
 thermometer shows the course. Otherwise it is that of a package, exp(-t / tau).
 """
@@ -43,6 +46,7 @@ class FactoryErrors:
     quadratic : K2 of the accelerometers, 1/(m/s^2)
     g_sensitivity : of the gyroscopes, (rad/s)/(m/s^2)
     acc_per_k, gyr_per_k : temperature coefficients of biases, m/s^2/K and rad/s/K
+    hysteresis : m/s^2, what the last turn leaves in the bias of an accelerometer
     warming_k : K that the device may still warm up by, where no thermometer shows it
 
     Raises
@@ -57,6 +61,7 @@ class FactoryErrors:
     g_sensitivity: float = 0.0
     acc_per_k: float = 0.0
     gyr_per_k: float = 0.0
+    hysteresis: float = 0.0
     warming_k: float = 0.0
 
     def __post_init__(self) -> None:

@@ -124,7 +124,7 @@ def passes(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
     """How long values, in steps, are zero, and one beside it, in each pass, (1)."""
     out = np.flatnonzero(np.abs(value) >= 2)
     for first, last in zip(out[:-1].tolist(), out[1:].tolist(), strict=True):
-        if value[first] * value[last] >= 0 or last == first + 1:
+        if (value[first] > 0) == (value[last] > 0) or last == first + 1:
             continue
         between = value[first + 1 : last]
         below, zero, above = (int((between == k).sum()) for k in (-1, 0, 1))

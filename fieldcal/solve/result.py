@@ -157,6 +157,7 @@ def _info(
         "g_sensitivity_sigma": wanted.factory.g_sensitivity,
         "acc_bias_per_k_sigma": wanted.factory.acc_per_k,
         "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
+        "acc_hysteresis_sigma": wanted.factory.hysteresis,
     }
     if doubt := DoubtfulPosition.of(observations, found.bad):
         out["doubtful_position"] = doubt.to_json()

@@ -121,6 +121,27 @@ def test_a_kink_is_not_taken_for_a_curve() -> None:
     assert (np.abs(value) < sigma).all() and (sigma < 1e-3).all()
 
 
+def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
+    """Each bias has the sign of its last change; without it the estimate is far off."""
+    rng, off, plain = np.random.default_rng(1), list[Array](), list[Array]()
+    force = forces(SIX_FACES, G)
+    came = np.vstack([np.zeros(3), np.sign(np.diff(force.round(6), axis=0))])
+    for _ in range(60):
+        mean = force + rng.normal(0, 5e-4, 3) * came
+        mean += rng.normal(0, 1e-5, force.shape)
+        seen = observe(SIX_FACES, mean, sigma=1e-5)
+        for left, pulls in (
+            (FactoryErrors(hysteresis=5e-4), off),
+            (FactoryErrors(), plain),
+        ):
+            result = solve(seen, tilt="none", factory=left)
+            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+                value, sigma = result.vector(group)
+                pulls.append((value - true) / sigma)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
+    assert np.sqrt(np.mean(np.square(plain))) > 2
+
+
 PER_K = {"acc_per_k": 5e-4, "gyr_per_k": 1e-5}
 
 

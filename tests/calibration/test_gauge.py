@@ -103,8 +103,8 @@ def test_effects_are_relative_and_the_calibration_is_in_counts(
     (counted,) = said["effects"]
     assert counted["id"] == "cross_coupling"
     k12 = counted["parameters"]["k12"]
-    # K2 of the accelerometers, which nobody knows, is in it
-    assert abs(k12["value"] - parse(COUPLED)["k12"]) < 4 * k12["sigma"] < 2e-3
+    # K2 and hysteresis of the accelerometers, which nobody knows, are in it
+    assert abs(k12["value"] - parse(COUPLED)["k12"]) < 4 * k12["sigma"] < 3e-3
     bias = said["calibration"]["acc_bias"]
     assert bias["unit"] == "count"
     off = np.array(bias["value"]) - ACC * np.array(Profile().truth.acc_bias)

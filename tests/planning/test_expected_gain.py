@@ -107,14 +107,17 @@ def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
     three = gain_of(explained(START, left=left))
     told = alone(three).of([one]).left[0, : len(ALLOWED)]
     noise = three.rows.noise[:3] / np.sqrt(SECONDS * 100.0)
-    weighed = []
-    for place in [*START, one]:
+    weighed, places = list[np.ndarray](), [*START, one]
+    for before, place in zip([None, *START], places, strict=True):
         rows, angle = _row(place), _by_angles(place) * ANGLE
+        came = np.zeros(3) if before is None else _force(place) - _force(before)
+        rows = np.column_stack([rows, np.diag(np.sign(np.round(came, 3)))])
         cov = np.diag(noise**2) + angle @ angle.T
         weighed.append(np.linalg.solve(np.linalg.cholesky(cov), rows))
     curves = left["quadratic"] * np.array([1.0, 9.80665, 1 / 98.0665])
-    factory = 1 / np.array([left["squareness"]] * 6 + np.repeat(curves, 3).tolist())
-    whole = np.vstack([*weighed, np.hstack([np.zeros((15, 8)), np.diag(factory)])])
+    sizes = np.append(np.repeat(curves, 3), [5e-4] * 3)  # and what a turn leaves
+    factory = 1 / np.append([left["squareness"]] * 6, sizes)
+    whole = np.vstack([*weighed, np.hstack([np.zeros((18, 8)), np.diag(factory)])])
     limits = np.array(list(ALLOWED.values()))
     variance = np.diag(np.linalg.inv(whole.T @ whole))[:6].copy()
     variance[3:] += (3e-4 / 9.806) ** 2  # gravity is not known better

@@ -14,6 +14,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.hysteresis import hysteresis
 from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
@@ -94,7 +95,9 @@ def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Gr
         return []
     shapes = {"warm_up": {"tau_s": WARM_UP_S}}
     return [
-        of_size(table, name, size, turned, (shapes.get(name, {}), 0))
+        hysteresis(table, float(size[0]))
+        if name == "hysteresis"
+        else of_size(table, name, size, turned, (shapes.get(name, {}), 0))
         for name, size in factory_sizes(table.x, left).items()
         if size.any()
     ]
@@ -103,6 +106,7 @@ def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Gr
 def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
     """One sigma of each effect that a factory left, SI: one for all, or (6,)."""
     sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
+    sizes["hysteresis"] = np.array([left.hysteresis])
     per_k = np.array(left.per_k)
     if x.warms:
         return sizes | {"temperature_bias": per_k}

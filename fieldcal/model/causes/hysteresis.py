@@ -1,0 +1,42 @@
+"""What the last turn leaves in the biases of the accelerometers.
+
+    U_i += h_i clip((f_i - f_i,before) / swing, -1, 1)
+
+f_before is the force in the position before; in the first position it is not known, and
+the term is part of the bias. A suspension that was bent one way does not return as far
+as from the other. Source: IEEE Std 1293, hysteresis error.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import Array
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.columns import General, RowView
+
+SWING = 0.02 * G0
+"""Change of the force from which all of it is left, m/s^2: a turn by a degree leaves
+some, and one about the axis itself nothing."""
+
+
+def hysteresis(table: ColumnTable, size: float) -> Group:
+    """The columns of three accelerometers, of a known size, m/s^2."""
+    held = np.unique(table.x.position[table.x.position >= 0])
+    force = np.array([table.x.f[table.x.position == p].mean(axis=0) for p in held])
+
+    def columns(view: RowView) -> Array:
+        x, out = view.x, np.zeros((len(view.x), 6, 3))
+        planned = (x.position < 0) & x.oriented  # a position that may come last
+        reached = np.flatnonzero((x.position > held[0]) | planned)
+        last = np.where(planned, len(held), np.searchsorted(held, x.position))[reached]
+        change = x.f[reached] - force[last - 1]
+        for c in range(3):
+            out[reached, c, c] = np.nan_to_num(np.clip(change[:, c] / SWING, -1.0, 1.0))
+        return out
+
+    at = table.add(General("hysteresis", columns), 3) + np.arange(3)
+    wide = size * np.abs(table.unit[:3])
+    return Group("factory", "hysteresis", at, wide, fixed=1.0)

@@ -111,7 +111,7 @@ def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
     for before, place in zip([None, *START], places, strict=True):
         rows, angle = _row(place), _by_angles(place) * ANGLE
         came = np.zeros(3) if before is None else _force(place) - _force(before)
-        rows = np.column_stack([rows, np.diag(np.sign(np.round(came, 3)))])
+        rows = np.column_stack([rows, np.diag(np.clip(came / 9.80665, -1, 1))])
         cov = np.diag(noise**2) + angle @ angle.T
         weighed.append(np.linalg.solve(np.linalg.cholesky(cov), rows))
     curves = left["quadratic"] * np.array([1.0, 9.80665, 1 / 98.0665])

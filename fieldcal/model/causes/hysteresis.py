@@ -1,10 +1,11 @@
 """What the last turn leaves in the biases of the accelerometers.
 
-    U_i += h_i clip((f_i - f_i,before) / swing, -1, 1)
+    U_i += h_i clip((f_i - f_i,before) / g, -1, 1)
 
 f_before is the force in the position before; in the first position it is not known, and
 the term is part of the bias. A suspension that was bent one way does not return as far
-as from the other. Source: IEEE Std 1293, hysteresis error.
+as from the other, and a smaller loop leaves less. Source: IEEE Std 1293, hysteresis
+error, which is that of the whole range.
 """
 
 from __future__ import annotations
@@ -17,9 +18,8 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
 
-SWING = 0.02 * G0
-"""Change of the force from which all of it is left, m/s^2: a turn by a degree leaves
-some, and one about the axis itself nothing."""
+SWING = G0
+"""Change of the force from which all of it is left, m/s^2."""
 
 
 def hysteresis(table: ColumnTable, size: float) -> Group:

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import Tilt
 from fieldcal.core.positions import FIVE, TWO, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import parameters, predicted
@@ -15,7 +16,6 @@ from fieldcal.planning.planner import Ladder, best_positions
 from fieldcal.solve import Observations
 from fieldcal.solve import solve as estimate
 from fieldcal.solve.five_position import axis_estimates
-from fieldcal.solve.given import Tilt
 
 G = 9.81
 SIGMA = 1e-3

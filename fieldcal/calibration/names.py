@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 AXES = "xyz"
 
@@ -16,6 +17,11 @@ SENSORS = {
 
 SCALES = frozenset({"acc_scale", "gyr_scale"})
 """Groups of scale factors."""
+
+Tilt = Literal["none", "angle_offset", "base_tilt"]
+
+TILTS: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
+"""Groups in degrees that say how a base is tilted; a calibration has one of them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fieldcal.calibration.names import ParameterName, group_of, sensor_of
+from fieldcal.calibration.names import TILTS, ParameterName, group_of, sensor_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join
@@ -23,9 +23,9 @@ UNREAL = {"acc_scale": 0.1, "gyr_scale": 0.1, "acc_bias": 5.0, "gyr_bias": 0.5}
 """Change from nominal that no sensor has: 10 %, three times what consumer grade is sold
 with; half a g; 30 deg/s."""
 
-TILTS, STEEP = ("angle_offset", "base_tilt"), 10.0
-"""Groups in degrees that say how a base is tilted, and the tilt from which it is none:
-session.toml takes no larger one for a level either."""
+STEEP = 10.0
+"""Tilt in degrees from which it is none: session.toml takes no larger one for a level
+either."""
 
 MENTIONED = 3
 """Turns that are named one by one."""

@@ -32,6 +32,9 @@ LARGEST = {"cross_coupling": 1.0, "quadratic": 1e-2, "g_sensitivity": 1e-2}
 """From which on a value is in another unit: an output as large as its input."""
 
 
+WARMING = ("temperature_bias", "warm_up")
+"""Effects by which biases change with a thermometer, and without."""
+
 WARM_UP_S = 300.0
 """Time constant of a package that warms up, s: of 100 to 2000."""
 
@@ -85,7 +88,12 @@ class FactoryErrors:
             "g_sensitivity": self.g_sensitivity,
         }
 
-    @property
-    def per_k(self) -> tuple[float, ...]:
-        """Temperature coefficients of the six biases."""
-        return (self.acc_per_k,) * 3 + (self.gyr_per_k,) * 3
+    def warming(self, shown: bool) -> tuple[str, tuple[float, ...]]:
+        """By which effect biases change, and the sizes of its six coefficients.
+
+        `shown` says whether a thermometer shows the course.
+        """
+        per_k = (self.acc_per_k,) * 3 + (self.gyr_per_k,) * 3
+        if shown:
+            return WARMING[0], per_k
+        return WARMING[1], tuple(size * self.warming_k for size in per_k)

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.names import TILTS
+from fieldcal.core.factory import WARMING
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.core.sampling import rate_of
@@ -16,7 +18,7 @@ from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import CHANGES, factory_sizes, of_factory
+from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -39,9 +41,6 @@ from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turning
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
-
-TILTS = ("base_tilt", "angle_offset")
-"""Models of the tilt that every base has, of which a set has one."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +169,7 @@ def _begun(before: Explanation) -> tuple[Member, ...]:
     members = before.best.set.members
     if {cause.name for cause, _ in members} & set(TILTS):
         return members
-    tilts = [c for c in before.dictionary.causes if c.name == TILTS[0]]
+    tilts = [c for c in before.dictionary.causes if c.name == TILTS[-1]]
     return (*members, *((cause, cause.variants[0]) for cause in tilts))
 
 
@@ -205,7 +204,7 @@ def _factory(
 
     A warm-up is none of it: the search looks for it as for all that time changes.
     """
-    known = {term.effect.id for term in prepared.known} | {*CHANGES}
+    known = {term.effect.id for term in prepared.known} | {*WARMING}
     turned = not dictionary.x.oriented.any()
     for one in of_factory(dictionary, factory_errors(about), turned):
         if one.part not in known:

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.names import group_of
+from fieldcal.calibration.names import TILTS, group_of
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
-from fieldcal.solve.given import TILTS
 
 
 def with_tilt_shown(

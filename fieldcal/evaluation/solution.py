@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_shown import GradeShown
-from fieldcal.calibration.names import group_of, sensor_of
+from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
@@ -46,7 +46,6 @@ from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import Recorded
-from fieldcal.solve.given import TILTS
 from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
 

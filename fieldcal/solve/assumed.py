@@ -10,14 +10,14 @@ import numpy as np
 
 from fieldcal.calibration import Method
 from fieldcal.calibration.lot_prior import LotPrior
+from fieldcal.calibration.names import TILTS, Tilt
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.sentences import join
-from fieldcal.solve.given import Tilt
 from fieldcal.solve.observations import Observations
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
-TILTS = ("auto", "none", "angle_offset", "base_tilt")
+CHOICES = ("auto", "none", *TILTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,10 @@ class Asked:
     factory: FactoryErrors = FactoryErrors()
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS or self.tilt not in TILTS:
+        if self.method not in METHODS or self.tilt not in CHOICES:
             raise InputError(
                 f"method {self.method!r} with tilt {self.tilt!r} is unknown: methods"
-                f" are {join(METHODS)}, tilts are {join(TILTS)}"
+                f" are {join(METHODS)}, tilts are {join(CHOICES)}"
             )
         if self.lot is not None and self.as_printed:
             raise InputError("printed formulas know of no lot: leave one of them out")
@@ -85,7 +85,7 @@ class Asked:
 
     def _refuse_tilt(self) -> None:
         if self.method == "two_position":
-            if self.tilt in ("angle_offset", "base_tilt") or self.cross:
+            if self.tilt in TILTS or self.cross:
                 raise NotObservable(
                     "two positions give bias and scale factor only, not tilt or "
                     "cross-coupling: take five positions, each with another α or β"

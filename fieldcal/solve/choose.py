@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.calibration.names import group_of
+from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.sentences import join
@@ -31,7 +31,7 @@ from fieldcal.solve import printed
 from fieldcal.solve.assumed import Asked
 from fieldcal.solve.borrowed import borrowed
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
-from fieldcal.solve.given import Tilt, Wanted, earth_known, seen_by
+from fieldcal.solve.given import Wanted, earth_known, seen_by
 from fieldcal.solve.latitude import EarthVertical
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.rank import ladder_remedy
@@ -40,8 +40,6 @@ from fieldcal.solve.rows import of_means, without_angles
 
 Earth = Literal["stated", "another", "none"]
 """Whose rate gyroscopes have: of the stated latitude, of another one, or none."""
-
-TILTED: tuple[Tilt, ...] = ("angle_offset", "base_tilt")
 
 NO_EARTH = (
     "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
@@ -238,7 +236,7 @@ class _Session:
 
         Windows tell which; turns hardly add to that.
         """
-        fits = {name: self._with(name, follow=False) for name in TILTED}
+        fits = {name: self._with(name, follow=False) for name in TILTS}
         usable = {n: e for n, e in fits.items() if _determines_all(e)}
         if not usable:
             return self._with("none"), [self._level_taken()]
@@ -246,7 +244,7 @@ class _Session:
             name = next(iter(usable))
             return self._with(name), [f"the tilt is taken as {name}"]
         ahead = usable["angle_offset"].score - usable["base_tilt"].score
-        best, other = TILTED if ahead >= 0 else TILTED[::-1]
+        best, other = TILTS if ahead >= 0 else TILTS[::-1]
         ahead = abs(ahead)
         if ahead > thresholds.BETTER_TILT:
             note = (
@@ -276,4 +274,4 @@ def _determines_all(found: Estimated) -> bool:
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False
     open_ = {group_of(n) for n in found.missing}
-    return not open_ & {"acc_bias", "acc_scale", *TILTED}
+    return not open_ & {"acc_bias", "acc_scale", *TILTS}

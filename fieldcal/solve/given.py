@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
-from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.core.factory import FactoryErrors
+from fieldcal.calibration.names import TILTS, ParameterName, Tilt, group_of
+from fieldcal.core.factory import WARMING, FactoryErrors
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.core.under_way import UnderWay
@@ -28,17 +27,12 @@ from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import CHANGES, of_factory, whole
+from fieldcal.model.causes.effect_causes import of_factory, whole
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect
 from fieldcal.solve.shown import Shown, at_end, carried
-
-Tilt = Literal["none", "angle_offset", "base_tilt"]
-
-TILTS = ("angle_offset", "base_tilt")
-"""Models of one tilt: a set has one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +122,7 @@ class Given(Dictionary):
     @cached_property
     def ending(self) -> Array:
         """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        left = tuple(m for m in self.asked if m[1].part in CHANGES)
+        left = tuple(m for m in self.asked if m[1].part in WARMING)
         return at_end(self, (Shown(left, 1.0), *self.explanations))
 
     @property

@@ -20,13 +20,13 @@ from observed import (
     practice,
 )
 
+from fieldcal.calibration.names import Tilt
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.closed_form import two_position
 from fieldcal.solve.five_position import axis_estimates, five_position
-from fieldcal.solve.given import Tilt
 
 LATITUDE = float(np.deg2rad(50.45))
 NOT_45 = (Position.deg(0, 0), Position.deg(30, 7))

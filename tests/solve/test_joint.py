@@ -18,13 +18,13 @@ from test_closed_form import MOUNTINGS, SPREAD_OUT, TILTED
 
 import fieldcal
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import Tilt
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.solve import Observations, choose, rank, solve
 from fieldcal.solve.estimation import scatter_of
-from fieldcal.solve.given import Tilt
 from fieldcal.windows import Average
 
 SIGMA = 1e-3

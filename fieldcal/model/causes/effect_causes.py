@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.core.factory import WARM_UP_S, FactoryErrors
+from fieldcal.core.factory import WARM_UP_S, WARMING, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -20,9 +20,6 @@ from fieldcal.physics.experience import Experience
 
 NOWHERE: Point = (NO_SHAPE, 0)
 """The only point of an effect that has no shape."""
-
-CHANGES = ("temperature_bias", "warm_up")
-"""Effects by which biases change while a device that a factory made warms up."""
 
 
 def of_effects(table: ColumnTable) -> Iterator[Cause]:
@@ -93,7 +90,7 @@ def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Gr
     """
     if not table.x.f.any():
         return []
-    shapes = {"warm_up": {"tau_s": WARM_UP_S}}
+    shapes = {WARMING[1]: {"tau_s": WARM_UP_S}}
     return [
         hysteresis(table, float(size[0]))
         if name == "hysteresis"
@@ -107,10 +104,8 @@ def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
     """One sigma of each effect that a factory left, SI: one for all, or (6,)."""
     sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
     sizes["hysteresis"] = np.array([left.hysteresis])
-    per_k = np.array(left.per_k)
-    if x.warms:
-        return sizes | {"temperature_bias": per_k}
-    return sizes | {"warm_up": per_k * left.warming_k}
+    name, per_k = left.warming(x.warms)
+    return sizes | {name: np.array(per_k)}
 
 
 def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:

@@ -5,10 +5,10 @@
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
 else, a lever arm, g-sensitivity, late gyroscopes, a cubic term, and a low-pass of first
-order on one triad or both: 40 recordings of a
-minute at 25 Hz, or as many as are asked for. Printed is how often that is named and
-something false is said, how numbers scatter in their own standard deviations, and how
-stretches that were left out are predicted. `--lag` puts a low-pass of that time
+or of second order on one triad or both: 40 recordings of a minute at 25 Hz, or as many
+as are asked for. Printed is how often that is named and something false is said, how
+numbers scatter in their own standard deviations, and how stretches that were left out
+are predicted. `--lag` puts a low-pass of that time
 constant on the gyroscopes of all others besides, and `--jitter` makes the stamps of
 samples be off by so much, one sigma, which the catalogue lacks.
 """

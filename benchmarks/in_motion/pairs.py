@@ -17,7 +17,10 @@ from fieldcal.session import description
 
 SECONDS, HZ = 60.0, 25.0
 WHITE = np.repeat([0.02, 1e-3], 3)
-KINDS = ("", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth")
+KINDS = (
+    "", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth",
+    "second_order",
+)  # fmt: skip
 ABOUT = description.parse({"format": 1})
 
 
@@ -94,6 +97,11 @@ def _effect(
         taus = rng.uniform(0.008, 0.03, 2)
         taus[rng.integers(2)] *= rng.integers(2)
         device["lag"] = tuple(taus.tolist())
+        return taus, ["acc", "gyr"]
+    if kind == "second_order":
+        taus = rng.uniform(0.016, 0.04, 2)
+        taus[rng.integers(2)] *= rng.integers(2)
+        device["second"] = tuple(taus.tolist())
         return taus, ["acc", "gyr"]
     size = 0.1 if kind == "lever_arm" else 3e-5
     values = rng.normal(0, size, 3)

@@ -151,6 +151,23 @@ def test_the_low_pass_of_a_simulator_is_a_time_constant_below_nothing() -> None:
         assert abs(tau + 0.02) < 4 * sigma < 0.008
 
 
+def test_a_butterworth_filter_is_no_delay_and_no_time_constant(true: Block) -> None:
+    found = held({"second": (0.0, 0.03), **NOISE}, true)
+    assert {d.id for d in found.differences} - CALIBRATION == {"second_order"}
+    tau, sigma = number(found, "second_order", "gyr")
+    assert abs(tau - 0.03) < 4 * sigma < 1e-3
+    assert 0.85 < found.after.chi2_per_dof < 1.15 < found.before.chi2_per_dof
+
+
+def test_the_butterworth_filter_of_a_simulator_is_one_below_nothing() -> None:
+    slow = block_of(recorded(DRIVE, {"second": (0.03, 0.03)}, 80.0, 25.0))
+    found = held(NOISE, slow, seconds=30.0)
+    assert {d.id for d in found.differences} - CALIBRATION == {"second_order"}
+    for name in ("acc", "gyr"):
+        tau, sigma = number(found, "second_order", name)
+        assert abs(tau + 0.03) < 4 * sigma < 0.006
+
+
 def test_what_only_motion_shows_is_named_of_the_virtual_device() -> None:
     angles = ((0, 0), (90, 40), (-60, 0), (30, -70), (0, 80), (-90, -30)) * 2
     windows = [

@@ -278,6 +278,30 @@ def test_sensors_of_little_bandwidth_show_an_exponential_mean_of_what_was() -> N
         np.testing.assert_allclose(shown, expected, atol=2e-4 * float(np.ptp(true)))
 
 
+def test_sensors_of_second_order_follow_the_equation_of_butterworth() -> None:
+    step, tau, moving = 1e-3, 0.04, []
+    quiet = {"sampling": {"rate_hz": 1 / step}, "noise": {"acc": 0.0, "gyr": 0.0}}
+    for given in ({"acc": tau, "gyr": tau}, {"gyr": tau}, {"acc": 0.0}):
+        device = VirtualDevice(from_tables(quiet).having(effect("second_order", given)))
+        device.take(500)
+        device.turn(1.0, 0.4, 0.8)
+        moving.append(device.take(1500))
+    both, gyr, plain = moving
+    np.testing.assert_array_equal(gyr.acc, plain.acc)
+    np.testing.assert_array_equal(gyr.gyr, both.gyr)
+    for shown, true in ((both.acc, plain.acc), (both.gyr, plain.gyr)):
+        # tau^2 y'' + sqrt(2) tau y' + y = u by the rule of midpoints, begun at rest
+        y, speed = true[0].copy(), np.zeros(3)
+        expected = [y.copy()]
+        for u in (true[1:] + true[:-1]) / 2:
+            pull = u - y - np.sqrt(2) * tau * speed - step / 2 * speed
+            gain = pull * step / (tau**2 + step * tau / np.sqrt(2) + step**2 / 4)
+            y, speed = y + step * (speed + gain / 2), speed + gain
+            expected.append(y.copy())
+        off = np.abs(shown - np.array(expected)).max()
+        assert off < 3e-4 * float(np.ptp(true))
+
+
 def test_vibration_is_rectified_by_its_variance() -> None:
     def shaken(x: float) -> Array:
         effect = parse(f"vibration_rectification:x={x},level=0.5")

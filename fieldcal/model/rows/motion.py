@@ -29,7 +29,8 @@ from scipy.fft import dct, idct
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
-from fieldcal.model.rows.reference import FEWEST, GAP, Reference, Response
+from fieldcal.model.rows.reference import FEWEST, GAP, Reference
+from fieldcal.model.rows.response import Response
 from fieldcal.physics.experience import Experience
 
 TRIADS = (ACC, GYR)
@@ -152,7 +153,8 @@ class MotionRows:
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
             f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
-            slope=self._means_of(response.slower, response.late, 1),
+            slope=self._means_of(response.slope, response.late, 0),
+            bend=self._means_of(response.bend, response.late, 0),
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=warming,
             heating=np.gradient(warming, t), variance=np.zeros((n, 3)),

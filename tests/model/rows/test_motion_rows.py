@@ -13,7 +13,8 @@ from fieldcal.model.rows.motion import (
     frequencies,
     rows_in_motion,
 )
-from fieldcal.model.rows.reference import Reference, Response
+from fieldcal.model.rows.reference import Reference
+from fieldcal.model.rows.response import Response
 
 LENGTH, COUNT = 6, 4
 STILL = Alignment(0.0, 0.0, 0.0)

@@ -75,6 +75,35 @@ def butterworth(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
     return _over_the_past(drive, t, arm, gyro, tau * ages, ring)
 
 
+def on_a_mount(drive: Drive, t: Any, arm: Any, compliance: Any) -> Any:
+    """Force on a structure with a mode along each axis: 1 / (2 pi hz)^2, in s^2."""
+    damping = 0.1
+    ages = np.linspace(0.0, 10.0 / damping, 401)
+    ring = np.sqrt(1 - damping**2)
+    weights = (1 - 2 * damping**2) / ring * np.sin(ring * ages)
+    weights = np.exp(-damping * ages) * (weights + 2 * damping * np.cos(ring * ages))
+    out = drive.force(t, arm)
+    for i, b in enumerate(compliance):
+        if b:
+            past = _over_the_past(drive, t, arm, False, np.sqrt(b) * ages, weights)
+            out[:, i] = past[:, i]
+    return out
+
+
+def incremented(drive: Drive, t: Any, arm: Any, seconds: float) -> Any:
+    """Force and rate as increments from t on, of velocity in the axes then."""
+    from scipy.spatial.transform import Rotation
+
+    start, parts = drive.axes(t), 16
+    force = np.zeros((len(t), 3))
+    for k in range(parts):
+        now = t + (k + 0.5) / parts * seconds
+        back = start @ np.swapaxes(drive.axes(now), 1, 2)
+        force += (back @ drive.force(now, arm)[:, :, None])[:, :, 0] / parts
+    turned = start @ np.swapaxes(drive.axes(t + seconds), 1, 2)
+    return force, Rotation.from_matrix(turned).as_rotvec() / seconds
+
+
 def _over_the_past(
     drive: Drive, t: Any, arm: Any, gyro: bool, ages: Any, weights: Any
 ) -> Any:
@@ -109,7 +138,8 @@ def recorded(
     `device` may have "start" (s of the motion), "clock" (delay s and rate), "turn" (R),
     "arm", "bias", "matrix_acc", "matrix_gyr", "g" (3, 3), "late" of the gyroscopes,
     "lag" or "second" (time constants of both triads, of first or second order), "cubic"
-    (3,), "noise", "jitter" (s by which stamps are off, one sigma) and "seed".
+    (3,), "interval" (s of increments), "compliance" (3,) of a mount, "noise", "jitter"
+    (s by which stamps are off, one sigma) and "seed".
     """
     rng = np.random.default_rng(device.get("seed", 0))
     n = int(seconds * hz)
@@ -125,6 +155,10 @@ def recorded(
     for passes, (acc, gyr) in ((low_passed, lags), (butterworth, second)):
         f = passes(drive, t, arm, acc, False) if acc else f
         w = passes(drive, t - late, arm, gyr, True) if gyr else w
+    if interval := device.get("interval", 0.0):
+        f, w = incremented(drive, t, arm, interval)
+    if "compliance" in device:
+        f = on_a_mount(drive, t, arm, device["compliance"])
     f, w = f @ turn.T, w @ turn.T
     acc = f @ np.asarray(device.get("matrix_acc", np.eye(3))).T
     acc = acc + f**3 * device.get("cubic", np.zeros(3))

@@ -33,6 +33,7 @@ class SecondOrder(Sensor):
     """Time constants of Butterworth low-passes of both triads."""
 
     params = (Param("acc", "s", 0.03), Param("gyr", "s", 0.03))
+    while_moving = True
     covariate = "how fast specific force and rate change"
     decided_by = "a quicker motion"
     cure = (

@@ -137,7 +137,9 @@ class MotionFit:
         alignment = replace(alignment, delay=alignment.delay + shared)
         acc = replace(acc, late=0.0)
         gyr = acc if alike else replace(gyr, late=gyr.late - shared)
-        now = replace(self.rows, alignment=alignment, acc=acc, gyr=gyr)
+        now = replace(
+            self.rows, alignment=alignment, acc=acc, gyr=gyr, share=there.lag.stamps
+        )
         self.system.dictionary.moved(now)
 
     def _alignment(self, found: Set) -> Alignment:
@@ -162,7 +164,7 @@ class MotionFit:
         steps = [told(found, d.clock, 2), told(found, d.turn, 3)]
         moved = [np.abs(step / np.sqrt(np.diag(cov))).max() for step, cov in steps]
         followed = [now.acc.apart(before.acc), now.gyr.apart(before.gyr)]
-        return float(max(moved + followed))
+        return float(max(*moved, *followed, abs(now.share - before.share)))
 
     def _responses(self, there: State, free: bool) -> tuple[Response, Response]:
         """How a state has the triads follow the motion; one and the same if alike."""

@@ -9,7 +9,7 @@ of every fit, so its uncertainty is in all numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -181,15 +181,11 @@ def _rate(reference: Reference) -> float:
 
 
 def _beginnings(dictionary: MotionDictionary) -> list[tuple[Member, ...]]:
-    """Late gyroscopes, and these with each filter."""
+    """Late gyroscopes, and these with each effect that only motion shows."""
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
-    return [delays, *((*delays, m) for m in _filters(every))]
-
-
-def _filters(members: Sequence[Member]) -> list[Member]:
-    """Those of causes by which a triad follows with a time constant."""
-    return [m for m in members if replace(lag_of(m), delay=0.0) != Lag()]
+    moving = (m for m in every if m[1].effect and m[1].effect.while_moving)
+    return [delays, *((*delays, m) for m in moving)]
 
 
 def _nominal(about: Description, places: int) -> State:

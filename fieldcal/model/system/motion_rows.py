@@ -95,6 +95,7 @@ class MotionSystem(System):
                 known.late * change[:, triad]
                 + known.tau * x.slope[:, triad]
                 + known.second * x.bend[:, triad]
+                + rows.share * x.missed[:, triad]
             )
         return out
 

@@ -8,7 +8,6 @@ of every fit, so its uncertainty is in all numbers.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,6 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.causes.followed import MotionDictionary
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
@@ -107,7 +105,7 @@ def follow(
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
     system = MotionSystem(dictionary, _flat(rows, nominal))
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
-    fit = _likeliest(plain, _beginnings(dictionary))
+    fit = _likeliest(plain, dictionary)
     found = fit.searched(())
     for _ in range(AGAIN if found.best.members else 0):
         before, members = found.best.keys, found.best.members
@@ -119,17 +117,25 @@ def follow(
     return Following(fit, found, Posterior(found.search, found.best))
 
 
-def _likeliest(fit: MotionFit, beginnings: Sequence[tuple[Member, ...]]) -> MotionFit:
-    """A fit settled with the likeliest of some beginnings.
+def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
+    """A fit settled with late gyroscopes, or with what only motion shows besides.
 
-    What a filter does is linear about a filter like it and not about none.
+    What a filter does is linear about a filter like it and not about none. Of those
+    that explain something about none the likeliest is taken.
     """
-    best, most = fit, -np.inf
-    for members in beginnings:
-        other = fit.apart()
-        other.settle(members)
-        if (evidence := other.evidence(members)) > most:
-            best, most = other, evidence
+    every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
+    delays = tuple(m for m in every if lag_of(m).delay)
+    fit.settle(delays)
+    best, most = fit, (nothing := fit.evidence(delays))
+    for member in every:
+        _, group = member
+        if group.effect is None or not group.effect.while_moving:
+            continue
+        if fit.evidence((*delays, member)) > nothing:
+            other = fit.apart()
+            other.settle((*delays, member))
+            if (evidence := other.evidence((*delays, member))) > most:
+                best, most = other, evidence
     return best
 
 
@@ -178,14 +184,6 @@ def _rate(reference: Reference) -> float:
     most = int((slower < 1 - MOVES).sum(axis=0).max())
     hz = most * QUICKEST_HZ * 2 / len(t)
     return float(np.clip(OFTEN * hz, SLOWEST_HZ, QUICKEST_HZ))
-
-
-def _beginnings(dictionary: MotionDictionary) -> list[tuple[Member, ...]]:
-    """Late gyroscopes, and these with each effect that only motion shows."""
-    every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
-    delays = tuple(m for m in every if lag_of(m).delay)
-    moving = (m for m in every if m[1].effect and m[1].effect.while_moving)
-    return [delays, *((*delays, m) for m in moving)]
 
 
 def _nominal(about: Description, places: int) -> State:

@@ -1,87 +1,127 @@
 """Low-passes of first and of second order, and how their outputs change with them.
 
-A sensor with a time constant tau puts out for an input u
+With the operator D = d/dt, a time constant tau and an input u these are
 
-    y(t) = int_0^inf u(t - tau a) exp(-a) da                     first order       (1)
-    y(t) = int_0^inf u(t - sqrt(2) tau a) 2 exp(-a) sin(a) da    second order      (2)
+    y = 1 / (1 + tau D) u                                        first order       (1)
+    y = 1 / (1 + sqrt(2) tau D + tau^2 D^2) u                    second order      (2)
 
-which are, with the operator D = d/dt, 1 / (1 + tau D) and the Butterworth low-pass
-1 / (1 + sqrt(2) tau D + tau^2 D^2) with the cut-off 1 / (2 pi tau), Hz. A negative tau
+and (2) is the Butterworth low-pass with the cut-off 1 / (2 pi tau), Hz. A negative tau
 is the inverse of that of |tau|: the reference has been through it,
 
     y = (1 + |tau| D) u,    y = (1 + sqrt(2) |tau| D + tau^2 D^2) u                 (3)
 
-The integral (1) is evaluated by Gauss-Laguerre quadrature, exact for polynomials of
-degree 2 NODES - 1, and (2) by Gauss-Legendre quadrature up to a = PAST. For either
+Both follow from a pole p, -1 / tau or (-1 + i) / (sqrt(2) tau), and
+
+    z' = p z + u,    y = z / tau  or  y = sqrt(2) / tau Im z                         (4)
+
+which is solved from one even instant to the next, exactly for a cubic u. For either
 sign, with F the low-pass of |tau|,
 
-    dy / dtau = -D F y                                                             (4)
-    dy / dtau = -(sqrt(2) D + 2 |tau| D^2) F y = sqrt(2) D F y - 2 (y - F y) / |tau| (5)
+    dy / dtau = -D F y = -(y - F y) / |tau|                                          (5)
+    dy / dtau = -(sqrt(2) D + 2 |tau| D^2) F y = sqrt(2) D F y - 2 (y - F y) / |tau| (6)
 
 Units: s; values in the input's. Source: first-order lag; S. Butterworth, On the theory
-of filter amplifiers, 1930; Abramowitz and Stegun 25.4.45 and 25.4.29.
+of filter amplifiers, 1930.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 from fieldcal.core.samples import Array
 
-NODES = 5
-"""Of the sum in place of (1)."""
-
-PAST, POINTS = 14.0, 20
-"""Where (2) ends, with exp(-14) left out, and points of the sum in place of it, which
-is right to 3e-6 up to twice the cut-off."""
-
 ROOT2 = np.sqrt(2)
 
+PAUSE = 3.5
+"""Intervals between knots from which the input is taken up anew, at rest."""
 
-def first_order(spline: CubicSpline, tau: float) -> Array:
-    """Values (n, k) of a spline of k channels at its knots, after (1) or inverse."""
+NODES = 8
+"""Of the integral of a cubic from one instant to the next, times the exponential."""
+
+
+def first_order(spline: CubicSpline, tau: float) -> CubicSpline:
+    """What comes of a spline of k channels after (1), or after its inverse."""
+    even = _evenly(spline)
+    t, u = even.x, even(even.x)
     if tau < 0:
-        early: Array = spline(spline.x) - tau * spline(spline.x, 1)  # (3)
-        return early
-    ages, weights = np.polynomial.laguerre.laggauss(NODES)
-    return _late(spline, tau * ages, weights)  # (1)
+        return CubicSpline(t, u - tau * even(t, 1))  # (3)
+    return CubicSpline(t, _answer(even, u, -1 / tau) / tau)  # (4)
 
 
-def second_order(spline: CubicSpline, tau: float) -> Array:
-    """Values (n, k) of a spline of k channels at its knots, after (2) or inverse."""
+def second_order(spline: CubicSpline, tau: float) -> CubicSpline:
+    """What comes of a spline of k channels after (2), or after its inverse."""
+    even = _evenly(spline)
+    t, u = even.x, even(even.x)
     if tau < 0:
-        t = spline.x
-        change = spline(t, 1)  # right to h^4 at the knots, its own bend only to h^2
+        change = even(t, 1)  # right to h^4 at the knots, its own bend only to h^2
         bend = CubicSpline(t, change)(t, 1)
-        early: Array = spline(t) - ROOT2 * tau * change + tau**2 * bend  # (3)
-        return early
-    place, weights = np.polynomial.legendre.leggauss(POINTS)
-    ages = (place + 1) * PAST / 2
-    weights = weights * np.exp(-ages) * np.sin(ages)
-    return _late(spline, ROOT2 * tau * ages, weights / weights.sum())  # (2)
+        return CubicSpline(t, u - ROOT2 * tau * change + tau**2 * bend)  # (3)
+    pole = (-1 + 1j) / (ROOT2 * tau)
+    return CubicSpline(t, ROOT2 / tau * _answer(even, u, pole).imag)  # (4)
 
 
-def first_order_slope(spline: CubicSpline, tau: float) -> Array:
-    """By how much less comes out for each second of tau, of an output (n, k), (4)."""
-    slower = CubicSpline(spline.x, first_order(spline, abs(tau)))
-    out: Array = slower(spline.x, 1)
-    return out
+def first_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
+    """By how much less comes out for each second of tau, of an output, (5)."""
+    even, tau = _evenly(spline), abs(tau)
+    t, y = even.x, even(even.x)
+    return CubicSpline(t, (y - _answer(even, y, -1 / tau) / tau) / tau)
 
 
-def second_order_slope(spline: CubicSpline, tau: float) -> Array:
-    """The same of a low-pass of second order, (5); tau is not 0."""
-    t, tau = spline.x, abs(tau)
-    slower = CubicSpline(t, second_order(spline, tau))
-    out: Array = 2 * (spline(t) - slower(t)) / tau - ROOT2 * slower(t, 1)
-    return out
+def second_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
+    """The same of a low-pass of second order, (6); tau is not 0."""
+    even, tau = _evenly(spline), abs(tau)
+    t, y, pole = even.x, even(even.x), (-1 + 1j) / (ROOT2 * tau)
+    z = _answer(even, y, pole)
+    slower, change = ROOT2 / tau * z.imag, ROOT2 / tau * (pole * z).imag
+    return CubicSpline(t, 2 * (y - slower) / tau - ROOT2 * change)
 
 
-def _late(spline: CubicSpline, late: Array, weights: Array) -> Array:
-    """Sum of what a spline was some times ago, s, with weights."""
+def _evenly(spline: CubicSpline) -> CubicSpline:
+    """The same with even knots, but for pauses."""
     t = spline.x
-    out: Array = sum(
-        weight * spline(np.maximum(t - ago, t[0]))
-        for ago, weight in zip(late, weights, strict=True)
-    )
+    step = float(np.median(np.diff(t)))
+    if np.allclose(np.diff(t), step, rtol=1e-6, atol=0.0):
+        return spline
+    breaks = np.flatnonzero(np.diff(t) > PAUSE * step) + 1
+    even = [
+        np.linspace(some[0], some[-1], max(round((some[-1] - some[0]) / step), 1) + 1)
+        for some in np.split(t, breaks)
+        if some[-1] > some[0]
+    ]
+    knots = np.concatenate(even)
+    return CubicSpline(knots, spline(knots))
+
+
+def _answer(even: CubicSpline, u: Array, pole: complex) -> Any:
+    """Z of (4) at the knots, (n, k), from rest after every pause."""
+    t = even.x
+    change = even(t, 1)
+    out = np.empty(u.shape, dtype=np.result_type(pole, float))
+    steps = np.diff(t)
+    pauses = np.flatnonzero(steps > PAUSE * np.median(steps)) + 1
+    for some in np.split(np.arange(len(t)), pauses):
+        step = float(np.mean(np.diff(t[some]))) if len(some) > 1 else 0.0
+        out[some] = _from_rest(u[some], change[some], step, pole)
     return out
+
+
+def _from_rest(u: Array, change: Array, step: float, pole: complex) -> Any:
+    """Z of (4) at even instants of an input with a derivative, (n, k)."""
+    keep = np.exp(pole * step)
+    place, weight = np.polynomial.legendre.leggauss(NODES)
+    x = (place + 1) / 2
+    weight = weight / 2 * step * np.exp(pole * step * (1 - x))
+    # Hermite's cubics: values and derivatives at both ends
+    last = weight @ ((1 + 2 * x) * (1 - x) ** 2)
+    ahead = weight @ (x**2 * (3 - 2 * x))
+    last_change = step * (weight @ (x * (1 - x) ** 2))
+    change_ahead = step * (weight @ (x**2 * (x - 1)))
+    drive = np.empty(u.shape, dtype=np.result_type(pole, float))
+    drive[0] = -u[0] / pole
+    drive[1:] = last * u[:-1] + ahead * u[1:]
+    drive[1:] += last_change * change[:-1] + change_ahead * change[1:]
+    return lfilter([1.0], [1.0, -keep], drive, axis=0)

@@ -1,8 +1,8 @@
 """A reference of the device's motion, interpolated, and filtered as a sensor does.
 
 A channel is a cubic spline through its samples. What a sensor with a low-pass makes of
-it (`fieldcal.model.rows.low_pass`) is a spline with the same knots. Units: s, m/s^2,
-rad/s; axes of the reference.
+it (`fieldcal.model.rows.low_pass`) is a spline as well. Units: s, m/s^2, rad/s; axes of
+the reference.
 """
 
 from __future__ import annotations
@@ -74,13 +74,10 @@ class Reference:
             out[:, channels] = spline(s, order)
         return out
 
-    def through(self, sensor: Callable[[CubicSpline], Array]) -> Self:
-        """What a sensor makes of it: of a spline values (n, k) at the knots."""
+    def through(self, sensor: Callable[[CubicSpline], CubicSpline]) -> Self:
+        """What a sensor makes of it."""
         out = copy(self)
-        out.splines = [
-            (channels, CubicSpline(spline.x, sensor(spline)))
-            for channels, spline in self.splines
-        ]
+        out.splines = [(channels, sensor(spline)) for channels, spline in self.splines]
         return out
 
     def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 They are late by a delay, and follow with a low-pass of first and one of second order.
 Where a time constant is below the least that a motion of a body tells from a delay,
-the derivatives (4) and (5) of `fieldcal.model.rows.low_pass` are those at the least, L.
+the derivatives (5) and (6) of `fieldcal.model.rows.low_pass` are those at the least, L.
 What tells a time constant from a delay goes as its square in the first order and as its
 cube in the second. A step of the derivative from tau to tau' therefore leads to
 

@@ -116,6 +116,16 @@ def test_before_its_first_sample_a_reference_is_as_at_it() -> None:
     np.testing.assert_allclose(found.at(even)[:, 0], expected, atol=0.02)
 
 
+def test_uneven_knots_and_pauses_are_filtered_as_even_ones() -> None:
+    rng = np.random.default_rng(5)
+    t = T + rng.uniform(-2e-3, 2e-3, len(T))
+    t = t[(t < 2.0) | (t > 2.5)]
+    found = Reference(Block.of(t, waves(t)[:, :3], waves(t)[:, 3:]))
+    np.testing.assert_allclose(
+        smoothed(0.02, found).at(INSIDE), after_butterworth(INSIDE, 0.02), atol=2e-4
+    )
+
+
 def test_channels_sampled_at_other_instants_are_each_followed_by_their_own() -> None:
     six = waves(T)
     six[1::2, 3:] = np.nan  # gyroscopes at half the rate

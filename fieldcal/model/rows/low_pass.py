@@ -39,8 +39,9 @@ ROOT2 = np.sqrt(2)
 PAUSE = 3.5
 """Intervals between knots from which the input is taken up anew, at rest."""
 
-NODES = 8
-"""Of the integral of a cubic from one instant to the next, times the exponential."""
+NODES, FORGOTTEN = 48, 40.0
+"""Of the integral of a cubic from one instant to the next, times the exponential, and
+the exponent from which on that has nothing left."""
 
 
 def first_order(spline: CubicSpline, tau: float) -> CubicSpline:
@@ -113,8 +114,9 @@ def _from_rest(u: Array, change: Array, step: float, pole: complex) -> Any:
     """Z of (4) at even instants of an input with a derivative, (n, k)."""
     keep = np.exp(pole * step)
     place, weight = np.polynomial.legendre.leggauss(NODES)
-    x = (place + 1) / 2
-    weight = weight / 2 * step * np.exp(pole * step * (1 - x))
+    part = min(1.0, FORGOTTEN / max(-pole.real * step, 1e-300))
+    x = 1 - (1 - place) / 2 * part
+    weight = weight / 2 * part * step * np.exp(pole * step * (1 - x))
     # Hermite's cubics: values and derivatives at both ends
     last = weight @ ((1 + 2 * x) * (1 - x) ** 2)
     ahead = weight @ (x**2 * (3 - 2 * x))

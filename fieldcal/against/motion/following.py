@@ -107,7 +107,7 @@ def follow(
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
     fit = _likeliest(plain, dictionary)
     found = fit.searched(())
-    for _ in range(AGAIN if found.best.members else 0):
+    for _ in range(AGAIN):
         before, members = found.best.keys, found.best.members
         fit.settle(members)
         found = fit.searched(members)

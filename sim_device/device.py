@@ -139,11 +139,12 @@ class VirtualDevice:
         seq = np.arange(self._tick, self._tick + n, dtype=float)
         self._tick += n
         t = seq / self.rate
-        true = t / self.sensing.pace
-        six, degrees = self.sensing.sense(true, np.ones(n, dtype=np.int64), t)
+        stamps, taken = self.sensing.stamped(t)
+        true = taken / self.sensing.pace
+        six, degrees = self.sensing.sense(true, np.ones(n, dtype=np.int64), stamps)
         late = LATENCY_S + JITTER_S * self._arrival.standard_exponential(n)
         host = np.maximum.accumulate(true + late)
-        block = Block.of(t, six[:3].T, six[3:].T, degrees, seq, host)
+        block = Block.of(stamps, six[:3].T, six[3:].T, degrees, seq, host)
         kept = self.sensing.chain.arrives(n)
         return block if kept.all() else _only(block, kept)
 
@@ -186,7 +187,16 @@ class Sensing:
         wanders = (e.wander(rate, stream(seed, e.id)) for e in effects)
         self._wanders = [wander for wander in wanders if wander is not None]
         self._thermometer = stream(seed, "thermometer")
+        stamps = (e.stamps(stream(seed, e.id)) for e in effects)
+        self._stamps = [stamp for stamp in stamps if stamp is not None]
         self._lag = sum(e.lag() for e in effects)
+
+    def stamped(self, t: Array) -> tuple[Array, Array]:
+        """Stamps of samples due at (n,) s of the device's clock, and when they are."""
+        shown = taken = t
+        for stamp in self._stamps:
+            shown, taken = stamp(taken)
+        return shown, taken
 
     def sense(
         self, true: Array, ticks: NDArray[np.int64], t: Array

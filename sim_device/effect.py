@@ -206,6 +206,15 @@ class SimulatedEffect:
         """Seconds of the device's clock in a true second."""
         return 1.0
 
+    def stamps(
+        self, rng: np.random.Generator
+    ) -> Callable[[Array], tuple[Array, Array]] | None:
+        """From even times (n,) s of the device's clock to stamps, and when samples are.
+
+        None: both are the even times.
+        """
+        return None
+
     def stage(self, full_scale: Array) -> Stage | None:
         """What happens to samples; `full_scale` (6,) of the outputs, inf without."""
         return None

@@ -98,7 +98,8 @@ def simulate(
 
 
 def _piece(sensing: Sensing, t: Array, ticks: NDArray[np.int64], noise: bool) -> Block:
-    true = t / sensing.pace
+    t, taken = sensing.stamped(t)
+    true = taken / sensing.pace
     if noise:
         six, degrees = sensing.sense(true, ticks, t)
     else:

@@ -4,13 +4,14 @@
 
 A motion program of its own draws bodies that are swung, and IMUs on them with clocks,
 axes, biases and scale factors of their own, noise of every colour, and in turn nothing
-else, a lever arm, g-sensitivity, late gyroscopes, a cubic term, and a low-pass of first
-order on one triad or both: 40 recordings of a
-minute at 25 Hz, or as many as are asked for. Printed is how often that is named and
-something false is said, how numbers scatter in their own standard deviations, and how
-stretches that were left out are predicted. `--lag` puts a low-pass of that time
+else, a lever arm, g-sensitivity, late gyroscopes, a cubic term, a low-pass of first or
+of second order on one triad or both, stamps that are off, increments over an interval,
+and a mount with a mode along each axis: 40 recordings of a minute at 25 Hz, or as many
+as are asked for. Printed is how often that is named and something false is said, how
+numbers scatter in their own standard deviations, and how stretches that were left out
+are predicted. `--lag` puts a low-pass of that time
 constant on the gyroscopes of all others besides, and `--jitter` makes the stamps of
-samples be off by so much, one sigma, which the catalogue lacks.
+samples be off by so much, one sigma.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ def main() -> None:
         seconds += time.process_time() - start
         usual = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
         usual |= {"bandwidth"} if lag and one.kind != "bandwidth" else set()
+        usual |= {"stamp_error"} if jitter and one.kind != "stamp_error" else set()
         effects = {d.id for d in found.differences} - usual
         named += one.kind in effects
         false += bool(effects - {one.kind})

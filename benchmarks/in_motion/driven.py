@@ -65,10 +65,51 @@ class Drive:
 def low_passed(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
     """A channel triad after a first-order low-pass: Simpson's rule over its past."""
     ages = np.linspace(0.0, 16.0, 65)
-    weights = np.exp(-ages) * np.where(np.arange(65) % 2, 4.0, 2.0)
+    return _over_the_past(drive, t, arm, gyro, tau * ages, np.exp(-ages))
+
+
+def butterworth(drive: Drive, t: Any, arm: Any, tau: float, gyro: bool) -> Any:
+    """The same after a Butterworth low-pass of second order."""
+    ages = np.linspace(0.0, 24.0, 121)
+    ring = np.exp(-ages / np.sqrt(2)) * np.sin(ages / np.sqrt(2))
+    return _over_the_past(drive, t, arm, gyro, tau * ages, ring)
+
+
+def on_a_mount(drive: Drive, t: Any, arm: Any, compliance: Any) -> Any:
+    """Force on a structure with a mode along each axis: 1 / (2 pi hz)^2, in s^2."""
+    damping = 0.1
+    ages = np.linspace(0.0, 10.0 / damping, 401)
+    ring = np.sqrt(1 - damping**2)
+    weights = (1 - 2 * damping**2) / ring * np.sin(ring * ages)
+    weights = np.exp(-damping * ages) * (weights + 2 * damping * np.cos(ring * ages))
+    out = drive.force(t, arm)
+    for i, b in enumerate(compliance):
+        if b:
+            past = _over_the_past(drive, t, arm, False, np.sqrt(b) * ages, weights)
+            out[:, i] = past[:, i]
+    return out
+
+
+def incremented(drive: Drive, t: Any, arm: Any, seconds: float) -> Any:
+    """Force and rate as increments from t on, of velocity in the axes then."""
+    from scipy.spatial.transform import Rotation
+
+    start, parts = drive.axes(t), 16
+    force = np.zeros((len(t), 3))
+    for k in range(parts):
+        now = t + (k + 0.5) / parts * seconds
+        back = start @ np.swapaxes(drive.axes(now), 1, 2)
+        force += (back @ drive.force(now, arm)[:, :, None])[:, :, 0] / parts
+    turned = start @ np.swapaxes(drive.axes(t + seconds), 1, 2)
+    return force, Rotation.from_matrix(turned).as_rotvec() / seconds
+
+
+def _over_the_past(
+    drive: Drive, t: Any, arm: Any, gyro: bool, ages: Any, weights: Any
+) -> Any:
+    weights = weights * np.where(np.arange(len(ages)) % 2, 4.0, 2.0)
     weights[[0, -1]] /= 2.0
-    seen = (drive.rate(t - tau * a) if gyro else drive.force(t - tau * a, arm)
-            for a in ages)  # fmt: skip
+    seen = (drive.rate(t - a) if gyro else drive.force(t - a, arm) for a in ages)
     total = sum(w * one for w, one in zip(weights, seen, strict=True))
     return total / weights.sum()
 
@@ -96,8 +137,9 @@ def recorded(
 
     `device` may have "start" (s of the motion), "clock" (delay s and rate), "turn" (R),
     "arm", "bias", "matrix_acc", "matrix_gyr", "g" (3, 3), "late" of the gyroscopes,
-    "lag" (time constants of both triads), "cubic" (3,), "noise", "jitter" (s by which
-    stamps are off, one sigma) and "seed".
+    "lag" or "second" (time constants of both triads, of first or second order), "cubic"
+    (3,), "interval" (s of increments), "compliance" (3,) of a mount, "noise", "jitter"
+    (s by which stamps are off, one sigma) and "seed".
     """
     rng = np.random.default_rng(device.get("seed", 0))
     n = int(seconds * hz)
@@ -108,9 +150,15 @@ def recorded(
     turn = np.asarray(device.get("turn", np.eye(3)), float)
     late, lags = device.get("late", 0.0), device.get("lag", (0.0, 0.0))
     arm = turn.T @ arm
-    f = low_passed(drive, t, arm, lags[0], False) if lags[0] else drive.force(t, arm)
-    g = t - late
-    w = low_passed(drive, g, arm, lags[1], True) if lags[1] else drive.rate(g)
+    second = device.get("second", (0.0, 0.0))
+    f, w = drive.force(t, arm), drive.rate(t - late)
+    for passes, (acc, gyr) in ((low_passed, lags), (butterworth, second)):
+        f = passes(drive, t, arm, acc, False) if acc else f
+        w = passes(drive, t - late, arm, gyr, True) if gyr else w
+    if interval := device.get("interval", 0.0):
+        f, w = incremented(drive, t, arm, interval)
+    if "compliance" in device:
+        f = on_a_mount(drive, t, arm, device["compliance"])
     f, w = f @ turn.T, w @ turn.T
     acc = f @ np.asarray(device.get("matrix_acc", np.eye(3))).T
     acc = acc + f**3 * device.get("cubic", np.zeros(3))

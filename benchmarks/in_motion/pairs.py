@@ -17,7 +17,10 @@ from fieldcal.session import description
 
 SECONDS, HZ = 60.0, 25.0
 WHITE = np.repeat([0.02, 1e-3], 3)
-KINDS = ("", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth")
+KINDS = (
+    "", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth",
+    "second_order", "stamp_error", "increments", "flexible_mount",
+)  # fmt: skip
 ABOUT = description.parse({"format": 1})
 
 
@@ -65,6 +68,8 @@ def drawn(number: int, seed: int, lag: float = 0.0, jitter: float = 0.0) -> Draw
         "lag": (0.0, lag),
         "jitter": jitter,
     }
+    if kind == "flexible_mount":  # its modes lie along the body's axes
+        device["turn"] = np.eye(3)
     truth = {
         (f"{part}_{name}", axis): float(values[3 * i + j] + offset)
         for name, values, offset in (("bias", bias, 0.0), ("scale", scale, 1.0))
@@ -95,6 +100,20 @@ def _effect(
         taus[rng.integers(2)] *= rng.integers(2)
         device["lag"] = tuple(taus.tolist())
         return taus, ["acc", "gyr"]
+    if kind == "second_order":
+        taus = rng.uniform(0.016, 0.04, 2)
+        taus[rng.integers(2)] *= rng.integers(2)
+        device["second"] = tuple(taus.tolist())
+        return taus, ["acc", "gyr"]
+    if kind == "stamp_error":
+        device["jitter"] = float(rng.uniform(0.002, 0.006))
+        return np.ones(1), ["share"]
+    if kind == "increments":
+        device["interval"] = float(rng.uniform(0.003, 0.01))
+        return np.array([device["interval"] / 2]), ["sculling"]
+    if kind == "flexible_mount":
+        device["compliance"] = (2 * np.pi * rng.uniform(10, 20, 3)) ** -2
+        return device["compliance"], ["x", "y", "z"]
     size = 0.1 if kind == "lever_arm" else 3e-5
     values = rng.normal(0, size, 3)
     device["arm" if kind == "lever_arm" else "cubic"] = values

@@ -32,6 +32,7 @@ class Bandwidth(Sensor):
     """Time constants of the accelerometers and of the gyroscopes."""
 
     params = (Param("acc", "s", 0.03), Param("gyr", "s", 0.03))
+    while_moving = True
     covariate = "how fast specific force and rate change"
     decided_by = "a quicker motion"
     cure = (

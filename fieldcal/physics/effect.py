@@ -90,6 +90,9 @@ class Effect(ABC):
     like_calibration: ClassVar[bool] = False
     """Whether bias and scale factor do the same, so that it is only ever possible."""
 
+    while_moving: ClassVar[bool] = False
+    """Whether it shows only where a reference follows the motion moment by moment."""
+
     usual: ClassVar[bool] = False
     """Whether every triad has it until it is calibrated: who has one has the others."""
 

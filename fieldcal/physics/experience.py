@@ -37,6 +37,10 @@ class Experience:
     w_dot : (n, 3) rad/s^2, angular acceleration in device axes
     slope : (n, 6) m/s^3 and rad/s^2, by how much less f and w are followed for each
         second of a time constant; 0 where that is not known
+    bend : (n, 6) the same of a low-pass of second order
+    missed : (n, 6) m/s^2 and rad/s, by how much f and w change in the time that stamps
+        are off the even times of the samples; 0 where that is not known
+    f_bend : (n, 3) m/s^4, second derivative of f; 0 where that is not known
     t : (n,) s, device time
     lasts : (n,) s, what each row is a mean over; 0 for samples
     since_start : (n,) s since the session's start
@@ -65,6 +69,9 @@ class Experience:
     w: Array
     w_dot: Array
     slope: Array
+    bend: Array
+    missed: Array
+    f_bend: Array
     t: Array
     lasts: Array
     since_start: Array
@@ -105,6 +112,9 @@ class Experience:
             "w": known.get("rate", np.zeros((n, 3))) @ known.get("mounting", np.eye(3)),
             "w_dot": np.zeros((n, 3)),
             "slope": np.zeros((n, 6)),
+            "bend": np.zeros((n, 6)),
+            "missed": np.zeros((n, 6)),
+            "f_bend": np.zeros((n, 3)),
             "t": np.arange(n, dtype=float),
             "lasts": np.zeros(n),
             "since_start": np.arange(n, dtype=float),

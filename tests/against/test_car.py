@@ -40,7 +40,8 @@ def test_a_phone_in_a_car_against_the_car(shared: Path, tmp_path: Path) -> None:
     found = json.loads((phone / "against.json").read_text())
     where = found["alignment"]
     delay = where["delay"]["value"] + EPOCH
-    assert abs(delay) < 0.1 and 0 < where["delay"]["sigma"] < 0.02
+    assert 0 < where["delay"]["sigma"] < 0.02
+    assert abs(delay + 0.041) < 0.008  # a filter that is not there would take 25 ms
     turn = where["turn"]  # the phone's z points down, its x forward
     for axis, wanted in (("x", 180.0), ("y", 0.0), ("z", 0.0)):
         told = turn[axis]

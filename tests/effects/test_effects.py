@@ -29,6 +29,9 @@ def experience() -> Experience:
         rate=rng.standard_normal((ROWS, 3)),
         w_dot=rng.standard_normal((ROWS, 3)),
         slope=rng.standard_normal((ROWS, 6)),
+        bend=rng.standard_normal((ROWS, 6)),
+        missed=rng.standard_normal((ROWS, 6)),
+        f_bend=rng.standard_normal((ROWS, 3)),
         since_turn=rng.uniform(0, 30, ROWS),
         warming=rng.standard_normal(ROWS),
         heating=rng.standard_normal(ROWS),
@@ -118,11 +121,13 @@ def test_what_lags_behind_the_motion_has_the_columns_of_its_lag() -> None:
             lag = effect.lag(one)
             if lag != Lag():
                 lagging.append((effect.id, effect.params[k].name))
-                late = np.hstack([lag.acc * X.slope[:, :3], lag.gyr * X.slope[:, 3:]])
+                first = [lag.acc * X.slope[:, :3], lag.gyr * X.slope[:, 3:]]
+                other = [lag.acc_second * X.bend[:, :3], lag.gyr_second * X.bend[:, 3:]]
+                late = np.hstack(first) + np.hstack(other) + lag.stamps * X.missed
                 late[:, 3:] += lag.delay * X.w_dot
                 np.testing.assert_allclose(columns(effect, X)[:, :, k], -late)
-    assert {EFFECTS[id_].unit(name) for id_, name in lagging} == {"s"}
-    assert len(lagging) >= 3
+    assert {EFFECTS[id_].unit(name) for id_, name in lagging} == {"s", "1"}
+    assert len(lagging) >= 6
 
 
 def test_tilt_and_offset_differ_once_both_joints_turn() -> None:

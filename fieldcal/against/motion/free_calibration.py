@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldcal.against.joint import differs
-from fieldcal.against.motion.following import Following, estimates
+from fieldcal.against.motion.fit import estimates
+from fieldcal.against.motion.following import Following
 from fieldcal.against.offsets import DETERMINED
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import Array, Index

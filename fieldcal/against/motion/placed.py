@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fieldcal.against.joint import differs
-from fieldcal.against.motion.following import Following, estimates
+from fieldcal.against.motion.fit import estimates
+from fieldcal.against.motion.following import Following
 from fieldcal.against.result import Aligned, Difference, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.against.motion.following import Following, estimates
+from fieldcal.against.motion.fit import estimates
+from fieldcal.against.motion.following import Following
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.result import Mismatch, Quantity

@@ -21,6 +21,7 @@ DCT-II, N. Ahmed et al. 1974; P. Whittle 1953 for the independence.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,10 +30,14 @@ from scipy.fft import dct, idct
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
-from fieldcal.model.rows.reference import FEWEST, GAP, Reference, Response
+from fieldcal.model.rows.reference import FEWEST, GAP, Reference
+from fieldcal.model.rows.response import Response
 from fieldcal.physics.experience import Experience
 
 TRIADS = (ACC, GYR)
+
+EVEN = 1e-6
+"""Part of the interval of samples by which rounding has stamps be off even times."""
 
 PARTS = 8
 """Parts of a recording, of whole stretches, that something may happen to."""
@@ -70,7 +75,8 @@ class MotionRows:
 
     Attributes
     ----------
-    t : (n, m) s, instants of the samples of each row
+    t : (n, m) s, stamps of the samples of each row
+    uneven : (n, m) s, by how much these are off the even times of their stretch
     y : (n, 6) their means, m/s^2 and rad/s; nan where a channel was not measured
     temperature : (n,) deg C; nan where unknown
     length : rows of each stretch
@@ -78,10 +84,12 @@ class MotionRows:
     reference : of the motion
     alignment : beside it
     acc, gyr : what each triad makes of the motion, as far as that is known
+    share : of `uneven` that is known to be the stamps' error
 
     """
 
     t: Array
+    uneven: Array
     y: Array
     temperature: Array
     length: int
@@ -90,6 +98,7 @@ class MotionRows:
     alignment: Alignment
     acc: Response
     gyr: Response
+    share: float = 0.0
 
     def __len__(self) -> int:
         return len(self.y)
@@ -152,7 +161,10 @@ class MotionRows:
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
             f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
-            slope=self._means_of(response.slower, response.late, 1),
+            slope=self._means_of(response.slope, response.late, 0),
+            bend=self._means_of(response.bend, response.late, 0),
+            missed=self._means_of(response.sensed, response.late, 1, self.uneven),
+            f_bend=self.motion(response, 2)[:, ACC],
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=warming,
             heating=np.gradient(warming, t), variance=np.zeros((n, 3)),
@@ -166,10 +178,19 @@ class MotionRows:
     def _turn(self) -> Array:
         return self.alignment.rotation.T
 
-    def _means_of(self, reference: Reference, late: float, order: int) -> Array:
-        """Means over the rows of a reference as it was, in device axes, (n, 6)."""
-        s = self.alignment.reference_time(self.t.ravel() - late)
-        means = reference.at(s, order).reshape(*self.t.shape, 6).mean(axis=1)
+    def _means_of(
+        self, reference: Reference, late: float, order: int, weight: Array | None = None
+    ) -> Array:
+        """Means over the rows of a reference as it was, in device axes, (n, 6).
+
+        `weight` (n, m) is what it is multiplied by at each sample.
+        """
+        taken = self.t - self.share * self.uneven
+        s = self.alignment.reference_time(taken.ravel() - late)
+        samples = reference.at(s, order).reshape(*self.t.shape, 6)
+        if weight is not None:
+            samples *= weight[:, :, None]
+        means = samples.mean(axis=1)
         return np.hstack([means[:, p] @ self._turn for p in TRIADS])  # (1)
 
 
@@ -218,6 +239,23 @@ def rows_in_motion(
     temperature = block.temperature[at].mean(axis=1)
     ideal = Response.of(reference)
     return MotionRows(
-        block.t[at], six[at].mean(axis=1), temperature, length,
+        block.t[at], _uneven(block.t, stretches).reshape(at.shape),
+        six[at].mean(axis=1), temperature, length,
         step * per_row, reference, alignment, ideal, ideal,
     )  # fmt: skip
+
+
+def _uneven(t: Array, stretches: Sequence[Index]) -> Array:
+    """By how much stamps are off a line through those of their stretch, (k,) s.
+
+    Samples of a stretch are counted, so what was lost in it makes it uneven.
+    """
+    off = [np.empty(0)]
+    for some in stretches:
+        if len(some):
+            count = np.arange(len(some)) - (len(some) - 1) / 2
+            stamps = t[some] - t[some].mean()
+            off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
+    out: Array = np.concatenate(off)
+    step = float(np.median(np.diff(t)))
+    return np.where(np.abs(out) > EVEN * step, out, 0.0)

@@ -92,7 +92,10 @@ class MotionSystem(System):
         change = self.dictionary.place.change
         for triad, x, known in ((ACC, acc, rows.acc), (GYR, gyr, rows.gyr)):
             out[:, triad] -= (
-                known.late * change[:, triad] + known.tau * x.slope[:, triad]
+                known.late * change[:, triad]
+                + known.tau * x.slope[:, triad]
+                + known.second * x.bend[:, triad]
+                + rows.share * x.missed[:, triad]
             )
         return out
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,7 +15,8 @@ from fieldcal.model.rows.motion import (
     frequencies,
     rows_in_motion,
 )
-from fieldcal.model.rows.reference import Reference, Response
+from fieldcal.model.rows.reference import Reference
+from fieldcal.model.rows.response import Response
 
 LENGTH, COUNT = 6, 4
 STILL = Alignment(0.0, 0.0, 0.0)
@@ -91,6 +94,33 @@ def test_the_motion_is_that_of_the_reference_where_the_recording_stands() -> Non
     change = (early - late) / (2 * step)
     slope = there.motion(there.acc, 1)
     np.testing.assert_allclose(slope, change / (1 + 1e-3), atol=2e-3)
+
+
+def test_what_stamps_miss_is_the_change_in_the_time_that_they_are_off_by() -> None:
+    even = np.arange(5.0, 30.0, 0.02)
+    off = np.random.default_rng(4).normal(0, 2e-3, len(even))
+    block = Block.of(even + off, course(even)[:, :3], course(even)[:, 3:])
+    there = rows_in_motion(block, reference(), STILL, 2, 2.0, 1.0)
+    stamped = there.motion(there.acc)
+    missed = there.experience(there.acc).missed
+    # samples are those of even times: less what the stamps miss, they agree
+    assert np.abs(there.y - stamped).max() > 2e-3
+    np.testing.assert_allclose(there.y, stamped - missed, atol=4e-4)
+    known = replace(there, share=1.0)
+    np.testing.assert_allclose(there.y, known.motion(known.acc), atol=4e-4)
+
+
+def test_even_stamps_miss_nothing() -> None:
+    there = rows(per_row=1)
+    assert not there.uneven.any() and not there.experience(there.acc).missed.any()
+
+
+def test_the_bend_of_force_is_its_second_derivative_in_the_axes_of_the_device() -> None:
+    turn = Rotation.from_rotvec([0.2, 0.5, -1.0]).as_matrix()
+    there = rows(Alignment(0.3, 0.0, 0.0, turn), per_row=1)
+    expected = -((0.7 + 0.1 * np.arange(3)) ** 2) * course(there.middles - 0.3)[:, :3]
+    found = there.experience(there.acc).f_bend
+    np.testing.assert_allclose(found, expected @ turn.T, atol=1e-3)
 
 
 def test_rows_end_at_gaps_of_recording_and_reference() -> None:

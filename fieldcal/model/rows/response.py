@@ -1,0 +1,123 @@
+"""What the sensors of a triad make of the motion of a reference.
+
+They are late by a delay, and follow with a low-pass of first and one of second order.
+Where a time constant is below the least that a motion of a body tells from a delay,
+the derivatives (5) and (6) of `fieldcal.model.rows.low_pass` are those at the least, L.
+What tells a time constant from a delay goes as its square in the first order and as its
+cube in the second. A step of the derivative from tau to tau' therefore leads to
+
+    tau |tau| + (|tau| + max(|tau|, L)) (tau' - tau)            squared             (1)
+    tau^3 + 3 max(|tau|, L)^2 (tau' - tau)                      cubed               (2)
+
+and what it is more than that is a delay: by tau, or sqrt(2) tau in the second order.
+Where no delay is free, that of the filter tells its time constant, and the step to tau'
+is right as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Self
+
+import numpy as np
+
+from fieldcal.model.rows.low_pass import (
+    ROOT2,
+    first_order,
+    first_order_slope,
+    second_order,
+    second_order_slope,
+)
+from fieldcal.model.rows.reference import Reference
+
+LEAST = 2e-3
+"""Time constant of first order that hardly a motion of a body tells from a delay, s."""
+
+LEAST_SECOND = 0.015
+"""The same of second order, s: what tells it from a delay is a part (w tau)^3 / 2 of a
+motion at w, 7e-4 of one at 1 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What the sensors of a triad make of the motion.
+
+    Attributes
+    ----------
+    late : s by which they are late
+    tau : time constant of the low-pass of first order, s
+    second : that of second order, s
+    sensed : the motion so followed
+    slope, bend : by how much less of it is followed for each second of either
+
+    """
+
+    late: float
+    tau: float
+    second: float
+    sensed: Reference
+    slope: Reference
+    bend: Reference
+
+    @classmethod
+    def of(
+        cls,
+        reference: Reference,
+        late: float = 0.0,
+        tau: float = 0.0,
+        second: float = 0.0,
+    ) -> Self:
+        """Of sensors that follow a reference."""
+        sensed = reference
+        if tau:
+            sensed = sensed.through(partial(first_order, tau=tau))
+        if second:
+            sensed = sensed.through(partial(second_order, tau=second))
+        slope = partial(first_order_slope, tau=max(abs(tau), LEAST))
+        bend = partial(second_order_slope, tau=max(abs(second), LEAST_SECOND))
+        return cls(
+            late, tau, second, sensed, sensed.through(slope), sensed.through(bend)
+        )
+
+    def towards(
+        self,
+        reference: Reference,
+        late: float,
+        tau: float,
+        second: float,
+        free: bool = True,
+    ) -> Self:
+        """What a step from here to a delay and time constants, s, comes to.
+
+        If a delay is `free`, a time constant is that of (1) or (2), or none, and of
+        what that is less the sensors are the later.
+        """
+        first, other = tau, second
+        if free:
+            first, other = self._first_towards(tau), self._second_towards(second)
+        late += tau - first + ROOT2 * (second - other)
+        if (first, other) == (self.tau, self.second):
+            return replace(self, late=late)
+        return self.of(reference, late, first, other)
+
+    def _first_towards(self, tau: float) -> float:
+        if not tau:
+            return 0.0
+        now = self.tau
+        square = now * abs(now) + (abs(now) + max(abs(now), LEAST)) * (tau - now)  # (1)
+        return float(np.sign(square) * np.sqrt(abs(square)))
+
+    def _second_towards(self, second: float) -> float:
+        if not second:
+            return 0.0
+        now = self.second
+        step = 3 * max(abs(now), LEAST_SECOND) ** 2 * (second - now)
+        return float(np.cbrt(now**3 + step))  # (2)
+
+    def apart(self, other: Self) -> float:
+        """How far the time constants of two are apart, in parts of the least."""
+        return max(
+            abs(self.tau - other.tau) / LEAST,
+            abs(self.second - other.second) / LEAST_SECOND,
+        )

@@ -1,0 +1,58 @@
+"""The accelerometers sit on a structure that vibrates with its first mode.
+
+    U'' / W^2 + 2 d U' / W + U = f + 2 d f' / W,    W = 1 / sqrt(b)
+
+of each accelerometer's noiseless output, with the damping d of the structure, which
+passes force as well. Solved by its response to an impulse,
+
+    U(t) = int_0^inf f(t - s) h(s) ds,
+    h(s) = W exp(-d W s) ((1 - 2 d^2) / r sin(r W s) + 2 d cos(r W s)),
+    r = sqrt(1 - d^2)
+
+by Simpson's rule until exp(-12) is left. b in s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.sim_device.effect import AXES, Example, Number, Range, SimulatedEffect
+
+LEFT, PER_RADIAN = 12.0, 6
+"""Exponent at which the past ends, and steps in a radian of the mode."""
+
+RINGS = Range("0.02 to 0.7", lambda v: 0.02 <= v <= 0.7)
+
+
+class SimulatedFlexibleMount(SimulatedEffect):
+    """Compliances of the axes, s^2, and the damping ratio of the structure."""
+
+    VECTOR = AXES
+    NUMBERS = {"damping": Number(0.05, RINGS)}
+    EXAMPLE = Example({"x": 3e-4, "y": 2e-4, "z": 4e-4}, in_motion=True)
+
+    def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
+        """Outputs (6, n) at t (n,) s as the structure passes them on."""
+        now = outputs(t)
+        for i, axis in enumerate(AXES):
+            if b := self.numbers.get(axis, 0.0):
+                now[i] = sum(
+                    share * outputs(t - np.sqrt(b) * age)[i]
+                    for age, share in self._past()
+                )
+        return now
+
+    def _past(self) -> list[tuple[float, float]]:
+        """Ages in radians of the mode, and their shares."""
+        d = self["damping"]
+        steps = 2 * int(PER_RADIAN * LEFT / d / 2)
+        ages = np.linspace(0.0, LEFT / d, steps + 1)
+        r = np.sqrt(1 - d**2)
+        sine = (1 - 2 * d**2) / r * np.sin(r * ages)
+        shares = np.exp(-d * ages) * (sine + 2 * d * np.cos(r * ages))
+        shares *= np.where(np.arange(steps + 1) % 2, 4.0, 2.0)
+        shares[[0, -1]] /= 2
+        return list(zip(ages.tolist(), (shares / shares.sum()).tolist(), strict=True))

@@ -107,7 +107,12 @@ EXPERIENCES = {
     "on a table": rows(rate=SPUN),
     "seeing the Earth": rows(base_rate=EARTH),
     "of unknown orientation": rows((2, 5)),
-    "followed in motion": rows(slope=RNG.standard_normal((ROWS, 6))),
+    "followed in motion": rows(
+        slope=RNG.standard_normal((ROWS, 6)),
+        bend=RNG.standard_normal((ROWS, 6)),
+        f_bend=RNG.standard_normal((ROWS, 3)),
+        missed=RNG.standard_normal((ROWS, 6)),
+    ),
 }
 COLUMNS = {name: Columns(x) for name, x in EXPERIENCES.items()}
 everywhere = pytest.mark.parametrize("one", COLUMNS.values(), ids=COLUMNS.keys())

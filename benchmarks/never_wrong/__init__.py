@@ -9,7 +9,7 @@ worse than its limit, is wrong, and so is a session that takes longer than `--li
 seconds of processor time. Limits are bounds on standard uncertainties, so a parameter
 may be off by more than its limit; the table has how many are, and how many the
 uncertainties lead one to expect. Session k of seed N is session 0 of seed N + k, so a
-campaign can be run in slices.
+campaign can be run in slices; one that is interrupted (ctrl-c) prints its table.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -126,27 +127,31 @@ def main() -> None:
     """Print what became of each mistake, and by which check it was caught."""
     options = Options.of(sys.argv[2:])
     rows: dict[str, list[Judged]] = defaultdict(list)
-    for seed in range(options.seed, options.seed + options.count):
-        rng = np.random.default_rng(seed)
-        bench, names = drawn(rng), mistakes(seed, rng, options.only)
-        bench = spoilt(bench, names, rng)
-        with tempfile.TemporaryDirectory() as where:
-            folder = Path(where) / "session"
-            write(folder, session(bench, names, rng))
-            one = judged(
-                folder, bench.truth, bench.grade, options.diagnose, options.limit
-            )
-        rows[names[0] if names else SOUND].append(one)
-        odd = one.wrong or one.over if one.go else not names
-        if odd or one.late or options.each:
-            what = "GO" if one.go else f"NO-GO ({one.caught}: {one.says})"
-            print(
-                f"seed {seed} {bench.places}, {', '.join(names) or SOUND}: {what},"
-                f" {one.off:.1f} σ ({one.worst}){', beyond a limit' * one.over}"
-                f" {one.verdict}",
-                flush=True,
-            )
+    with suppress(KeyboardInterrupt):  # a campaign that is stopped says what it found
+        for seed in range(options.seed, options.seed + options.count):
+            _try(seed, options, rows)
     _print(rows)
+
+
+def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
+    """One session, printed if it is not as it should be."""
+    rng = np.random.default_rng(seed)
+    bench, names = drawn(rng), mistakes(seed, rng, options.only)
+    bench = spoilt(bench, names, rng)
+    with tempfile.TemporaryDirectory() as where:
+        folder = Path(where) / "session"
+        write(folder, session(bench, names, rng))
+        one = judged(folder, bench.truth, bench.grade, options.diagnose, options.limit)
+    rows[names[0] if names else SOUND].append(one)
+    odd = one.wrong or one.over if one.go else not names
+    if odd or one.late or options.each:
+        what = "GO" if one.go else f"NO-GO ({one.caught}: {one.says})"
+        print(
+            f"seed {seed} {bench.places}, {', '.join(names) or SOUND}: {what},"
+            f" {one.off:.1f} σ ({one.worst}){', beyond a limit' * one.over}"
+            f" {one.verdict}",
+            flush=True,
+        )
 
 
 def _print(rows: dict[str, list[Judged]]) -> None:

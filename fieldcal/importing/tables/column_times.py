@@ -90,6 +90,11 @@ def is_clock_number(t: Array) -> bool:
 
     >>> is_clock_number(np.r_[142058:142060:0.5, 142100:142102:0.5])
     True
+
+    Such numbers leave out 40 at the end of each minute, where a count goes on evenly.
+
+    >>> is_clock_number(np.arange(0.0, 3100.0, 50.0))
+    False
     """
     t = t[np.isfinite(t)]
     begins = np.flatnonzero(np.diff(np.floor(t / 100)) > 0)
@@ -98,7 +103,8 @@ def is_clock_number(t: Array) -> bool:
     inside = (t % 100 < 60).all() and (np.floor(t / 100) % 100 < 60).all()
     ends = (t[begins] % 100, t[begins + 1] % 100)
     usual = float(np.median(np.diff(t)))
-    return bool(inside and usual > 0
+    left_out = float(np.median(np.diff(t)[begins])) - usual
+    return bool(inside and usual > 0 and left_out > 20
                 and (60 - ends[0] < NEAR * usual).all()
                 and (ends[1] < NEAR * usual).all())  # fmt: skip
 

@@ -380,6 +380,20 @@ def test_axes_without_a_name_beside_gyroscopes_are_asked_about(
     assert np.isnan(session.block.acc).all()
 
 
+def test_an_axis_that_rests_within_a_step_is_one_of_three(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At 256 counts in a g noise does not show on every axis."""
+    rng = np.random.default_rng(8)
+    counts = np.round([-1.2, 1.5, 254.0] + rng.normal(0, 0.1, (160, 3)))
+    assert [len(np.unique(axis)) for axis in counts.T] == [1, 2, 1]
+    rates = rng.normal(0, 1e-3, (160, 3))
+    log = np.column_stack([np.arange(160) / 50.0, counts, rates])
+    path = write(tmp_path, log, heading="t,tx,ty,tz,wx,wy,wz")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "whether tx ty tz are the accelerometers" in capsys.readouterr().err
+
+
 def test_words_for_nothing_are_missing_numbers(tmp_path: Path) -> None:
     rows = turned(8, 50.0)
     path = write(tmp_path, rows, heading="t,ax,ay,az,gx,gy,gz")

@@ -103,12 +103,17 @@ def directions(table: Array) -> list[Three]:
 
 
 def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
-    """Columns that move and may be three axes, beside those that are known."""
+    """Columns that move and may be three axes, beside those that are known.
+
+    An axis may rest within one step of its output, if its name says that it is one.
+    """
     if len(table) < FEWEST or table.shape[1] != len(names):
         return []
     without = {*known, *_growing(table)}
     free = [i for i in range(table.shape[1]) if i not in without]
-    return _threes([i for i in free if _moves(table[:, i])], names)
+    moving = [i for i in free if _moves(table[:, i])]
+    named = [three for three in _by_name(free, names) if {*three} & {*moving}]
+    return _threes(moving, names) or named
 
 
 def _growing(table: Array) -> list[int]:
@@ -143,18 +148,23 @@ def _named(known: Mapping[int, str], kind: str) -> Three | None:
 
 def _threes(free: Sequence[int], names: Sequence[str]) -> list[Three]:
     """Columns that may be three axes: by what their names share, or side by side."""
-    stems: dict[str, dict[str, int]] = {}
-    for i in free:
-        if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
-            stem = f"{matched.group(1)}|{matched.group(3)}"
-            stems.setdefault(stem, {})[matched.group(2)] = i
-    whole = [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
+    whole = _by_name(free, names)
     if whole and len({names[i] for i in free}) == len(free):
         return whole
     beside = zip(free, free[1:], free[2:], strict=False)
     side = [(a, b, c) for a, b, c in beside if c == a + 2]
     parted = len(free) % len(EACH) == 0 and len(side) == len(free) - len(EACH) + 1
     return side[:: len(EACH)] if parted else side
+
+
+def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
+    """Columns that are three axes by what their names share."""
+    stems: dict[str, dict[str, int]] = {}
+    for i in free:
+        if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
+            stem = f"{matched.group(1)}|{matched.group(3)}"
+            stems.setdefault(stem, {})[matched.group(2)] = i
+    return [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
 
 
 def _pair(

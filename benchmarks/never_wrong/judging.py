@@ -21,6 +21,7 @@ import tomlkit
 
 from benchmarks.never_wrong.mistakes import Written
 from fieldcal.cli import main
+from fieldcal.commands.help import INTERRUPTED
 
 WRONG = 5.0
 """Standard uncertainties from which a parameter is wrong."""
@@ -91,12 +92,21 @@ def write(folder: Path, written: Written) -> None:
 
 
 def said(words: list[str]) -> tuple[int, dict[str, Any], str, int]:
-    """Exit code, document, what stood on stderr, and warnings that leaked."""
+    """Exit code, document, what stood on stderr, and warnings that leaked.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the command was interrupted.
+
+    """
     out, err = io.StringIO(), io.StringIO()
     with warnings.catch_warnings(record=True) as leaked:
         warnings.simplefilter("always")
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = main(words)
+    if code == INTERRUPTED:
+        raise KeyboardInterrupt
     try:
         document = json.loads(out.getvalue())
     except ValueError:

@@ -19,7 +19,14 @@ from collections.abc import Callable
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.effect import AXES, Example, Number, Range, SimulatedEffect
+from fieldcal.sim_device.effect import (
+    AXES,
+    NOT_NEGATIVE,
+    Example,
+    Number,
+    Range,
+    SimulatedEffect,
+)
 
 LEFT, PER_RADIAN = 12.0, 6
 """Exponent at which the past ends, and steps in a radian of the mode."""
@@ -30,15 +37,16 @@ RINGS = Range("0.02 to 0.7", lambda v: 0.02 <= v <= 0.7)
 class SimulatedFlexibleMount(SimulatedEffect):
     """Compliances of the axes, s^2, and the damping ratio of the structure."""
 
-    VECTOR = AXES
-    NUMBERS = {"damping": Number(0.05, RINGS)}
+    NUMBERS = {axis: Number(0.0, NOT_NEGATIVE) for axis in AXES} | {
+        "damping": Number(0.05, RINGS)
+    }
     EXAMPLE = Example({"x": 3e-4, "y": 2e-4, "z": 4e-4}, in_motion=True)
 
     def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
         """Outputs (6, n) at t (n,) s as the structure passes them on."""
         now = outputs(t)
         for i, axis in enumerate(AXES):
-            if b := self.numbers.get(axis, 0.0):
+            if b := self[axis]:
                 now[i] = sum(
                     share * outputs(t - np.sqrt(b) * age)[i]
                     for age, share in self._past()

@@ -141,8 +141,13 @@ def lsb_of(values: Array) -> float:
     0.001
     """
     some = values[np.isfinite(values)]
-    some = some[:: max(1, len(some) // ENOUGH)]  # one rest may show two values alone
-    distinct = np.unique(some[some != 0.0])
+    # one rest may show two values alone
+    return _step_between(np.unique(some[:: max(1, len(some) // ENOUGH)]))
+
+
+def _step_between(shown: Array) -> float:
+    """Step of the grid of values that are shown, in order; 0 is not looked at."""
+    distinct = shown[shown != 0.0]
     gaps = np.diff(distinct)
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
     if len(gaps) < 2:
@@ -179,8 +184,8 @@ def grids_of(block: Block) -> Array:
 
 def _grids(triad: Array) -> Array:
     some = triad[:: max(1, len(triad) // ENOUGH)]
-    steps = np.array([lsb_of(axis) for axis in some.T])
     shown = [np.unique(axis[np.isfinite(axis)]) for axis in some.T]
+    steps = np.array([_step_between(values) for values in shown])
     few = np.array([0 < len(values) < FEW for values in shown])
     known = steps[steps > 0]
     if not len(known):

@@ -14,8 +14,6 @@ by Simpson's rule until exp(-12) is left. b in s^2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fieldcal.core.samples import Array
@@ -27,6 +25,7 @@ from fieldcal.sim_device.effect import (
     Range,
     SimulatedEffect,
 )
+from fieldcal.sim_device.impulse_response import Outputs, passed_on, past
 
 LEFT, PER_RADIAN = 12.0, 6
 """Exponent at which the past ends, and steps in a radian of the mode."""
@@ -42,25 +41,20 @@ class SimulatedFlexibleMount(SimulatedEffect):
     }
     EXAMPLE = Example({"x": 3e-4, "y": 2e-4, "z": 4e-4}, in_motion=True)
 
-    def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
+    def followed(self, outputs: Outputs, t: Array) -> Array:
         """Outputs (6, n) at t (n,) s as the structure passes them on."""
-        now = outputs(t)
+        steps = 2 * int(PER_RADIAN * LEFT / self["damping"] / 2)
+        now, by = outputs(t), past(self._response, LEFT / self["damping"], steps)
         for i, axis in enumerate(AXES):
             if b := self[axis]:
-                now[i] = sum(
-                    share * outputs(t - np.sqrt(b) * age)[i]
-                    for age, share in self._past()
-                )
+                rows = slice(i, i + 1)
+                now[rows] = passed_on(outputs, t, rows, float(np.sqrt(b)), by)
         return now
 
-    def _past(self) -> list[tuple[float, float]]:
-        """Ages in radians of the mode, and their shares."""
+    def _response(self, age: Array) -> Array:
+        """The response to an impulse at ages in radians of the mode, over W."""
         d = self["damping"]
-        steps = 2 * int(PER_RADIAN * LEFT / d / 2)
-        ages = np.linspace(0.0, LEFT / d, steps + 1)
         r = np.sqrt(1 - d**2)
-        sine = (1 - 2 * d**2) / r * np.sin(r * ages)
-        shares = np.exp(-d * ages) * (sine + 2 * d * np.cos(r * ages))
-        shares *= np.where(np.arange(steps + 1) % 2, 4.0, 2.0)
-        shares[[0, -1]] /= 2
-        return list(zip(ages.tolist(), (shares / shares.sum()).tolist(), strict=True))
+        sine = (1 - 2 * d**2) / r * np.sin(r * age)
+        ring: Array = np.exp(-d * age) * (sine + 2 * d * np.cos(r * age))
+        return ring

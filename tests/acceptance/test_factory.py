@@ -33,6 +33,15 @@ def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibra
     return solve(seen, tilt="none", factory=FactoryErrors(square))
 
 
+def plain_pulls(found: Calibration) -> list[Array]:
+    """Errors of biases and scale factors in their sigmas, of a perfect device."""
+    out = list[Array]()
+    for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
+        value, sigma = found.vector(group)
+        out.append((value - true) / sigma)
+    return out
+
+
 @pytest.mark.parametrize(
     ("square", "stated", "says"),
     [
@@ -80,9 +89,7 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
         seen = observe(FIVE, mean, sigma=1e-4)
         for square, pulls in ((5e-4, off), (0.0, plain)):
             result = solve(seen, tilt="none", factory=FactoryErrors(square))
-            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
-                value, sigma = result.vector(group)
-                pulls.append((value - true) / sigma)
+            pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
     assert np.sqrt(np.mean(np.square(plain))) > 3
 
@@ -102,9 +109,7 @@ def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
         seen = observe(FIVE, mean, sigma=1e-4)
         for left, pulls in ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain)):
             result = solve(seen, tilt="none", factory=left)
-            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
-                value, sigma = result.vector(group)
-                pulls.append((value - true) / sigma)
+            pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
     assert np.sqrt(np.mean(np.square(plain))) > 2
 
@@ -135,9 +140,7 @@ def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
             (FactoryErrors(), plain),
         ):
             result = solve(seen, tilt="none", factory=left)
-            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
-                value, sigma = result.vector(group)
-                pulls.append((value - true) / sigma)
+            pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
     assert np.sqrt(np.mean(np.square(plain))) > 2
 
@@ -246,8 +249,6 @@ def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
         for grade, pulls in (("consumer", off), ("tactical", plain)):
             left = limits.read(grade).factory
             result = solve(seen, tilt="none", factory=left)
-            for group, true in (("acc_bias", 0.0), ("acc_scale", 1.0)):
-                value, sigma = result.vector(group)
-                pulls.append((value - true) / sigma)
+            pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
     assert np.sqrt(np.mean(np.square(plain))) > 3

@@ -72,7 +72,7 @@ def _checks(
         yield Check("linearity", None, says)
     if left.hysteresis and "acc" in measured:
         says = (
-            "this relies on accelerometers in which a turn leaves 0 ±"
+            "this relies on accelerometers with a hysteresis of 0 ±"
             f" {1e3 * left.hysteresis / G0:.2g} mg, as usual for {of_grade}; each ±"
             " includes it"
         )

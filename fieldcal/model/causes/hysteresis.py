@@ -1,4 +1,4 @@
-"""What the last turn leaves in the biases of the accelerometers.
+"""Hysteresis of the accelerometers: what the last turn leaves in their biases.
 
     U_i += h_i clip((f_i - f_i,before) / g, -1, 1)
 
@@ -18,9 +18,6 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
 
-SWING = G0
-"""Change of the force from which all of it is left, m/s^2."""
-
 
 def hysteresis(table: ColumnTable, size: float) -> Group:
     """The columns of three accelerometers, of a known size, m/s^2."""
@@ -34,7 +31,7 @@ def hysteresis(table: ColumnTable, size: float) -> Group:
         last = np.where(planned, len(held), np.searchsorted(held, x.position))[reached]
         change = x.f[reached] - force[last - 1]
         for c in range(3):
-            out[reached, c, c] = np.nan_to_num(np.clip(change[:, c] / SWING, -1.0, 1.0))
+            out[reached, c, c] = np.nan_to_num(np.clip(change[:, c] / G0, -1.0, 1.0))
         return out
 
     at = table.add(General("hysteresis", columns), 3) + np.arange(3)

@@ -123,7 +123,7 @@ def averaged(
             row[some] = 1.0
         names = {cause.name for cause, _ in one.members}
         left = [group for group in unfitted if group.part not in names]
-        shift, wider = _with(one, pick, left) if left else (0.0, 0.0)
+        shift, wider = _left_out(one, pick, left) if left else (0.0, 0.0)
         means.append(pick @ one.state.estimate + shift)
         covs.append(pick @ one.state.inverse @ pick.T + wider)
     weight = np.array([w for _, w in sets])
@@ -134,7 +134,7 @@ def averaged(
     return mean, cov + (weight[:, None] * off).T @ off  # (1)
 
 
-def _with(one: Set, pick: Array, left: Sequence[Group]) -> tuple[Array, Array]:
+def _left_out(one: Set, pick: Array, left: Sequence[Group]) -> tuple[Array, Array]:
     """By how much a mean shifts and a covariance grows with what a set leaves out."""
     columns = np.concatenate([group.columns for group in left])
     typical = np.concatenate([group.typical for group in left])

@@ -1,0 +1,24 @@
+"""The grid that values lie on: counts written in decimals, and few values on none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.physics.recording import lsb_of
+
+
+@pytest.mark.parametrize("count", [1.33e-3, 2.39e-3, 5.98e-3, 7.5e-3, 9.3e-3])
+def test_counts_that_are_written_in_decimals_lie_on_those(count: float) -> None:
+    """Beyond two thousandths no two values are neighbours on them."""
+    rng = np.random.default_rng(3)
+    values = np.round(np.round(rng.normal(0, 0.2, 4000) / count) * count, 3)
+    assert lsb_of(values) == pytest.approx(1e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("many", [5, 6, 8, 12, 40])
+def test_few_values_that_lie_on_no_grid_show_none(many: int) -> None:
+    """Four gaps may be multiples of a step by chance, and of a part of it sooner."""
+    rng = np.random.default_rng(4)
+    shown = [lsb_of(rng.normal(size=many)) > 0 for _ in range(2000)]
+    assert np.mean(shown) < (0.03 if many == 5 else 0.006)

@@ -19,11 +19,13 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
+from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.held_out import HeldOut, in_question, turns_held_out
 from fieldcal.model.posterior.model_average import ModelAverage
+from fieldcal.model.posterior.on_the_way import remaining
 from fieldcal.model.posterior.probabilities import Posterior, Standing
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.posterior.time_constants import elsewhere
@@ -93,6 +95,14 @@ class Explanation:
         """Numbers over all sets that count."""
         around = elsewhere(self.inferred)
         return ModelAverage(self.posterior, around or [self.best.set])
+
+    @cached_property
+    def filters(self) -> tuple[Array, Array] | None:
+        """What the way between windows says of filters, as rows; None without it."""
+        groups = [g for g in self.dictionary.always if g.part == FILTERED]
+        if not groups:
+            return None
+        return remaining(self.best.set, self.inferred.turned, groups[0].columns)
 
     @cached_property
     def turns_held_out(self) -> Array:

@@ -14,6 +14,8 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.filtered_turns import FILTERED
+from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.search.selection import Search
@@ -44,6 +46,8 @@ class Recorded:
     since : (o, n) s since the turn
     source : the samples of turns that are to be followed
     shown : explanations of the recording
+    filters : rows of what filters of the sensors make of turns, as the accelerometers
+        show it on the way: (m, 2) by s^2 of each triad, and (m,)
     cut : m/s^2, 1 sigma, what each accelerometer's values may have lost in size where
         they were cut toward zero
 
@@ -53,6 +57,7 @@ class Recorded:
     since: Array
     source: RowSource | None = None
     shown: tuple[Shown, ...] = ()
+    filters: tuple[Array, Array] | None = None
     cut: tuple[float, ...] = ()
 
     def turning(self) -> Turning | None:
@@ -206,8 +211,7 @@ def estimated(
         recorded.rows, np.abs(nominal.scale), recorded.since, turning is not None,
         wanted, recorded.shown, recorded.cut,
     )  # fmt: skip
-    if wanted.lot is not None:
-        given.known = known_rows(given, wanted.lot, nominal)
+    given.known = _known(given, recorded, nominal)
     turns = None if turning is None else Turns(turning, given, False)
     fit = without_bad_windows(recorded.rows, given, nominal, turns)
     found, gram = fit.found, fit.gram
@@ -226,6 +230,17 @@ def estimated(
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
         tuple(wrong_angles(given, found, names, picked[at])),
     )  # fmt: skip
+
+
+def _known(given: Given, recorded: Recorded, nominal: State) -> KnownRows | None:
+    """What the lot and the way between the windows say of columns."""
+    lot, rows = given.wanted.lot, []
+    if lot is not None and (known := known_rows(given, lot, nominal)) is not None:
+        rows.append(known)
+    filters = [g.columns for g in given.always if g.part == FILTERED]
+    if filters and recorded.filters is not None and len(recorded.filters[1]):
+        rows.append(KnownRows(filters[0], *recorded.filters))
+    return KnownRows.joined(rows) if rows else None
 
 
 def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:

@@ -25,6 +25,7 @@ from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.causes.effect_causes import at_points, of_effects
+from fieldcal.model.causes.filtered_turns import filtered_turns
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.causes.random_causes import flicker_of_few, of_chance
 from fieldcal.model.causes.unknown_causes import of_no_effect
@@ -101,7 +102,7 @@ class Dictionary(ColumnTable):
         self.earth = self.attitude = -1
         self.always: list[Group] = [
             *self._calibration(), *self._gravity(), *self._unoriented_earth(),
-            *self._attitudes(), *self._speeds(), *self._alike(alike),
+            *self._attitudes(), *self._speeds(), *self._filters(), *self._alike(alike),
         ]  # fmt: skip
         self.free = np.array([self._is_free(p) for p in self.held])
         self._instability()
@@ -234,6 +235,11 @@ class Dictionary(ColumnTable):
         off = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
         wide = np.hypot(off, EARTH_RATE / 3**0.5) / known
         yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed=1.0)
+
+    def _filters(self) -> Iterator[Group]:
+        """What filters of the sensors make of turns."""
+        if self.turns and np.isin(self.observed, (3, 4, 5)).any():
+            yield filtered_turns(self)
 
     def _unoriented_earth(self) -> Iterator[Group]:
         """What the Earth may add wherever nobody knows the orientation.

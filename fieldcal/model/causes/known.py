@@ -7,6 +7,7 @@ They count as any other rows do, in the estimate and in the evidence of every se
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,3 +40,15 @@ class KnownRows:
             columns, np.linalg.solve(root, design[:, columns]),
             np.linalg.solve(root, off),
         )  # fmt: skip
+
+    @classmethod
+    def joined(cls, some: Sequence[KnownRows]) -> KnownRows:
+        """Rows of several, which are independent."""
+        columns = np.unique(np.concatenate([one.columns for one in some]))
+        design = []
+        for one in some:
+            part = np.zeros((len(one.off), len(columns)))
+            part[:, np.searchsorted(columns, one.columns)] = one.design
+            design.append(part)
+        off = np.concatenate([one.off for one in some])
+        return cls(columns, np.vstack(design), off)

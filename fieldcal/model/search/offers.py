@@ -203,7 +203,7 @@ class Offers(Sets):
         ):  # what a device has anyway, with next to no change from nominal: what one
             # cause does to all axes, or in time, looks like it
             some = slice(first, first := first + len(group.columns))
-            if group.in_step or not group.in_state:
+            if group.fixed is None and (group.in_step or not group.in_state):
                 small = wide.copy()
                 small[some] = group.sizes(float(priors.SIZES[0]))
                 state = Eliminated.of(rows, columns, small)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -133,3 +134,17 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     assert offer.member[1].shape == acc[1].shape
     taken = search.taken(search.evaluated((gyr,)), offer)
     assert abs(taken.score - offer.score) < 2 * SLACK
+
+
+def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> None:
+    """Gravity is known so well: held to nothing, it would make offers look better."""
+    plain = drawn()
+    d = copy(plain.dictionary)
+    d.always = [replace(g, in_state=False) for g in d.always]
+    search = Search(d, plain.gram)
+    nothing = search.evaluated(())
+    known = [g.columns for g in d.always if g.fixed is not None]
+    at = np.isin(nothing.state.columns, np.concatenate(known))
+    assert at.any()
+    for table in search.tables(nothing):
+        np.testing.assert_array_equal(table.state.sizes[at], nothing.state.sizes[at])

@@ -13,6 +13,7 @@ from fieldcal.diagnosis.explain import inference_of
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import turns_held_out
 from fieldcal.model.priors import SIZES
@@ -102,9 +103,10 @@ def recorded(*errors: SimulatedEffect) -> tuple[Block, list[HeldWindow]]:
     return simulate(device, windows, seed=3), windows
 
 
-@cache
-def ride(name: str) -> Ride:
-    block, windows = recorded(effect(name, ERRORS[name]))
+def followed(
+    block: Block, windows: list[HeldWindow]
+) -> tuple[Inference, Set, list[TurnRows]]:
+    """The inference of a ride, what windows say, and rows of turns about nominal."""
     places = [
         {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
         for (a, b), w in zip(PLACES, windows, strict=True)
@@ -120,6 +122,13 @@ def ride(name: str) -> Ride:
     known = Search(d, gram(linear, d, at_rest)).evaluated(())
     assert inference.turns is not None
     turns = inference.turns.linearised(inference.nominal, at_rest, linear, known)
+    return inference, known, turns
+
+
+@cache
+def ride(name: str) -> Ride:
+    inference, known, turns = followed(*recorded(effect(name, ERRORS[name])))
+    d = inference.dictionary
     group = next(c for c in d.causes if c.name == name).variants[0]
     assert group.effect is not None
     sizes = {
@@ -132,7 +141,7 @@ def ride(name: str) -> Ride:
         np.rad2deg(sizes.get(n, 0.0)) if deg else sizes.get(n, 0.0)
         for n, deg in zip(names, degrees, strict=True)
     ])  # fmt: skip
-    values = at_rest.copy()
+    values = np.zeros(d.width)
     values[group.columns] = true
     return Ride(inference, group, true, values, known, turns)
 
@@ -181,6 +190,33 @@ def test_about_the_true_state_there_is_nothing_left(name: str) -> None:
         predicted = turn.design @ one.values[turn.columns]
         size = np.linalg.norm(turn.closure)
         assert np.linalg.norm(turn.closure - predicted) < 1e-4 * size + 1e-6
+
+
+@pytest.mark.parametrize(("acc", "gyr"), [(0.03, 0.03), (0.0, 0.02), (0.02, 0.0)])
+def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
+    """A low-pass of first order has a variance of tau^2, and is late by tau.
+
+    It bends the turn about two axes alone, and the forces on the way everywhere. There
+    a filter of one triad is a delay first of all, whose own square is another column's.
+    """
+    low_pass = effect("bandwidth", {"acc": acc, "gyr": gyr})
+    inference, _, turns = followed(*recorded(low_pass))
+    d = inference.dictionary
+    filters = next(g for g in d.always if g.part == FILTERED)
+    values = np.zeros(d.width)
+    values[filters.columns] = acc**2, gyr**2
+    *one_axis, both = turns
+    off, predicted = both.closure, both.design @ values[both.columns]
+    size = float(np.linalg.norm(off))
+    np.testing.assert_allclose(predicted, off, atol=0.12 * size + 2e-6)
+    assert (size > 1e-5) == (gyr > 0)
+    for turn in one_axis:
+        assert np.abs(turn.closure).max() < 4e-6
+        assert np.abs(turn.design @ values[turn.columns]).max() < 4e-6
+    for turn in turns if acc == gyr else ():
+        predicted = turn.way_design @ values[turn.columns]
+        rest, seen = np.linalg.norm(turn.way - predicted), np.linalg.norm(turn.way)
+        assert seen > 25 and rest < 0.12 * seen + 1.4 * np.sqrt(len(turn.way))
 
 
 def test_information_of_closures_is_that_of_noise() -> None:

@@ -56,6 +56,10 @@ UNLIKELY = (5.0, 0.5)
 BESIDE = 10
 """Samples to either side that tell whether something shakes the device."""
 
+AROUND, CHANCE = 500, 1e-4
+"""Samples to either side whose tail is known, and how likely one of it may be to go as
+far: what shakes is no noise with a bell's tail, and rectified it has an exponential."""
+
 AT_ONCE = 1 << 16
 """Samples looked at together: an hour of them need not be in memory once more."""
 
@@ -122,7 +126,7 @@ class DecodeFault(Chain):
 
 def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Single samples that jump by more than the device can move, (n, 6)."""
-    n, edge, still = len(recording.block), BESIDE + 3, recording.still
+    n, edge, still = len(recording.block), AROUND + 3, recording.still
     out, moved = np.zeros((n, 6), dtype=bool), np.repeat(MOVED, 3)
     for first in range(0, n, AT_ONCE):
         some = slice(max(first - edge, 0), min(first + AT_ONCE + edge, n))
@@ -148,8 +152,30 @@ def _wild_in(block: Block, most: Array) -> NDArray[np.bool_]:
             np.clip(np.add.outer(rows, s), 0, len(six) - 1) for s in (steps, -steps)
         )
         usual = np.max([np.median(apart[near, c], axis=1) for near in sides], axis=0)
-        wild[rows, c] = apart[rows, c] > WILD * DEVIATION * usual
+        others = np.where(_touched(wild[:, c]), np.nan, apart[:, c])
+        tails = [_tail(others[max(r - AROUND, 0) : r + AROUND]) for r in rows]
+        least = np.maximum(WILD * DEVIATION * usual, tails)
+        wild[rows, c] = apart[rows, c] > least
     return wild
+
+
+def _touched(wild: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples that are wild, or depart from one beside them that is, (n,)."""
+    out: NDArray[np.bool_] = np.convolve(wild, np.ones(3), "same") > 0
+    return out
+
+
+def _tail(values: Array) -> float:
+    """What one of some values exceeds by `CHANCE`, if their tail is an exponential.
+
+    Its scale is that between the tenth and the hundredth of them that is largest.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return 0.0
+    tenth, hundredth = np.quantile(known, (0.9, 0.99))
+    scale = (hundredth - tenth) / np.log(10)
+    return float(hundredth + scale * np.log(len(values) / 100 / CHANCE))
 
 
 def _of_wild(

@@ -101,6 +101,39 @@ def test_what_shakes_a_device_is_no_wild_value() -> None:
     assert "decode_fault" not in told.ids
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
+    seed: int,
+) -> None:
+    """Its square is chi-squared: some samples of thousands go eleven times as far."""
+    about = description.parse(tables(TACTICAL))
+    ridden = ride(TACTICAL, seed=3)
+    block, rng = record(TACTICAL, ridden), np.random.default_rng(seed)
+    six = block.six
+    six[:, 1] -= 0.9 * rng.normal(size=len(six)) ** 2
+    assert "decode_fault" not in check(with_six(block, six), about).ids
+    lost = rng.choice(np.flatnonzero(ridden.held >= 0), 3, replace=False)
+    six[lost, 1] += 60.0
+    told = check(with_six(block, six), about)
+    assert "decode_fault" in told.ids
+    assert np.abs(told.block.acc[lost, 1] - six[lost, 1]).min() > 40.0
+
+
+def test_wild_values_that_come_often_are_found_among_each_other() -> None:
+    """Every thirtieth sample is one, so a tenth departs from those beside it."""
+    about = description.parse(tables(TACTICAL))
+    ridden = ride(TACTICAL, seed=3)
+    block = record(TACTICAL, ridden)
+    lost = np.flatnonzero(ridden.held >= 0)[10:-10:30]
+    six = block.six
+    six[lost, 2] += 70.0
+    told = check(with_six(block, six), about)
+    assert [f.values for i, f in told.faults if i == "decode_fault"] == [
+        {"channel": "az", "kind": "wild"}
+    ]
+    assert np.abs(told.block.acc[lost, 2] - block.acc[lost, 2]).max() < 1.0
+
+
 @pytest.mark.parametrize("push", [2.0, 90.0])
 def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
     """It moves the device; at rest 2 m/s^2 of one sample may as well be noise."""

@@ -121,21 +121,29 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
     """A fit settled with late gyroscopes, or with what only motion shows besides.
 
     What a filter does is linear about a filter like it and not about none. Of those
-    that explain something about none the likeliest is taken.
+    that explain something about none the likeliest is taken. They are settled beginning
+    with what explains most, until nothing is left for those that remain.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
     fit.settle(delays)
     best, most = fit, (nothing := fit.evidence(delays))
-    for member in every:
-        _, group = member
-        if group.effect is None or not group.effect.while_moving:
-            continue
-        if fit.evidence((*delays, member)) > nothing:
-            other = fit.apart()
-            other.settle((*delays, member))
-            if (evidence := other.evidence((*delays, member))) > most:
-                best, most = other, evidence
+    explains = {
+        i: evidence
+        for i, member in enumerate(every)
+        if member[1].effect is not None
+        and member[1].effect.while_moving
+        and (evidence := fit.evidence((*delays, member))) > nothing
+    }
+    remain = sorted(explains, key=lambda i: -explains[i])
+    while remain:
+        one, *remain = remain
+        other, members = fit.apart(), (*delays, every[one])
+        other.settle(members)
+        own = other.evidence(members)
+        if own > most:
+            best, most = other, own
+        remain = [i for i in remain if other.evidence((*members, every[i])) > own]
     return best
 
 

@@ -156,6 +156,9 @@ class MotionRows:
     def experience(self, response: Response) -> Experience:
         """The same as the inputs of effects."""
         v, n, t = self.motion(response), len(self), self.middles
+        missed: Array = np.zeros((n, 6))
+        if self.uneven.any():
+            missed = self._means_of(response.sensed, response.late, 1, self.uneven)
         warming = self.temperature - self.temperature[0]
         unknown = np.full(n, np.nan)
         return Experience(
@@ -163,7 +166,7 @@ class MotionRows:
             f=v[:, ACC], w=v[:, GYR], w_dot=self.motion(response, 1)[:, GYR],
             slope=self._means_of(response.slope, response.late, 0),
             bend=self._means_of(response.bend, response.late, 0),
-            missed=self._means_of(response.sensed, response.late, 1, self.uneven),
+            missed=missed,
             f_bend=self.motion(response, 2)[:, ACC],
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
             since_turn=np.full(n, np.inf), warming=warming,

@@ -18,7 +18,11 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.importing.files.gzip_stream import on_disk
-from fieldcal.importing.messages.mcap_messages import Decoders, messages
+from fieldcal.importing.messages.mcap_messages import (
+    Decoders,
+    QuietDecoders,
+    messages,
+)
 from fieldcal.importing.messages.ros_messages import (
     IMU,
     MANY,
@@ -115,11 +119,10 @@ class McapLog(Recording):
     ) -> Iterator[tuple[str, int, Any]]:
         """Topic, time of logging, ns, and contents of messages, in order of time."""
         from mcap.reader import make_reader
-        from mcap_ros2.decoder import DecoderFactory
 
         seen = 0
         with path.open("rb") as file:
-            decoders = [DecoderFactory()]
+            decoders: Any = [QuietDecoders()]  # as the reader wants them, by its shape
             reader = make_reader(file, validate_crcs=True, decoder_factories=decoders)
             try:
                 for _, channel, message, said in reader.iter_decoded_messages(

@@ -142,7 +142,8 @@ class ColumnReader:
                 if column is not None:
                     signed = wrapped(column) if kind in wanted.unsigned else column
                     sign = -1.0 if kind + "xyz"[i] in wanted.reversed else 1.0
-                    np.multiply(signed, sign * scale, out=table[i])
+                    with np.errstate(invalid="ignore"):  # of a nan that signals
+                        np.multiply(signed, sign * scale, out=table[i])
             return table.T
 
         acc = triad("a", wanted.acc_scale)

@@ -134,6 +134,23 @@ def test_an_empty_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         assert "none of the kind that they are called" in said
 
 
+def test_a_schema_that_is_damaged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The library prints its line; what is said is said once, with the file's name."""
+    path = tmp_path / "damaged.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        text = b"float64 x\n=\x1b[2J= y\n"
+        kind = writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", text)
+        topic = writer.register_channel("/imu", "cdr", kind)
+        writer.add_message(topic, 1, bytes(400), 1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    said = assert_refused("import", str(path), capsys=capsys)
+    assert "Error with" not in said and "\x1b[2J" not in said
+
+
 @pytest.mark.parametrize("spacing", [5e-14, 1e-9])
 def test_times_that_no_imu_has(
     tmp_path: Path, spacing: float, capsys: pytest.CaptureFixture[str]

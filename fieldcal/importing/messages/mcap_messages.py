@@ -8,6 +8,8 @@ costs no other. Source: MCAP format specification, mcap.dev.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -103,13 +105,30 @@ def _records(path: Path, damaged: Cut) -> Iterator[Any]:
 Decoder = Callable[[bytes], Any]
 
 
-class Decoders:
-    """Reads the contents of messages, each by its schema."""
+class QuietDecoders:
+    """What makes decoders of ROS 2 messages, for a reader of `mcap`.
+
+    The library prints a definition that it cannot read, and raises an error that says
+    the same; a reader needs the error.
+    """
 
     def __init__(self) -> None:
         from mcap_ros2.decoder import DecoderFactory
 
         self._factory = DecoderFactory()
+
+    def decoder_for(self, encoding: str, schema: Schema | None) -> Decoder | None:
+        """What decodes messages of a schema; None of those that nobody here knows."""
+        with redirect_stderr(StringIO()):
+            made: Decoder | None = self._factory.decoder_for(encoding, schema)
+        return made
+
+
+class Decoders:
+    """Reads the contents of messages, each by its schema."""
+
+    def __init__(self) -> None:
+        self._factory = QuietDecoders()
         self._known: dict[int, Decoder | None] = {}
 
     def read(self, said: DecodedMessage) -> Any:

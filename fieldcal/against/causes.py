@@ -11,7 +11,7 @@ from fieldcal.against.joint import Relation, apart, as_large, both, likeliest, w
 from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import Side
-from fieldcal.against.widened import Widened
+from fieldcal.against.widened import Widened, on_all_axes
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
@@ -77,8 +77,9 @@ def _relation(pairing: Pairing, key: str) -> tuple[Relation, float]:
 
 def _with(there: Widened, keys: Sequence[str]) -> Widened:
     """A session with some of its causes, and the numbers that it then has."""
-    kept = tuple(m for m in there.set.members if m[0].key in keys)
-    found = there.search.evaluated(kept, Search.sizes_of(there.set, kept))
+    some = tuple(m for m in there.set.members if m[0].key in keys)
+    kept = tuple(map(on_all_axes, some))
+    found = there.search.evaluated(kept, Search.sizes_of(there.set, some))
     return replace(there, set=found, told_from=reported(there.search, found))
 
 

@@ -113,11 +113,24 @@ def widened(
         if (more := _counterpart(own, cause, group, later)) is not None:
             every.append(more)
     values = np.pad(found.values, (0, own.dictionary.width - len(found.values)))
-    wanted = own.wanted(every) | (values != 0)
+    wanted = own.wanted([*every, *map(on_all_axes, every)]) | (values != 0)
     linear = own.system.linearised(found.state, wanted)
     search = Search(own.dictionary, own.gram_of(linear, values, wanted))
     there = search.evaluated(tuple(every), _start(found.best, every))
     return Widened(own, search, there, reported(search, there), linear, values)
+
+
+def on_all_axes(member: Member) -> Member:
+    """The same effect with all its parameters.
+
+    A device has it on every axis. On some alone it was found where the others are told
+    from bias and scale factor by nothing; these hold what they do.
+    """
+    cause, group = member
+    same = [*group.siblings(cause.variants), group]
+    if group.effect is None:
+        return member
+    return cause, max(same, key=lambda v: len(v.params))
 
 
 def _start(best: Set, every: Sequence[Member]) -> Sizes:

@@ -132,13 +132,25 @@ def _scales(path: Path, headers: Mapping[str, Any]) -> tuple[float, float]:
             f"{path}: does not say acc_1G, the counts in a g; export it with"
             " blackbox_decode and import the .csv with --acc-unit g --acc-lsb 2048"
         )
-    said = headers.get("gyro_scale", headers.get("gyro.scale", 1))
-    whole = int(said, 16) if isinstance(said, str) else int(said)
-    # a number is written as the bits of a float
-    gyr = struct.unpack("<f", struct.pack("<I", whole))[0] if whole > 1 else 1.0
+    gyr = _scale_of(path, headers.get("gyro_scale", headers.get("gyro.scale", 1)))
     gyr /= FINER if str(headers.get(FINE, "0")) not in ("0", "OFF") else 1
     is_rad = str(headers.get("Firmware type", "")) == MEANT
     return G0 / counts, gyr * 1e6 if is_rad else float(np.deg2rad(gyr))
+
+
+def _scale_of(path: Path, said: Any) -> float:
+    """What a header says of the gyroscopes' scale: 1, or the bits of a float."""
+    try:
+        whole = int(said, 16) if isinstance(said, str) else int(said)
+        scale = struct.unpack("<f", struct.pack("<I", whole))[0] if whole > 1 else 1.0
+    except (ValueError, TypeError, OverflowError, struct.error):
+        scale = np.nan
+    if not (np.isfinite(scale) and scale > 0):
+        raise InputError(
+            f"{path}: its header gyro_scale is {said!r}, which is no scale of a"
+            " gyroscope (0x3f800000 would be 1); copy it again from where it came"
+        )
+    return float(scale)
 
 
 def _block(rows: list[list[float]], scales: tuple[float, float]) -> Block:

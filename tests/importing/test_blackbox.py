@@ -44,6 +44,18 @@ def test_counts_become_si(
     np.testing.assert_allclose(got.gyr, table[:n, 2:5] * unit, rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "damaged", ["rx3f80P000", "0x3f8000001234", "0x7f800000", "0xbf800000", "0x7fc00000"]
+)
+def test_a_scale_that_is_none_is_refused(tmp_path: Path, damaged: str) -> None:
+    """No number, too many digits, infinite, negative, and none at all."""
+    path = tmp_path / "LOG.BFL"
+    top = header(1.0).replace(b"0x3f800000", damaged.encode())
+    path.write_bytes(top + frames(counts(1)))
+    with pytest.raises(InputError, match="LOG.BFL: its header gyro_scale is .* copy"):
+        flights(path)
+
+
 @pytest.mark.parametrize(("fine", "counts_in_deg"), [(0, 1), (1, 10)])
 def test_rates_of_high_resolution_are_tenths(
     tmp_path: Path, fine: int, counts_in_deg: int

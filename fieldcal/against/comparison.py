@@ -11,8 +11,9 @@ from fieldcal.against.facts import facts
 from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Match, verdict_of
 from fieldcal.against.side import Side, side
-from fieldcal.against.wording import paragraph
+from fieldcal.against.wording import paragraph, undecided
 from fieldcal.core.samples import CHANNELS, Block
+from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 
 
@@ -48,10 +49,14 @@ def matched(real: Side, sim: Side) -> Match:
         *samples.lines_and_faults(real, sim),
         *samples.noise(real, sim),
     ]
-    differences = tuple(sorted(apart, key=lambda d: -d.probability))
+    apart.sort(key=lambda d: -d.probability)
+    differences = tuple(d for d in apart if d.probability >= thresholds.DIFFERS)
     verdict = verdict_of(differences)
     predicted = prediction.before(found), prediction.after(real)
-    warnings = (*_of(real), *_of(sim), *_quieted(sim), *_missing(found))
+    warnings = (
+        *_of(real), *_of(sim), *_quieted(sim), *_missing(found),
+        *map(undecided, apart[len(differences) :]),
+    )  # fmt: skip
     return Match(
         verdict,
         _probability(found, differences),

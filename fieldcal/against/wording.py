@@ -14,6 +14,7 @@ from fieldcal.calibration.wording import pretty
 from fieldcal.diagnosis.result import Quantity, Verdict
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
+from fieldcal.model import thresholds
 
 SHOWN = 3.0
 """Standard deviations from which a sentence names a parameter."""
@@ -87,6 +88,14 @@ def named(one: Difference) -> str:
             told.append(_said(name, one.direction, pair))
     name, sizes = one.id.replace("_", " "), f" ({', '.join(told)})" if told else ""
     return f"{name}{sizes}{_or_else(one)}"
+
+
+def undecided(one: Difference) -> str:
+    """What is likelier than not, and not likely enough to be called a difference."""
+    return (
+        f"{named(one)} may differ, with a probability of {one.probability:.2f}; from"
+        f" {thresholds.DIFFERS} on it counts as a difference. A longer recording would tell"
+    )
 
 
 def _or_else(one: Difference) -> str:

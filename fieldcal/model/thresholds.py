@@ -14,6 +14,11 @@ import math
 NAMED = 0.5
 """Probability from which an effect is reported."""
 
+DIFFERS = 0.9
+"""Probability from which two recordings are said to differ in something. Nothing needs
+a name there, as what a recording leaves unexplained does, and a gate must rarely be
+wrong."""
+
 SAME = 4.6
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100
 to 1, beyond which nobody would ask."""

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import strapdown
+from small_sessions import dictionary, ladder
 
 from fieldcal.against import Match, compare, matched
 from fieldcal.against.side import Side, side
+from fieldcal.against.widened import on_all_axes
 from fieldcal.core.samples import Array, Block
+from fieldcal.model import thresholds
 from fieldcal.session import description
 
 DEVICE: dict[str, Any] = {
@@ -85,6 +88,37 @@ def test_a_simulator_that_is_like_the_device_agrees(real: Side) -> None:
     assert found.verdict == "consistent" and not found.differences
     assert found.alike == ("cross_coupling",)
     assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+
+
+def test_what_is_not_likely_enough_is_no_difference_and_is_told(
+    real: Side, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    louder = {**DEVICE, "noise": {"acc": [0.0208] * 3, "gyr": [1e-3] * 3}}
+    sim = side("simulator", *played(louder, 2, LATER), real)
+    (sure,) = matched(real, sim).differences
+    assert sure.id == "noise" and sure.probability > 0.9
+    for asked, said in ((sure.probability, 1), (sure.probability + 1e-9, 0)):
+        monkeypatch.setattr(thresholds, "DIFFERS", asked)
+        found = matched(real, sim)
+        assert len(found.differences) == said
+        assert found.verdict == ("left_out" if said else "consistent")
+        told = [w for w in found.warnings if "may differ, with a probability of" in w]
+        assert len(told) == 1 - said
+        assert all(w.startswith("noise (ax ") for w in told)
+
+
+def test_numbers_of_an_effect_are_told_with_it_on_all_axes() -> None:
+    """Alone on one axis, the others are in the scale factor; a refined shape stays."""
+    d = dictionary(ladder())
+    cause = next(c for c in d.causes if c.name == "scale_asymmetry")
+    one = next(v for v in cause.variants if v.params == (1,))
+    assert on_all_axes((cause, one))[1].params == (0, 1, 2)
+    drift = next(c for c in d.causes if c.key == "settling:acc")
+    narrow = next(v for v in drift.variants if len(v.params) == 1)
+    whole = on_all_axes((drift, narrow))[1]
+    assert whole.params == (0, 1, 2) and whole.shape == narrow.shape
+    exact = replace(narrow, shape={"tau_s": 3.21})
+    assert on_all_axes((drift, exact))[1] is exact
 
 
 def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:

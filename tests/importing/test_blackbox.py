@@ -45,7 +45,8 @@ def test_counts_become_si(
 
 
 @pytest.mark.parametrize(
-    "damaged", ["rx3f80P000", "0x3f8000001234", "0x7f800000", "0xbf800000", "0x7fc00000"]
+    "damaged",
+    ["rx3f80P000", "0x3f8000001234", "0x7f800000", "0xbf800000", "0x7fc00000"],
 )
 def test_a_scale_that_is_none_is_refused(tmp_path: Path, damaged: str) -> None:
     """No number, too many digits, infinite, negative, and none at all."""

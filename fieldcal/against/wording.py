@@ -94,7 +94,8 @@ def undecided(one: Difference) -> str:
     """What is likelier than not, and not likely enough to be called a difference."""
     return (
         f"{named(one)} may differ, with a probability of {one.probability:.2f}; from"
-        f" {thresholds.DIFFERS} on it counts as a difference. A longer recording would tell"
+        f" {thresholds.DIFFERS} on it counts as a difference. A longer recording would"
+        " tell"
     )
 
 

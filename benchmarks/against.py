@@ -118,7 +118,8 @@ def outcomes(count: int, first: int) -> list[Outcome]:
         found = compare(real, sim)
         one = judged(relation, name, found, time.process_time() - start)
         out.append(one)
-        if one.false or not (one.named or one.aliased):
+        heard = one.named or one.aliased
+        if one.false or not heard or relation != "equal" and not one.directed:
             told = [(d.id, d.direction, d.aliases) for d in found.differences]
             print(f"{relation} {name} (seed {seed}): {told}", flush=True)
     return out

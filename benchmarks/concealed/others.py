@@ -21,7 +21,7 @@ CHAIN = (
     *("bump", "stuck", "quantisation", "saturation", "dropped", "clock_skew"),
     *("decode_fault", "noise_level", "mounting"),
 )
-SPECIAL = ("gravity_error", "earth_rate", "vibration_rectification")
+SPECIAL = ("gravity_error", "earth_rate", "bandwidth", "vibration_rectification")
 APART = (
     {"base_tilt", "angle_offset", "cross_coupling", "angle_scale"},
     {"quadratic", "scale_asymmetry", "cubic", "pendulous_products"},
@@ -86,6 +86,10 @@ def special(name: str, rng: np.random.Generator) -> Session:
         noise = replace(session.profile.noise, gyr=(gyr,) * 3)
         session = replace(session, profile=replace(session.profile, noise=noise))
         return replace(session, label=name, concealed={name: {}})
+    if name == "bandwidth":  # of which only turns with known ends tell
+        tau = float(rng.uniform(0.04, 0.1))
+        session = plain(rng, ("twelve", "wide"))
+        return replace(session.having({name: {"acc": tau, "gyr": tau}}), label=name)
     session = plain(rng)
     level = float(rng.uniform(0.3, 2.0))
     some = rng.random(len(session.windows)) < 0.5

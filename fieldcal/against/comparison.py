@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldcal.against import causes, offsets, prediction, samples
 from fieldcal.against.facts import facts
+from fieldcal.against.filters import filters
 from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Match, verdict_of
 from fieldcal.against.side import Side, side
@@ -46,6 +47,7 @@ def matched(real: Side, sim: Side) -> Match:
         *causes.differences(found),
         *offsets.differences(found),
         *offsets.earth(found),
+        *filters(found),
         *samples.lines_and_faults(real, sim),
         *samples.noise(real, sim),
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -122,14 +122,16 @@ class Explanation:
     @cached_property
     def earth(self) -> float:
         """By how much the Earth's rate of the model raises ln Z; 0 without it."""
-        always = self.dictionary.always
-        if not any(g.cause == "earth" for g in always):
+        groups = [g for g in self.dictionary.always if g.cause == "earth"]
+        return self.raised([c for g in groups for c in g.columns])
+
+    def raised(self, columns: Sequence[int]) -> float:
+        """By how much some columns raise ln Z."""
+        if not columns:
             return 0.0
-        rows = self.best.set.state.rows
-        at = np.concatenate([g.columns for g in always if g.cause == "earth"])
         found = self.best.set.state
-        kept = ~np.isin(found.columns, at)
-        less = type(found).of(rows, found.columns[kept], found.sizes[kept])
+        kept = ~np.isin(found.columns, columns)
+        less = type(found).of(found.rows, found.columns[kept], found.sizes[kept])
         return found.score - less.score
 
     @property

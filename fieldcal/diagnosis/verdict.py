@@ -17,6 +17,7 @@ from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
 from fieldcal.diagnosis.findings.calibrated import calibrated, with_effects
 from fieldcal.diagnosis.findings.candidates import candidates
 from fieldcal.diagnosis.findings.curves import curves
+from fieldcal.diagnosis.findings.filters import of_filters
 from fieldcal.diagnosis.findings.found_effects import Removed
 from fieldcal.diagnosis.findings.quality import (
     OF_TURNS,
@@ -127,6 +128,7 @@ def _effects(
     for one in explanation.standing:
         if one.name in catalogue():
             found.append(found_effects.of_rows(explanation, one, lost[one.name], then))
+    found += of_filters(explanation)
     if explanation.sees_earth:
         evidence = {"delta_chi2": 2 * explanation.earth}
         found.append(FoundEffect("earth_rate", {}, evidence=evidence))

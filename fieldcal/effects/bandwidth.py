@@ -5,8 +5,9 @@
 U, W outputs, f specific force and w angular rate, device axes; tau in s, of the
 accelerometers and of the gyroscopes, and the bandwidth is 1 / (2 pi tau), Hz. By
 tau the output is late as well, and only what goes as tau^2 tells it from a delay: the
-quicker the motion, the better. If negative, the simulator has the low-pass. Seen only
-where a reference follows the motion. Source: digital low-pass of the MPU-6000, register
+quicker the motion, the better. If negative, the simulator has the low-pass. Seen where
+a reference follows the motion, and in turns between known positions, which tell the
+square of tau. Source: digital low-pass of the MPU-6000, register
 map RM-MPU-6000A, CONFIG: 5 to 260 Hz.
 
 >>> import numpy as np

@@ -1,0 +1,53 @@
+"""Filters of the sensors that turns show, in one of two recordings or in both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fieldcal.against.causes import Decided
+from fieldcal.against.joint import differs
+from fieldcal.against.result import Difference, Direction, RealAndSimulated
+from fieldcal.against.widened import Widened
+from fieldcal.core.samples import Array
+from fieldcal.diagnosis.findings.filters import time_constants
+from fieldcal.diagnosis.result import Quantity
+from fieldcal.model import thresholds
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.filtered_turns import FILTERED
+
+DIRECTIONS: dict[tuple[bool, bool], Direction] = {
+    (True, False): "left_out", (False, True): "added", (True, True): "resized",
+}  # fmt: skip
+"""By whether the recording and the simulator have a filter."""
+
+
+def filters(found: Decided) -> Iterator[Difference]:
+    """The difference of two filters, by the variances of their impulse responses."""
+    groups = [_group(w) for w in (found.real, found.sim)]
+    if groups[0] is None or groups[1] is None:
+        return
+    (one, cov), (two, more) = (
+        w.estimate(g.columns[:2])
+        for w, g in zip((found.real, found.sim), groups, strict=True)
+        if g is not None
+    )
+    typical = groups[0].typical[:2]
+    probability = differs(one - two, cov + more, typical)
+    told = _told(one, cov), _told(two, more)
+    names = dict.fromkeys([*told[0], *told[1]])
+    if probability < thresholds.NAMED or not names:
+        return
+    direction = DIRECTIONS[bool(told[0]), bool(told[1])]
+    parameters = {n: RealAndSimulated.of(told[0].get(n), told[1].get(n)) for n in names}
+    yield Difference(FILTERED, direction, probability, parameters)
+
+
+def _told(square: Array, covariance: Array) -> dict[str, Quantity]:
+    return time_constants(square, np.sqrt(np.diag(covariance)))
+
+
+def _group(there: Widened) -> Group | None:
+    always = there.inference.dictionary.always
+    return next((g for g in always if g.part == FILTERED), None)

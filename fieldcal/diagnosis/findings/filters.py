@@ -1,0 +1,56 @@
+"""Filters of the sensors, as the turns between known positions show them.
+
+A turn shows the variance v of an impulse response, (1) of `filtered_turns`. A low-pass
+of first order with tau^2 = v has the same, so it is told as one: tau = sqrt(v), and its
+sigma is that of v over 2 tau.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.diagnosis.explain import Explanation
+from fieldcal.diagnosis.result import FoundEffect, Quantity
+from fieldcal.effects import catalogue
+from fieldcal.model import thresholds
+from fieldcal.model.causes.filtered_turns import FILTERED
+
+
+def of_filters(explanation: Explanation) -> Iterator[FoundEffect]:
+    """The filter that is likelier there than not, if there is one."""
+    groups = [g for g in explanation.dictionary.always if g.part == FILTERED]
+    for group in groups:
+        effect = catalogue()[FILTERED]
+        chance = effect.chance(explanation.dictionary.x)
+        rise = explanation.raised(group.columns.tolist())
+        odds = rise + np.log(chance) - np.log1p(-chance)
+        probability = float(1 / (1 + np.exp(-odds)))
+        state = explanation.best.set.state
+        at = [int(np.flatnonzero(state.columns == c)[0]) for c in group.columns[:2]]
+        sigma = np.sqrt(np.diag(state.inverse)[at])
+        found = time_constants(state.estimate[at], sigma)
+        if probability >= thresholds.NAMED and found:
+            evidence = {"log_evidence": rise}
+            yield FoundEffect(
+                FILTERED, found, evidence=evidence, probability=probability
+            )
+
+
+def time_constants(square: Array, sigma: Array) -> dict[str, Quantity]:
+    """Of the triads whose impulse response is clearly no pulse.
+
+    Parameters
+    ----------
+    square, sigma : (2,) v of accelerometers and gyroscopes, s^2
+
+    """
+    out = {}
+    params = catalogue()[FILTERED].params
+    for param, v, s in zip(params, square.tolist(), sigma.tolist(), strict=True):
+        if v > thresholds.STANDS_OUT * s:
+            tau = v**0.5
+            out[param.name] = Quantity(tau, s / (2 * tau), param.unit)
+    return out

@@ -86,6 +86,7 @@ class RowSource:
     left : (p, 6) variance that a swaying base leaves of each window's mean, SI squared
     white : (6,) deviation of one sample on such a base, where what is slow of the noise
         was taken out with what swayed
+    unsure_gravity : m/s^2, standard deviation of what swaying takes from gravity
 
     """
 
@@ -97,6 +98,7 @@ class RowSource:
     pace: float = 1.0
     left: Array | None = None
     white: Array | None = None
+    unsure_gravity: float = 0.0
 
     @property
     def whole(self) -> RowSource:
@@ -216,7 +218,7 @@ def _experience(
         transport=about.under_way.rate,
         mounting=about.mounting,
         latitude=about.latitude,
-        gravity_sigma=gravity_sigma(about),
+        gravity_sigma=float(np.hypot(gravity_sigma(about), source.unsure_gravity)),
         **known_attitudes(about, position),
     )
     free = ~x.oriented & ~x.rate.any(axis=1)

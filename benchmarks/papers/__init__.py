@@ -1,10 +1,11 @@
 """The figures of the 2023 paper, and what follows from them.
 
-    python -m benchmarks papers
+    python -m benchmarks papers [DEVICES]
 
 Tables 1 to 3, 5 and 6 of V. Avrutov, D. Pozniak, Calibration of the inertial
 measurement unit in critical conditions, 2023, as printed; they lie beside the project
-and are not part of it. Table 4 is a copy of table 1.
+and are not part of it. Table 4 is a copy of table 1. Then what the papers leave to
+others: a base that sways, DEVICES simulated ones a row (`sway`).
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._words import how_many
 from benchmarks.injected.recorded import REAL
 from benchmarks.joint import OFFSET, SIGMA, G, bound, observed
+from benchmarks.papers.sway import through_sway
 from fieldcal.core.positions import FIVE, TWO
 from fieldcal.core.samples import Array
 from fieldcal.solve.closed_form import two_position
@@ -135,10 +138,11 @@ def starts(tables: Tables) -> None:
 
 def main() -> None:
     """Print the tables."""
-    if not TABLES.is_file():
+    if TABLES.is_file():
+        tables = tomllib.loads(TABLES.read_text(encoding="utf-8"))
+        two_positions(tables)
+        five_positions(tables)
+        starts(tables)
+    else:
         print(f"the paper's tables are not here: {'/'.join(TABLES.parts[-3:])}")
-        return
-    tables = tomllib.loads(TABLES.read_text(encoding="utf-8"))
-    two_positions(tables)
-    five_positions(tables)
-    starts(tables)
+    through_sway(how_many(2))

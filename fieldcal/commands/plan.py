@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed, show_spins
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.factory import FACTORY
@@ -28,6 +29,7 @@ EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
   fieldcal plan --set five
   fieldcal plan --noise-of bench-7/overnight
+  fieldcal plan --speed 20 --positions 6 --minutes 10
   fieldcal run plan.toml --device "serial:/dev/ttyUSB0?format=witmotion"
 """
 
@@ -37,13 +39,21 @@ TURN = 10.0
 SHORTEST, LONGEST = 10.0, 60.0
 """Averaging times worth planning for, s: noise below, disturbances and drift above."""
 
+POSITIONS = 5
+"""Positions unless another number is asked for."""
+
 PAPER = "the paper's five"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    add("--positions", type=int, default=5, metavar="N", help="how many (default: 5)")
+    add(
+        "--positions",
+        type=int,
+        metavar="N",
+        help="how many (default: 5; 6 with --speed)",
+    )
     add("--minutes", type=float, default=5.0, help="time for all (default: 5)")
     add("--alpha", type=float, default=45.0, metavar="DEG", help="limit (default: 45)")
     add("--beta", type=float, default=5.0, metavar="DEG", help="limit (default: 5)")
@@ -67,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the plan for fieldcal run",
     )
     add("--json", action="store_true", help="print one JSON object")
+    add_speed(parser)
     add_site(parser)
 
 
@@ -81,13 +92,14 @@ def run(args: argparse.Namespace) -> int:
 
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
     gravity = description.parse(tables).gravity
+    if args.speed is not None:
+        return _spins(args)
     if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
         raise PlanError("limits are 0 to 180° for α and 0 to 90° for β")
     ladder = planner.Ladder(*np.deg2rad([args.alpha, args.beta]).tolist())
+    many = POSITIONS if args.positions is None else args.positions
     chosen = (
-        SETS[args.set]
-        if args.set
-        else planner.best_positions(args.positions, ladder, gravity)
+        SETS[args.set] if args.set else planner.best_positions(many, ladder, gravity)
     )
     seconds = _seconds(args.minutes, len(chosen))
     device = _device(args.noise_of) if args.noise_of else None
@@ -113,6 +125,18 @@ def run(args: argparse.Namespace) -> int:
     if args.output:
         sys.stdout.write(f"written: {args.output}\n")
     return 0
+
+
+def _spins(args: argparse.Namespace) -> int:
+    """Plan windows on a table."""
+    from fieldcal.planning.planner import GRADES
+
+    windows = (SPINS if args.positions is None else args.positions) + RESTS
+    seconds = _seconds(args.minutes, windows)
+    device = _device(args.noise_of) if args.noise_of else None
+    grade = device.grade(seconds) if device else GRADES[args.noise]
+    noise = "this device" if device else args.noise
+    return show_spins(args, grade.gyr(seconds), seconds, noise)
 
 
 def _device(path: Path) -> DeviceNoise:

@@ -149,7 +149,7 @@ def reduce(source: RowSource) -> Rows:
         off = np.hypot(off, np.sqrt(source.left[out.x.position]))
     # the Earth turns a device of unknown orientation about any of its axes; one that
     # was never turned has it in its bias, and some gyroscopes show where it points
-    free = ~out.x.oriented & (len(held) > 1) & ~out.x.earth_seen
+    free = out.x.earth_unseen & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     return replace(out, common=off, alike=alike)

@@ -38,6 +38,9 @@ ANGLES = {
 DIGIT = 1e-4 / 12**0.5
 """Standard deviation of rounding to the last digit of tables 5 and 6, rad/s."""
 
+DOUBTED = -0.0416
+"""Of table 1, U_y0 after 30 s: a misprint or an outlier, as the errata say."""
+
 Tables = Mapping[str, Any]
 
 
@@ -100,6 +103,44 @@ def warming(middle: Array, mean: Array, sigma: Array) -> tuple[float, float]:
     return min(every)
 
 
+def noise_left(until_s: Array, errors: Array) -> float:
+    """What white noise leaves in the last of some means from the start, by their scatter.
+
+    Of the means of the stretches between, d s long and m of them, N^2 is the mean of
+    d (mean - whole)^2, and N / sqrt(T) is left after T.
+    """
+    _, each, _ = apart(until_s, errors)
+    lasts = np.diff(until_s, prepend=0.0)
+    whole = float(each @ lasts) / until_s[-1]
+    density = float(lasts @ (each - whole) ** 2) / (len(each) - 1)
+    return float(np.sqrt(density / until_s[-1]))
+
+
+def over_time(table: Mapping[str, Any]) -> dict[str, tuple[float, float, float]]:
+    """Errors of each parameter after the shortest and the longest time, and noise then.
+
+    Figures 4, 7 and 8 draw tables 1 and 3. The value that the errata doubt is left out.
+    """
+    until, out = np.array(table["averaging_s"], dtype=float), {}
+    for name, values in table.items():
+        if not name.startswith("d"):
+            continue
+        errors = np.array(values)
+        kept = ~np.isclose(errors, DOUBTED)
+        left = noise_left(until[kept], errors[kept])
+        out[name] = float(errors[0]), float(errors[-1]), left
+    return out
+
+
+def figures(tables: Tables) -> None:
+    """Figures 4, 7 and 8: the error after the longest time, and what of it is noise."""
+    print("\nfigures 4 (table 1), 7 and 8 (table 3): error after the shortest and the"
+          " longest time, and noise left then")  # fmt: skip
+    for table in ("table1", "table3"):
+        for name, (first, last, left_by) in over_time(tables[table]).items():
+            print(f"{table} {name:14}{first:10.5f}{last:10.5f}{left_by:10.5f}")
+
+
 def two_positions(tables: Tables) -> None:
     """Table 2 less table 1, 60 s, beside one degree of (15)."""
     print("table 2 - table 1, 60 s   measured  one degree, as (15) adds it")
@@ -142,6 +183,7 @@ def main() -> None:
         tables = tomllib.loads(TABLES.read_text(encoding="utf-8"))
         two_positions(tables)
         five_positions(tables)
+        figures(tables)
         starts(tables)
     else:
         print(f"the paper's tables are not here: {'/'.join(TABLES.parts[-3:])}")

@@ -104,7 +104,7 @@ def warming(middle: Array, mean: Array, sigma: Array) -> tuple[float, float]:
 
 
 def noise_left(until_s: Array, errors: Array) -> float:
-    """What white noise leaves in the last of some means from the start, by their scatter.
+    """What white noise leaves in the last of some means from the start.
 
     Of the means of the stretches between, d s long and m of them, N^2 is the mean of
     d (mean - whole)^2, and N / sqrt(T) is left after T.

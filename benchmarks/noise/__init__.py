@@ -34,7 +34,7 @@ from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.noise import estimate, reduced
 from fieldcal.noise.levels import CosineLevels
-from fieldcal.noise.likelihood import NoiseFit, Powers, fit
+from fieldcal.noise.likelihood import Flags, NoiseFit, Powers, fit
 from fieldcal.noise.measured import measured
 from fieldcal.noise.spectrum import CosineSpectrum
 
@@ -120,7 +120,7 @@ def beside_the_bound() -> None:
                   f"{np.std(pull):6.3f} {rmse[1]:15.3f}")  # fmt: skip
 
 
-def scored(variance: Array, freedom: Array, deviation: Array) -> tuple[Array, Array]:
+def scored(variance: Array, freedom: Array, deviation: Array) -> tuple[Array, Flags]:
     """Log density of log deviations, and whether 68 of 100 hold them."""
     from scipy.stats import chi2
 
@@ -130,7 +130,7 @@ def scored(variance: Array, freedom: Array, deviation: Array) -> tuple[Array, Ar
     return density, held
 
 
-Series = list[tuple[Array, Array]]
+Series = list[tuple[Array, Flags]]
 """Log scores and whether bands hold, (t,) each, of one channel after the other."""
 
 

@@ -114,14 +114,12 @@ def run(args: argparse.Namespace) -> int:
         _write(args.output, tables, chosen, seconds)
     if args.json:
         out = _json(chosen, seconds, found, confused, further, with_it)
-        if device:
-            out["averaging"] = device.to_json()
+        out["averaging"] = device.to_json() if device else grade.to_json()
         sys.stdout.write(json.dumps(out) + "\n")
         return 0
     _show(chosen, seconds, noise, grade, found, paper, with_it)
     _tell(confused, further)
-    if device:
-        sys.stdout.write(f"{device.sentence(seconds)}\n")
+    sys.stdout.write(f"{device.sentence(seconds) if device else _worth(grade)}\n")
     if args.output:
         sys.stdout.write(f"written: {args.output}\n")
     return 0
@@ -170,6 +168,15 @@ def _seconds(minutes: float, n: int) -> float:
             f" {n * (SHORTEST + TURN) / 60:.1f} min or take fewer positions"
         )
     return float(min(LONGEST, round(each)))
+
+
+def _worth(grade: Grade) -> str:
+    """How long a device of a grade is worth averaging."""
+    return (
+        f"flicker wins over white noise from {grade.acc_seconds:.0f} s"
+        f" (accelerometers) and {grade.gyr_seconds:.0f} s (gyroscopes): longer windows"
+        " gain little"
+    )
 
 
 def _write(

@@ -1,4 +1,4 @@
-"""Sessions whose set-up is the matter: what moves the base, and how attitudes are told."""
+"""Sessions of unusual set-ups: what moves the base, and how attitudes are told."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import PlanError
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import observe
+from fieldcal.evaluation.observations import observe, rests
+from fieldcal.evaluation.solution import solved
 from fieldcal.planning.table_speed import NAMES, expected_by_speed, spin_axes
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
@@ -23,8 +25,8 @@ RATE_HZ, WINDOW_S, NOISE, RESTS = 50.0, 40.0, 2e-3, 2
 SPEED, SPEED_SIGMA = np.deg2rad([20.0, 0.02])
 
 
-def solved(folder: Path, axes: Array, seed: int) -> Calibration:
-    """Estimate from a device that a table turned about some axes of it."""
+def turned(folder: Path, axes: Array, seed: int) -> Session:
+    """A device that a table turned about some axes of it."""
     rng = np.random.default_rng(seed)
     turns = [*(SPEED * axes), *np.zeros((RESTS, 3))]
     times, outputs, positions = [], [], []
@@ -40,19 +42,35 @@ def solved(folder: Path, axes: Array, seed: int) -> Calibration:
     six = np.vstack(outputs)
     six += rng.standard_normal(six.shape) * np.repeat([0.005, NOISE], 3)
     block = Block.of(np.concatenate(times), six[:, :3], six[:, 3:])
-    write_session(folder, block, positions)
-    return solve(observe(Session.open(folder))[0])
+    return Session.open(write_session(folder, block, positions))
 
 
+def by_means(session: Session) -> Calibration:
+    return solve(observe(session)[0])
+
+
+def by_rows(session: Session) -> Calibration:
+    perfect = {"squareness": 0.0, "quadratic": 0.0, "g_sensitivity": 0.0}
+    return solved(session, rests(session), left=perfect)
+
+
+@pytest.mark.parametrize(("estimate", "most"), [(by_means, 1.25), (by_rows, 1.6)])
 @pytest.mark.parametrize("spins", [6, 9])
-def test_the_estimate_is_as_uncertain_as_planned(tmp_path: Path, spins: int) -> None:
+def test_the_estimate_is_as_uncertain_as_planned(
+    tmp_path: Path,
+    spins: int,
+    estimate: Callable[[Session], Calibration],
+    most: float,
+) -> None:
     axes = spin_axes(spins)
-    found = solved(tmp_path, axes, spins)
+    found = estimate(turned(tmp_path, axes, spins))
     sigma = NOISE / np.sqrt(RATE_HZ * WINDOW_S)
     said = expected_by_speed(axes, SPEED, SPEED_SIGMA, sigma, RESTS)
     at = [found.names.index(name) for name in NAMES]
     stated = np.sqrt(np.diag(found.covariance))[at]
-    assert list(said.values()) == pytest.approx(stated.tolist(), rel=0.25)
+    # the estimate has scatter of the windows beside their noise, which few leave open
+    wider = stated / np.array(list(said.values()))
+    assert wider.min() > 0.95 and wider.max() < most
 
 
 def test_what_the_speed_is_off_by_is_off_in_every_scale_factor() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from session_folders import recorded, write_session
 
+from benchmarks.papers import sway as pier
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
@@ -24,6 +25,7 @@ from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve
+from fieldcal.windows.sway import waves_of
 
 FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 SECONDS, RATE = 30.0, 50.0
@@ -132,6 +134,27 @@ def test_it_calibrates_accelerometers_without_gyroscopes(tmp_path: Path) -> None
     said = " ".join(pair[0].warnings)
     assert "each position needs" in said and "turns or is pushed" in said
     assert "turns or is pushed" not in " ".join(pair[1].warnings)
+
+
+def test_a_part_of_a_slow_wave_is_no_drift() -> None:
+    """Of irregular waves of ten seconds, of which windows hold three."""
+    block, firm = pier.played(0, 0.1, 0.1), pier.played(0)
+    for held in (pier.held()[2], pier.held()[4]):
+        some = (block.t >= held.start) & (block.t < held.end)
+        t, six = block.t[some], block.six[some]
+        (found,) = waves_of(t, six, np.ones(3))
+        s = (t - t.mean()) / np.ptp(t) * 2
+        left = six - found.of(t) - firm.six[some]
+        assert np.abs(left[:, :3].T @ s / (s @ s)).max() < 1e-3
+
+
+def test_beating_waves_have_no_arm() -> None:
+    """One axis, and hardly any swaying in the middle of the window."""
+    waves = "sway:amplitude_deg=1,hz=0.1008,spread_hz=0.01008,phase_deg=97.12,"
+    block = played(100, f"{waves}azimuth_deg=7.375")
+    some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
+    (found,) = waves_of(block.t[some], block.six[some], np.ones(3))
+    assert np.abs(found.arm).max() < 3.0
 
 
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:

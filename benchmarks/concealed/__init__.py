@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from benchmarks._words import how_many, option
-from benchmarks.concealed import draws, others
+from benchmarks.concealed import draws, others, setups
 from benchmarks.concealed.judging import Outcome, judged
 from benchmarks.concealed.sessions import Session, plain
 from benchmarks.concealed.tables import printed
@@ -64,9 +64,12 @@ def kinds() -> Mapping[str, tuple[Draw, int]]:
     for name in catalogue():
         if name not in out and not kind(name).EXAMPLE.in_motion:
             out[name] = (lambda rng, n=name: others.example(n, rng), 3)  # type: ignore[misc]
-    out["pier"] = (others.pier, 3)
-    out["under way"] = (others.under_way, 3)
+    out["pier"] = (setups.pier, 3)
+    out["under way"] = (setups.under_way, 3)
     out["nothing, flicker"] = (others.flickering, 9)
+    out["pier, no gyroscopes"] = (setups.pier_by_force, 3)
+    out["nothing, speeds"] = (setups.table_of_known_speed, 3)
+    out["any attitude"] = (lambda rng: setups.any_attitude(rng, _sigmas(rng)), 3)
     return out
 
 

@@ -12,9 +12,8 @@ from benchmarks.concealed.draws import EQUATIONS, HOT, drawn, size, sized, suite
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import effects
-from fieldcal.sim_device.profile import FullScale, Identity
+from fieldcal.sim_device.profile import FullScale
 from fieldcal.sim_device.profile_file import from_tables
-from fieldcal.sim_device.vocabulary import effect
 
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
@@ -108,26 +107,6 @@ def special(name: str, rng: np.random.Generator) -> Session:
     return session.having({name: values | {"level": 0.0}})
 
 
-def pier(rng: np.random.Generator) -> Session:
-    """A base that sways irregularly about both level axes, as a ship at the pier."""
-    session = calm(plain(rng))
-    hz, azimuth = float(rng.uniform(0.1, 0.5)), float(rng.uniform(0, 180))
-    both = []
-    for turned in (0.0, 90.0):
-        values = {
-            "amplitude_deg": float(rng.uniform(0.4, 1.0)),
-            "hz": hz * float(rng.uniform(0.8, 1.2)),
-            "spread_hz": float(rng.choice([0.0, 0.1])) * hz,
-            "azimuth_deg": azimuth + turned,
-            "phase_deg": float(rng.uniform(0, 360)),
-        }
-        both.append(values)
-    one = session.profile
-    swaying = tuple(effect("sway", values) for values in both)
-    profile = replace(one, effects=(*one.effects, *swaying))
-    return replace(session, profile=profile, concealed={"sway": {}}, label="pier")
-
-
 def flickering(rng: np.random.Generator) -> Session:
     """Nothing concealed, on a device whose biases have flicker noise.
 
@@ -140,24 +119,6 @@ def flickering(rng: np.random.Generator) -> Session:
     noise = replace(one.noise, acc_flicker=(acc,) * 3, gyr_flicker=(gyr,) * 3)
     profile = replace(one, noise=noise)
     return replace(session, profile=profile, label="nothing, flicker")
-
-
-def under_way(rng: np.random.Generator) -> Session:
-    """Nothing concealed, on a base whose velocity over the Earth is said.
-
-    Of navigation grade: tactical grade knows no north, and finds Coriolis as a tilt.
-    """
-    session = calm(plain(rng))
-    one = session.profile
-    north, east = (float(v) for v in rng.uniform(-100, 100, 2))
-    profile = replace(
-        one,
-        site=replace(one.site, north_m_s=north, east_m_s=east),
-        noise=replace(one.noise, gyr=(10 ** rng.uniform(-4.5, -4),) * 3),
-        device=Identity(grade="navigation"),
-        effects=(),
-    )
-    return replace(session, profile=profile, label="nothing")
 
 
 def chain(name: str, rng: np.random.Generator) -> Session:

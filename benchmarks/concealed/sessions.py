@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description
@@ -64,7 +65,9 @@ class Session:
     place : name of the position set
     concealed : parameters by id, of what ought to be named
     angles : whether the diagnosis knows the angles
-    thermometer, host_clock : whether the samples have those columns
+    attitudes : whether angles are told as one finite turn each
+    speeds : whether of a rate table only the speed is known, and nothing where it rests
+    gyroscopes, thermometer, host_clock : whether the samples have those columns
     off : by how much the nominal calibration is off
     added : what no effect in the catalogue makes, added to the samples
     channel : where that shows
@@ -78,6 +81,9 @@ class Session:
     place: str
     concealed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     angles: bool = True
+    attitudes: bool = False
+    speeds: bool = False
+    gyroscopes: bool = True
     thermometer: bool = True
     host_clock: bool = False
     off: Array = field(default_factory=lambda: np.zeros(3))
@@ -102,24 +108,34 @@ class Session:
             host = 1e5 + block.t / self.profile.pace + late
         warmth = block.temperature if self.thermometer else unknown
         block = replace(block, temperature=warmth, seq=unknown, t_host=host)
+        if not self.gyroscopes:
+            block = replace(block, gyr=np.full_like(block.gyr, np.nan))
         for one in self.profile.effects:
             if arrival := one.arrival(np.random.default_rng(seed)):
                 block = _only(block, arrival(len(block)))
         return self.added(self, block) if self.added is not None else block
 
+    def _told(self, w: HeldWindow) -> dict[str, Any]:
+        """What session.toml says of a window."""
+        table: dict[str, Any] = {"start_s": w.start, "end_s": w.end}
+        if self.speeds:
+            speed = float(np.rad2deg(np.linalg.norm(w.rate)))
+            return table | ({"speed_deg_s": speed} if speed else {})
+        if self.attitudes:
+            turned = np.rad2deg(finite_turn(w.alpha, w.beta))
+            table["rotation_vector_deg"] = turned.tolist()
+        elif self.angles:
+            alpha, beta = np.rad2deg([w.alpha, w.beta])
+            table |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
+        if any(w.rate):
+            table["rate_deg_s"] = [float(r) for r in np.rad2deg(w.rate)]
+        return table
+
     @property
     def about(self) -> Description:
         """What session.toml says."""
         truth, off = self.profile.truth, self.off
-        positions = []
-        for w in self.windows:
-            table: dict[str, Any] = {"start_s": w.start, "end_s": w.end}
-            if self.angles:
-                alpha, beta = np.rad2deg([w.alpha, w.beta])
-                table |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
-            if any(w.rate):
-                table["rate_deg_s"] = [float(r) for r in np.rad2deg(w.rate)]
-            positions.append(table)
+        positions = [self._told(w) for w in self.windows]
         site = self.profile.site
         return description.parse(
             {
@@ -142,6 +158,13 @@ class Session:
                 "position": positions,
             }
         )
+
+
+def finite_turn(alpha: float, beta: float) -> Array:
+    """About z by alpha and then about the turned x by beta, as one turn, (3,) rad."""
+    about_z = Rotation.from_rotvec([0.0, 0.0, alpha])
+    both = about_z * Rotation.from_rotvec([beta, 0.0, 0.0])
+    return np.asarray(both.as_rotvec())
 
 
 def _only(block: Block, kept: NDArray[np.bool_]) -> Block:

@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.plan_file import chosen, table, write
+from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed, show_spins
 from fieldcal.commands.site import add_site, site_tables
-from fieldcal.core.errors import InputError, PlanError
+from fieldcal.core.errors import PlanError
 from fieldcal.core.factory import FACTORY
 
 if TYPE_CHECKING:
@@ -27,7 +29,9 @@ RARE = (
 EXAMPLE = """\
   fieldcal plan --noise tactical --positions 5 --minutes 5 -o plan.toml
   fieldcal plan --set five
+  fieldcal plan --of bench-7/2026-03-01 --sways 0.2
   fieldcal plan --noise-of bench-7/overnight
+  fieldcal plan --speed 20 --positions 6 --minutes 10
   fieldcal run plan.toml --device "serial:/dev/ttyUSB0?format=witmotion"
 """
 
@@ -43,7 +47,12 @@ PAPER = "the paper's five"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    add("--positions", type=int, default=5, metavar="N", help="how many (default: 5)")
+    add(
+        "--positions",
+        type=int,
+        metavar="N",
+        help="how many (default: 5; 6 with --speed)",
+    )
     add("--minutes", type=float, default=5.0, help="time for all (default: 5)")
     add("--alpha", type=float, default=45.0, metavar="DEG", help="limit (default: 45)")
     add("--beta", type=float, default=5.0, metavar="DEG", help="limit (default: 5)")
@@ -60,6 +69,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="evaluate a known set instead of choosing positions",
     )
     add(
+        "--of",
+        type=Path,
+        metavar="FILE",
+        help="evaluate the positions of a session or a plan",
+    )
+    add(
+        "--sways",
+        type=float,
+        metavar="HZ",
+        help="also how long windows must be on a base that sways by 1° at HZ",
+    )
+    add(
         "-o",
         "--output",
         type=Path,
@@ -67,6 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the plan for fieldcal run",
     )
     add("--json", action="store_true", help="print one JSON object")
+    add_speed(parser)
     add_site(parser)
 
 
@@ -74,45 +96,79 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     import numpy as np
 
-    from fieldcal.core.positions import FIVE, SETS
+    from fieldcal.core.positions import FIVE
     from fieldcal.planning import planner
     from fieldcal.planning.aliasing import aliases
     from fieldcal.session import description
 
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    if args.sways is not None:
+        tables["site"] = {**tables.get("site", {}), "sways": True}
     gravity = description.parse(tables).gravity
+    if args.speed is not None:
+        return _spins(args)
     if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
         raise PlanError("limits are 0 to 180° for α and 0 to 90° for β")
     ladder = planner.Ladder(*np.deg2rad([args.alpha, args.beta]).tolist())
-    chosen = (
-        SETS[args.set]
-        if args.set
-        else planner.best_positions(args.positions, ladder, gravity)
-    )
-    seconds = _seconds(args.minutes, len(chosen))
+    places = chosen(args, ladder, gravity)
+    seconds = _seconds(args.minutes, len(places))
     device = _device(args.noise_of) if args.noise_of else None
     grade = device.grade(seconds) if device else planner.GRADES[args.noise]
     noise = "this device" if device else args.noise
-    found = planner.expected(chosen, grade, seconds, gravity)
+    needed = None if args.sways is None else _needed(args.sways, grade)
+    found = planner.expected(places, grade, seconds, gravity)
     paper = planner.expected(FIVE, grade, seconds, gravity)
-    further = planner.extra_position(chosen, ladder, gravity)
-    with_it = planner.expected((*chosen, further), grade, seconds, gravity)
-    confused = aliases(chosen, gravity)
+    further = planner.extra_position(places, ladder, gravity)
+    with_it = planner.expected((*places, further), grade, seconds, gravity)
+    confused = aliases(places, gravity)
     if args.output:
-        _write(args.output, tables, chosen, seconds)
+        write(args.output, tables, places, seconds)
     if args.json:
-        out = _json(chosen, seconds, found, confused, further, with_it)
-        if device:
-            out["averaging"] = device.to_json()
+        out = _json(places, seconds, found, confused, further, with_it)
+        out["averaging"] = device.to_json() if device else grade.to_json()
+        if needed is not None:
+            out["needed_s"] = needed
         sys.stdout.write(json.dumps(out) + "\n")
         return 0
-    _show(chosen, seconds, noise, grade, found, paper, with_it)
+    _show(places, seconds, noise, grade, found, paper, with_it)
     _tell(confused, further)
-    if device:
-        sys.stdout.write(f"{device.sentence(seconds)}\n")
+    sys.stdout.write(f"{device.sentence(seconds) if device else _worth(grade)}\n")
+    if needed is not None:
+        sys.stdout.write(
+            f"on a base that sways by 1° at {args.sways:g} Hz each position needs"
+            f" {needed:.0f} s; this plan has {seconds:g} s\n"
+        )
     if args.output:
         sys.stdout.write(f"written: {args.output}\n")
     return 0
+
+
+def _needed(hz: float, grade: Grade) -> float:
+    """Seconds that a position needs on a swaying base.
+
+    Raises
+    ------
+    PlanError
+        If it does not sway.
+
+    """
+    from fieldcal.planning.swaying_base import seconds_needed
+
+    if not hz > 0:
+        raise PlanError("--sways is a frequency in Hz, above 0")
+    return seconds_needed(hz, grade)
+
+
+def _spins(args: argparse.Namespace) -> int:
+    """Plan windows on a table."""
+    from fieldcal.planning.planner import GRADES
+
+    windows = (SPINS if args.positions is None else args.positions) + RESTS
+    seconds = _seconds(args.minutes, windows)
+    device = _device(args.noise_of) if args.noise_of else None
+    grade = device.grade(seconds) if device else GRADES[args.noise]
+    noise = "this device" if device else args.noise
+    return show_spins(args, grade.gyr(seconds), seconds, noise)
 
 
 def _device(path: Path) -> DeviceNoise:
@@ -148,23 +204,13 @@ def _seconds(minutes: float, n: int) -> float:
     return float(min(LONGEST, round(each)))
 
 
-def _write(
-    path: Path, tables: Mapping[str, Any], chosen: Sequence[Position], seconds: float
-) -> None:
-    import tomlkit
-
-    from fieldcal.session.folder import write_whole
-
-    if path.exists():
-        raise InputError(f"{path}: is there already; name another file")
-    run_table = {"procedure": "positions", "seconds": seconds}
-    whole = {**tables, "run": run_table, "position": [_table(p) for p in chosen]}
-    write_whole(path, tomlkit.dumps(whole))
-
-
-def _table(position: Position) -> dict[str, Any]:
-    alpha, beta = position.degrees or (0.0, 0.0)
-    return {"name": position.name, "alpha_deg": alpha, "beta_deg": beta}
+def _worth(grade: Grade) -> str:
+    """How long a device of a grade is worth averaging."""
+    return (
+        f"flicker wins over white noise from {grade.acc_seconds:.0f} s"
+        f" (accelerometers) and {grade.gyr_seconds:.0f} s (gyroscopes): longer windows"
+        " gain little"
+    )
 
 
 def _json(
@@ -176,12 +222,12 @@ def _json(
     with_it: Mapping[str, float],
 ) -> dict[str, Any]:
     return {
-        "positions": [_table(p) for p in chosen],
+        "positions": [table(p) for p in chosen],
         "seconds": seconds,
         "sigma": dict(found),
         "hidden": list(confused.hidden),
         "aliases": {name: list(others) for name, others in confused.pairs},
-        "extra_position": {**_table(further), "sigma": dict(with_it)},
+        "extra_position": {**table(further), "sigma": dict(with_it)},
     }
 
 

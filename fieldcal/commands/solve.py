@@ -7,9 +7,10 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_factory
+from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FACTORY
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ RARE = ("as_printed", "method", "heading", "history", "lot")
 
 EXAMPLE = """\
   fieldcal solve bench-7/2026-03-01
+  fieldcal solve bench-7/2026-03-01 --over-time
   fieldcal solve imu0 --cross --json > imu0.json
   fieldcal solve unit-81 --lot lot=2026-11
 """
@@ -67,6 +69,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="use these units of the store as prior knowledge; conditions as in"
         " fieldcal lot; may be given several times",
     )
+    add(
+        "--over-time",
+        action="store_true",
+        help="also how each parameter depends on the averaging time, and what wins over"
+        " noise from when",
+    )
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO")
     add("--history", metavar="FILE", help="use this history")
     add(
@@ -81,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.borrowed_view import show_borrowed
     from fieldcal.commands.decision_view import show_decision
     from fieldcal.commands.installing import with_installed
+    from fieldcal.commands.over_time_view import show_over_time
     from fieldcal.commands.table import show
     from fieldcal.evaluation.not_carried import mended
     from fieldcal.evaluation.observations import rests
@@ -94,6 +103,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.as_printed:
         found = replace(found, warnings=(*repaired, *found.warnings))
     found = with_installed(found, session)
+    over_time = _over_time(session) if args.over_time else None
+    if over_time is not None:
+        found = replace(found, info={**found.info, "over_time": over_time})
     found = _decided(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
@@ -103,6 +115,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         show(found)
         show_borrowed(found)
+        show_over_time(found)
         show_decision(found)
         sys.stdout.write(f"written: {path}\n")
     go = found.info.get("decision", {}).get("go", True)
@@ -127,6 +140,25 @@ def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibra
         angle_sigma_deg=args.angles,
         lot=_lot(args, session) if args.lot else None,
     )
+
+
+def _over_time(session: Session) -> dict[str, Any]:
+    """Each parameter against the averaging time.
+
+    Raises
+    ------
+    InputError
+        If its windows cannot be cut.
+
+    """
+    from fieldcal.evaluation.nested_windows import nested
+
+    found = nested(session)
+    if found is None:
+        raise InputError(
+            "--over-time needs windows of 5 s or more with samples: leave it out"
+        )
+    return found.to_json()
 
 
 def _left(args: argparse.Namespace) -> dict[str, float]:

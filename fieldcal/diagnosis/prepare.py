@@ -85,7 +85,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     warmth = Thermometer.of(checked.block)
     source = RowSource(
         checked.block, about, checked.usable, rest, warmth, checked.pace,
-        *((None, None) if sways is None else (sways.left, sways.white)),
+        *(() if sways is None else (sways.left, sways.white, sways.gravity)),
     )  # fmt: skip
     rows = rows_of(source)
     _refuse_turning(rows, about)

@@ -149,6 +149,7 @@ def _times(found: Recalibration) -> dict[str, Any]:
         "after_s": [_known(s) for s in found.seconds],
         "from_history": found.from_history,
         "unseen_walk": found.unseen,
+        "by_ramp": found.by_ramp,
     }
 
 

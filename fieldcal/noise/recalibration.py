@@ -69,6 +69,7 @@ class Recalibration:
         `LONGEST`
     from_history : whether the device's own calibrations say so
     unseen : whether a walk does that was not seen, and would not have been
+    by_ramp : whether the ramp of the recording does half of it or more, if it goes on
 
     """
 
@@ -76,6 +77,7 @@ class Recalibration:
     seconds: tuple[float, ...]
     from_history: bool
     unseen: bool
+    by_ramp: bool
 
 
 def recalibration(
@@ -110,7 +112,9 @@ def recalibration(
         over = np.flatnonzero(chance > level)
         times.append(float(seconds[over[0]]) if len(over) else np.inf)
     guessed = known is None and unseen > 0 and any("K" not in d.terms for d in drawn)
-    return Recalibration(limit, tuple(times), known is not None, guessed)
+    first = times[0] if np.isfinite(times[0]) else 0.0
+    ramped = known is None and abs(ramp) * first > limit / 2
+    return Recalibration(limit, tuple(times), known is not None, guessed, ramped)
 
 
 def walk_of(steps: Sequence[HistoryStep]) -> float:

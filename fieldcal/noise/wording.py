@@ -48,11 +48,13 @@ def _due(found: NoiseResult) -> str:
     first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
     when = found.recalibrate[first]
     sure = f"{100 * CHANCES[0]:.0f} %"
-    if when.unseen and math.isfinite(when.seconds[0]):
+    if (when.by_ramp or when.unseen) and math.isfinite(when.seconds[0]):
+        why = "by a walk that this recording would not show: a longer one tells more"
+        if when.by_ramp:
+            why = "if the ramp of this recording goes on: a longer one tells whether"
         return (
             f"by {_date(found.since, when.seconds[0])} {first} may be beyond its limit"
-            f" ({sure}), by a walk that this recording would not show: a longer one"
-            " tells more"
+            f" ({sure}), {why}"
         )
     whose = "history" if when.from_history else "this recording"
     if not any(map(math.isfinite, when.seconds)):

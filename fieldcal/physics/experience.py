@@ -167,6 +167,19 @@ class Experience:
         return seen
 
     @property
+    def earth_unseen(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Rows in which the Earth's rate may point anywhere, (n,).
+
+        Where a table turns, what is across its axis goes round, and what is along it is
+        part of the speed.
+        """
+        turning = self.rate.any(axis=1)
+        unseen: np.ndarray[Any, np.dtype[np.bool_]] = (
+            ~self.oriented & ~turning & ~self.earth_seen
+        )
+        return unseen
+
+    @property
     def force_known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Rows in which the turning of a rate table does not turn the force, (n,)."""
         speed = np.linalg.norm(self.rate, axis=1)

@@ -63,6 +63,20 @@ class Grade:
         """Standard error of a gyroscope's mean over `seconds`, rad/s."""
         return float(np.hypot(self.gyr_white / np.sqrt(seconds), self.gyr_floor))
 
+    @property
+    def acc_seconds(self) -> float:
+        """Window after which flicker has more of an accelerometer's mean, s."""
+        return (self.acc_white / self.acc_floor) ** 2
+
+    @property
+    def gyr_seconds(self) -> float:
+        """Window after which flicker has more of a gyroscope's mean, s."""
+        return (self.gyr_white / self.gyr_floor) ** 2
+
+    def to_json(self) -> dict[str, float]:
+        """These averaging times, s."""
+        return {"acc_best_s": self.acc_seconds, "gyr_best_s": self.gyr_seconds}
+
 
 GRADES = {
     "consumer": Grade(3e-3, 5e-4, 2e-4, 5e-5),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration import over_time
 from fieldcal.calibration.wording import number, pretty
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS
@@ -26,10 +27,22 @@ MOST = 1_000_000
 def noise(material: Material) -> Section:
     """Allan deviation of accelerometers and gyroscopes, and what noise.json tells."""
     section = _of_recording(material)
+    more: list[Part] = []
     found = read_noise(material.session.folder)
-    if found is None:
-        return section
-    return replace(section, blocks=(*section.blocks, averaging(found)))
+    if found is not None:
+        more.append(averaging(found))
+    if material.calibration is not None and "over_time" in material.calibration.info:
+        more += by_parameter(material.calibration.info["over_time"])
+    return replace(section, blocks=(*section.blocks, *more))
+
+
+def by_parameter(told: Mapping[str, Any]) -> list[Part]:
+    """Each parameter against the averaging time, of the content of a result.json."""
+    first, *times, unit = over_time.heading(told)
+    columns = (first, *(f">{time}" for time in times), unit)
+    caption = "± of each parameter by averaging time, of the first part of each window"
+    texts = [Text(f"{s[0].upper()}{s[1:]}.") for s in over_time.sentences(told)]
+    return [table(caption, columns, over_time.rows(told)), *texts]
 
 
 def averaging(found: Mapping[str, Any]) -> Table:

@@ -29,6 +29,10 @@ from fieldcal.windows import Stillness
 SETTLE = 1.5
 """Rest before a window begins, s: a joint that was just let go of still creeps."""
 
+SWUNG = 4.0
+"""Time in place before a window on a base that sways, s: the end of a small turn is no
+quicker than the swaying."""
+
 PATIENCE = 3.0
 """Rest at a wrong place before that is said, s: a person stops in between."""
 
@@ -90,6 +94,7 @@ class PositionWait:
         self._resting = _Resting()
         self._told = -np.inf
         self.arrival: PositionCheck | None = None
+        self._there = np.nan
         self.where: PositionCheck | None = None
         self.f: Array | None = None
 
@@ -131,6 +136,10 @@ class PositionWait:
             self.arrival, self.f, self._told = None, None, -np.inf
             now = self._judged(force(block.acc, self._about))
             self.where = replace(now, ok=False)
+        if self.arrival is None or not self.arrival.ok:
+            self._there = np.nan
+        elif np.isnan(self._there):
+            self._there = self._last
 
     def _judged(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity
@@ -140,7 +149,8 @@ class PositionWait:
     def arrived(self) -> bool:
         """Whether it rests where it should."""
         there = self.arrival is not None and self.arrival.ok
-        return there and self.seconds >= SETTLE
+        swung = not self._about.sways or self._last - self._there >= SWUNG
+        return there and swung and self.seconds >= SETTLE
 
     @property
     def usable(self) -> bool:

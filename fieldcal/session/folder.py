@@ -72,6 +72,12 @@ class Session:
         about = replace(about, sent=as_sent(about.nominal, marks))
         return cls(folder, about, tuple(says))
 
+    def with_windows(self, windows: tuple[tuple[float, float] | None, ...]) -> Session:
+        """The same recording with other windows of the positions."""
+        out = Session(self.folder, replace(self.about, windows=windows), self.warnings)
+        out.block = self.block
+        return out
+
     @property
     def positions(self) -> tuple[Position, ...]:
         """Positions in the order of session.toml."""

@@ -56,8 +56,7 @@ def of_means(observations: Observations) -> Recorded:
     x = replace(x, w=np.where(free[:, None], read.earth_rates(), x.w))
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
-    unseen = ~x.oriented & ~x.earth_seen
-    common[unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
+    common[x.earth_unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
     span = np.column_stack([x.t, x.t])
     rows = Rows(x, y, sd, common, np.ones(n), level, span)

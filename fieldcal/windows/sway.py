@@ -23,8 +23,9 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.windows.cells import CELL
+from fieldcal.windows.sway_by_force import leaning, turning
 from fieldcal.windows.sway_process import fitted, flattened, frequencies
-from fieldcal.windows.sway_waves import POINTS, Waves
+from fieldcal.windows.sway_waves import PERIODS, POINTS, Waves
 
 LOWEST, HIGHEST = 0.06, 1.5
 """Frequencies at which bases sway, Hz: a long swell, a stiff tripod."""
@@ -46,9 +47,13 @@ SMALLEST = float(np.deg2rad(0.1))
 """Turning below which nothing is looked for, rad: it moves gravity by less than 1e-5
 m/s^2 in the mean."""
 
-ALIKE, MISSED = 0.3, 1e-4
+ALIKE, MISSED, TINY = 0.3, 1e-4, 1e-12
 """Part of the power that gravity makes of the turning of which accelerometers across it
-may show something else, and of which they do so where it turns."""
+may show something else, and of which they do so at least where it turns; and the least
+power, m^2/s^4."""
+
+ROUNDS = 4
+"""Fits of the arm, each with what the one before misses."""
 
 
 def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
@@ -57,7 +62,8 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     Parameters
     ----------
     t : (n,) s
-    six : (n, 6) m/s^2 and rad/s, nan where missing
+    six : (n, 6) m/s^2 and rad/s, nan where missing; without gyroscopes the
+        accelerometers tell it alone (`sway_by_force`)
     scale : (3,) nominal scale factors of the gyroscopes
 
     Returns
@@ -65,8 +71,9 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     One for each stretch of up to a minute; none where nothing sways.
 
     """
-    known = np.isfinite(six).all(axis=1)
-    t, six = t[known], six[known]
+    seen = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
+    known = np.isfinite(seen).all(axis=1)
+    t, six = t[known], seen[known]
     parts = max(1, int(np.ceil((t[-1] - t[0]) / WIDEST))) if len(t) > 1 else 1
     found = [
         _waves_of_stretch(t[some], six[some], scale)
@@ -85,25 +92,29 @@ def _waves_of_stretch(t: Array, six: Array, scale: Array) -> Waves | None:
     span = float(at[-1] - at[0]) + length
     hz: Array = np.arange(1, int(2 * span * HIGHEST) + 1) / (2 * span)
     hz = hz[hz >= max(LOWEST, 1 / span)]
-    if not _oscillates(y[:, 3:] / scale, length):
-        return None
     force, ends = y[:, :3].mean(axis=0), (float(t[0]), float(t[-1]))
-    none = np.zeros(6)
+    alone = y.shape[1] == 3
+    if not _oscillates(leaning(y, force) if alone else _turned(y, scale, length)):
+        return None
+    none = np.zeros(y.shape[1])
     plain = Waves(
         hz[:0], float(at.mean()), y[:0], y[:0], force, none[:3], none, none, length,
         ends, scale,
     )  # fmt: skip
     hz = frequencies(at, y, hz, 1 / (8 * span))
+    whole = turning if alone else _with_arm
     first = fitted(at, y, hz, plain)
-    if first is None or not (found := _with_arm(first)):
+    if first is None or not (found := whole(first)):
         return None
     # squares have waves of their own, of which the first fit took some for sway
-    again = fitted(at, y - found.squares(at), hz, found)
-    return again or found
+    again = fitted(at, y - found.squares(at)[:, : y.shape[1]], hz, found)
+    if again is not None:
+        found = turning(again) if alone else again
+    return found if found.periods > PERIODS else None
 
 
 def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
-    """Middles and means (m, 6) of cells in which nothing is missing, and how long."""
+    """Middles and means (m, c) of cells in which nothing is missing, and how long."""
     if len(t) < LEAST:
         return None
     step = float(np.median(np.diff(t)))
@@ -111,15 +122,21 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     count = len(t) // each
     if count < LEAST:
         return None
-    y = six[: count * each].reshape(count, each, 6).mean(axis=1)
+    y = six[: count * each].reshape(count, each, -1).mean(axis=1)
     own = t[: count * each].reshape(count, each)
     whole = np.ptp(own, axis=1) < (each + 0.5) * step  # none across a gap
     return own.mean(axis=1)[whole], y[whole], each * step
 
 
-def _oscillates(rate: Array, length: float) -> bool:
-    """Whether what rates (m, 3) sum up to goes to and fro enough to be looked at."""
-    angle = np.cumsum((rate - rate.mean(axis=0)) * length, axis=0)
+def _turned(y: Array, scale: Array, length: float) -> Array:
+    """What the gyroscopes of cells (m, 6) sum up to, (m, 3) rad, without their bias."""
+    rate = y[:, 3:] / scale
+    angle: Array = np.cumsum((rate - rate.mean(axis=0)) * length, axis=0)
+    return angle
+
+
+def _oscillates(angle: Array) -> bool:
+    """Whether the device leans to and fro, (m, 3) rad, enough to be looked at."""
     about = flattened(np.arange(float(len(angle))), angle, ())
     return float((about**2).sum(axis=1).mean()) > SMALLEST**2 / 2
 
@@ -132,11 +149,15 @@ def _with_arm(found: Waves) -> Waves | None:
     design = np.stack([np.cross(speeding, e) for e in np.eye(3)] + [made], axis=2)
     design = design.reshape(-1, 4) * np.array([ARM, ARM, ARM, GAUGE])
     power = float((made**2).sum())
-    noise = max(MISSED * power / len(t), 1e-12)
     rest = (strong.linear(t)[:, :3] - made).ravel()
-    known = np.linalg.solve(
-        design.T @ design / noise + np.eye(4), design.T @ rest / noise
-    )
+    known, amplitudes = np.zeros(4), 6 * len(strong.hz)
+    for _ in range(ROUNDS):
+        # what is missed is as smooth as the waves: it has as many values as they
+        missed = float(((rest - design @ known) ** 2).sum())
+        noise = max(missed, MISSED * power, TINY) / amplitudes
+        known = np.linalg.solve(
+            design.T @ design / noise + np.eye(4), design.T @ rest / noise
+        )
     across = (rest - design @ known).reshape(-1, 3)  # a ship heaves as well
     across -= np.outer(across @ found.force, found.force) / (found.force @ found.force)
     arm = ARM * known[:3]

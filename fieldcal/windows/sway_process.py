@@ -5,7 +5,8 @@
 
 at frequencies half a cycle per window apart, and at those of the strongest lines. v_k
 and the noise maximise the evidence: a swell is one line, gusts are many. The remaining
-uncertainty of m_c is its variance in addition to that of white noise.
+uncertainty of m_c is its variance in addition to that of white noise. The drift q_c is
+that of a device, which is small beside that of a wave of which a part is missing.
 
 Source: MacKay 1992, Tipping 2001.
 """
@@ -18,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.sway_waves import Waves
+from fieldcal.windows.sway_waves import PERIODS, Waves
 
 ROUNDS, KEPT = 20, 1.0
 """Steps towards the greatest evidence, and the power that a line must have in some
@@ -26,6 +27,10 @@ output, in that of its noise, to be looked at any longer."""
 
 LINES, FINER = 4, 16
 """Lines whose frequencies are sought, and points of the first grid in 1 / T."""
+
+DRIFT = (2e-4, 2e-4, 2e-4, 2e-5, 2e-5, 2e-5)
+"""What the biases of a device that has warmed up drift by in half a stretch, 1 sigma,
+m/s^2 and rad/s. What drifts more is taken for a part of a slow wave."""
 
 STEP_S, TINY = 0.25, 1e-15
 """Step of a window that is only thought of, s, and the least size of a wave in it."""
@@ -38,7 +43,9 @@ LADDER = (10, 15, 20, 30, 45, 60, 90, 120, 180, 300, 600)
 
 
 def fitted(t: Array, y: Array, hz: Array, known: Waves) -> Waves | None:
-    """Waves of greatest evidence in cells (m, 6); None where there are none.
+    """Waves of greatest evidence in cells (m, 6), or (m, 3) of accelerometers alone.
+
+    None where there are none.
 
     Parameters
     ----------
@@ -60,7 +67,7 @@ class _Fitted:
 
     Parameters
     ----------
-    t, y : (m,), (m, 6) cells
+    t, y : (m,), (m, c) cells
     hz : (k,) frequencies
     known : what is known of the stretch
 
@@ -71,46 +78,50 @@ class _Fitted:
         t = t - known.middle
         wave = np.multiply.outer(t, 2 * np.pi * hz)
         mean = np.sinc(hz * known.length)  # of a wave over a cell
-        self.table = np.hstack([np.cos(wave) * mean, np.sin(wave) * mean])
-        flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
-        self.free = self.table - flat @ (flat.T @ self.table)
-        self.off = y - flat @ (flat.T @ y)
+        line = t / np.abs(t).max()
+        self.table = np.column_stack([np.cos(wave) * mean, np.sin(wave) * mean, line])
+        self.free = self.table - self.table.mean(axis=0)
+        self.off = y - y.mean(axis=0)
         rate = np.multiply.outer(2 * np.pi * hz, np.abs(known.scale))
         size = np.full((len(hz), 3), np.linalg.norm(known.force))
-        self.size = np.tile(np.hstack([size, rate]), (2, 1))
+        self.drift = np.array(DRIFT)[: y.shape[1]]
+        self.size = np.tile(np.hstack([size, rate])[:, : y.shape[1]], (2, 1))
 
     def waves(self) -> Waves | None:
         """Waves of greatest evidence; None where there is none beyond noise."""
         gram, pull = self.free.T @ self.free, self.free.T @ self.off
         bent = np.diff(self.off, n=2, axis=0)
         noise = np.maximum((bent**2).mean(axis=0) / 6, 1e-30)
-        at = np.arange(len(self.hz))
-        power = (2 / self.count * pull / self.size) ** 2
-        v = (power[at] + power[at + len(at)]).mean(axis=1) / 2
+        at, count = np.arange(len(self.hz)), len(self.hz)
+        power = (2 / self.count * pull[:-1] / self.size) ** 2
+        v = (power[at] + power[at + count]).mean(axis=1) / 2
         for _ in range(ROUNDS):
-            both = np.concatenate([at, at + len(self.hz)])
+            both = np.concatenate([at, at + count])
+            every, half = np.append(both, 2 * count), len(at)
             wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[both]
-            mean, cov = _posterior(gram[np.ix_(both, both)], pull[both], wide, noise)
+            wide = np.vstack([wide, self.drift])
+            mean, cov = _posterior(gram[np.ix_(every, every)], pull[every], wide, noise)
             known = np.clip(1 - np.einsum("ckk->kc", cov) / wide**2, 1e-12, 1.0)
             share = [
-                (x[: len(at)] + x[len(at) :]).sum(axis=1)
-                for x in ((mean / self.size[both]) ** 2, known)
+                (x[:half] + x[half:]).sum(axis=1)
+                for x in ((mean[:-1] / self.size[both]) ** 2, known[:-1])
             ]
             v[at] = share[0] / share[1]
-            rest = self.off - self.free[:, both] @ mean
-            spare = np.maximum(self.count - 2 - known.sum(axis=0), 1.0)
+            rest = self.off - self.free[:, every] @ mean
+            spare = np.maximum(self.count - 1 - known.sum(axis=0), 1.0)
             noise = np.maximum((rest**2).sum(axis=0) / spare, 1e-30)
             loud = v[at, None] * self.size[at] ** 2 * self.count / 2 > KEPT * noise
             if not loud.any():
                 return None
             kept = loud.any(axis=1)
-            mean, cov = mean[np.tile(kept, 2)], cov[:, np.tile(kept, 2)]
-            cov, at = cov[:, :, np.tile(kept, 2)], at[kept]
-        off = self.table[:, np.concatenate([at, at + len(self.hz)])].mean(axis=0)
+            some = np.append(np.tile(kept, 2), True)
+            mean, cov = mean[some], cov[:, some][:, :, some]
+            at = at[kept]
+        off = self.table[:, np.concatenate([at, at + count, [2 * count]])].mean(axis=0)
         left = np.einsum("i,cij,j->c", off, cov, off)
         half = len(at)
         return replace(
-            self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:], left=left,
+            self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:-1], left=left,
             noise=noise,
         )  # fmt: skip
 
@@ -131,12 +142,15 @@ def needed(waves: Waves) -> float:
     """Seconds that a window needs to be nearly as good as on firm ground.
 
     With waves of these sizes and unknown phases, none of its means is `WORSE` times as
-    uncertain as by its noise.
+    uncertain as by its noise; and it has waves enough to tell their frequency.
     """
-    power = (waves.cos**2 + waves.sin**2) / 2
+    seen = np.isfinite(waves.noise)
+    power = ((waves.cos**2 + waves.sin**2) / 2)[:, seen]
     for seconds in LADDER:
+        if seconds * waves.mean_hz < PERIODS:
+            continue
         t = np.arange(0.0, seconds, STEP_S) - seconds / 2
-        noise = waves.noise * waves.length / STEP_S
+        noise = waves.noise[seen] * waves.length / STEP_S
         wave = np.multiply.outer(t, 2 * np.pi * waves.hz)
         table = np.hstack([np.cos(wave), np.sin(wave)])
         flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]

@@ -11,6 +11,10 @@ from fieldcal.core.samples import Array
 POINTS = 400
 """Instants at which the turning of a stretch is looked at."""
 
+PERIODS = 1.2
+"""Waves below which a stretch does not tell their frequency from what drifts: means
+are then up to twenty times as far off as the fit has it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Waves:
@@ -23,7 +27,7 @@ class Waves:
     cos, sin : (k, 6) amplitudes of the outputs
     force, arm : (3,) m/s^2 and m, force at rest and arm from the turning centre
     left : (6,) variance of the means at rest beyond that of white noise
-    noise : (6,) variance of a mean over a cell of `length` s
+    noise : (6,) variance of a mean over a cell of `length` s; nan without gyroscopes
     length : s
     span : s, the stretch that was looked at
     scale : (3,) outputs of the gyroscopes in a rad/s
@@ -48,6 +52,17 @@ class Waves:
         t = np.linspace(*self.span, POINTS)
         squares = [float((self.turn(t, i) ** 2).sum(axis=1).mean()) for i in (0, 1)]
         return squares[0], squares[1]
+
+    @property
+    def mean_hz(self) -> float:
+        """Frequency of one wave with all their power, Hz."""
+        turned, rate = self.size
+        return float(np.sqrt(rate / turned) / (2 * np.pi))
+
+    @property
+    def periods(self) -> float:
+        """Waves in the stretch."""
+        return self.mean_hz * (self.span[1] - self.span[0])
 
     def turn(self, t: Array, order: int = 0) -> Array:
         """Phi at some instants, or its derivative of some order, (n, 3) rad."""

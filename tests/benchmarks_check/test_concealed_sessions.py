@@ -1,5 +1,7 @@
 """The benchmark's sessions are what they say: size, seeds, judgement."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closed_circle import a_third
@@ -9,6 +11,7 @@ from benchmarks.concealed.draws import size
 from benchmarks.concealed.judging import judged
 from benchmarks.concealed.others import OUTSIDE, example
 from benchmarks.concealed.tables import GROUPS, groups
+from fieldcal.core.positions import forces, speeds
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
 from fieldcal.sim_device.effects import ids, kind
@@ -47,6 +50,29 @@ def test_a_seed_gives_one_recording() -> None:
     assert one.concealed == two.concealed
     assert np.array_equal(one.record(7).six, two.record(7).six)
     assert not np.array_equal(one.record(7).six, two.record(8).six)
+
+
+def test_attitudes_told_as_one_turn_are_those_of_the_angles() -> None:
+    session = kinds()["any attitude"][0](np.random.default_rng(1))
+    told = session.about.positions
+    plain = replace(session, attitudes=False).about.positions
+    np.testing.assert_allclose(forces(told, 9.8), forces(plain, 9.8), atol=1e-6)
+
+
+def test_a_table_of_known_speed_tells_nothing_else() -> None:
+    session = kinds()["nothing, speeds"][0](np.random.default_rng(1))
+    positions = session.about.positions
+    speed, _ = speeds(positions)
+    assert (speed > 0).sum() == len(positions) - 2
+    assert not any(p.oriented or p.rate for p in positions)
+
+
+def test_a_pier_without_gyroscopes_is_named() -> None:
+    session = kinds()["pier, no gyroscopes"][0](np.random.default_rng(1))
+    block = session.record(1)
+    assert np.isnan(block.gyr).all()
+    told = diagnose(block, session.about)
+    assert judged(session, 1, told, 0.0).right
 
 
 def test_a_bump_is_judged_by_name_and_by_number() -> None:

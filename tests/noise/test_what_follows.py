@@ -133,6 +133,15 @@ def test_a_ramp_leaves_its_limit_on_a_day() -> None:
     assert recalibration(drawn(N=1e-9), 0.0, 1.0, 1e-14).seconds == (math.inf,) * 2
 
 
+def test_a_ramp_that_goes_on_is_told_from_a_walk_that_was_not_seen() -> None:
+    found = recalibration(drawn(N=1e-9), 1e-9, 1e-4, 1e-14, unseen=1e-9)
+    assert found.by_ramp and found.seconds[0] == pytest.approx(1e5, rel=0.15)
+    slow = recalibration(drawn(N=1e-9), 1e-13, 5e-4, 0.0, unseen=1e-6)
+    assert slow.unseen and not slow.by_ramp
+    never = recalibration(drawn(N=1e-9), 1e-16, 1e-4, 1e-14)
+    assert never.seconds == (math.inf,) * 2 and not never.by_ramp
+
+
 def test_a_walk_that_would_not_be_seen_counts_where_none_is() -> None:
     seen = recalibration(drawn(N=1e-9, K=1e-6), 0.0, 5e-4, 0.0, unseen=1e-5)
     none = recalibration(drawn(N=1e-9), 0.0, 5e-4, 0.0, unseen=1e-6)

@@ -114,3 +114,17 @@ def test_the_command_writes_a_plan_that_run_takes(
     assert main(["plan", "-o", str(path)]) == 2
     assert main(["plan", "--minutes", "0.5"]) == 2
     assert "allow 1.7 min" in capsys.readouterr().err
+
+
+def test_a_plan_says_from_when_flicker_wins(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    grade = Grade(2e-3, 4e-4, 1e-4, 2e-5)
+    assert grade.acc(grade.acc_seconds) == pytest.approx(2**0.5 * grade.acc_floor)
+    assert grade.gyr(grade.gyr_seconds) == pytest.approx(2**0.5 * grade.gyr_floor)
+    assert main(["plan", "--set", "five", "--noise", "consumer"]) == 0
+    out = capsys.readouterr().out
+    assert "from 36 s (accelerometers) and 16 s (gyroscopes)" in out
+    assert main(["plan", "--set", "five", "--noise", "consumer", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["averaging"]
+    assert told == pytest.approx({"acc_best_s": 36.0, "gyr_best_s": 16.0})

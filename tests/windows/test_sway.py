@@ -82,6 +82,44 @@ def test_means_are_those_of_a_base_at_rest(hz: tuple[float, ...]) -> None:
     assert (np.sqrt((np.array(off) ** 2).mean(axis=0)) < 1.5 * white).all()
 
 
+@pytest.mark.parametrize("hz", [(0.137,), (0.2, 0.26, 0.31, 0.33)])
+def test_accelerometers_alone_show_it_as_well(hz: tuple[float, ...]) -> None:
+    """Mean forces as on firm ground; of what they turn about the vertical, nothing."""
+    rng = np.random.default_rng(7)
+    white = NOISE[:3] / np.sqrt(30 * RATE)
+    off, sigma = [], []
+    for _ in range(8):
+        t, six = swayed(rng, hz)
+        six[:, 3:] = np.nan
+        mean, sd = at_rest(t, six)
+        off.append((mean - REST)[:3])
+        sigma.append(sd[:3])
+    assert 0.75 < np.sqrt(((np.array(off) / sigma) ** 2).mean()) < 1.25
+    assert (np.sqrt((np.array(off) ** 2).mean(axis=0)) < 1.5 * white).all()
+    (found,) = waves_of(t, six, PLAIN)
+    turned = 0.5 * np.deg2rad(1.0) ** 2  # <phi^2> of two axes
+    assert found.size[0] == pytest.approx(turned, rel=0.25)
+    pulse = 2 * np.pi * np.array(hz)
+    assert found.size[1] / found.size[0] == pytest.approx(np.mean(pulse**2), rel=0.1)
+
+
+def test_what_is_left_does_not_drift() -> None:
+    """Half of a slow wave at an end is no drift of the device."""
+    rng, tilt = np.random.default_rng(4), []
+    for _ in range(4):
+        t, six = swayed(rng, (0.085, 0.095, 0.1, 0.105, 0.115))
+        (found,) = waves_of(t, six, PLAIN)
+        s = (t - t.mean()) / np.ptp(t) * 2
+        tilt.append((six - found.of(t)).T @ s / (s @ s))
+    assert np.sqrt((np.array(tilt) ** 2).mean(axis=0)).max() < 6e-4
+
+
+def test_less_than_a_period_tells_no_frequency() -> None:
+    rng = np.random.default_rng(6)
+    assert waves_of(*swayed(rng, (0.1,), seconds=9.0), PLAIN) == []
+    assert len(waves_of(*swayed(rng, (0.1,), seconds=16.0), PLAIN)) == 1
+
+
 def test_an_arm_pulls_outward() -> None:
     """Three metres from the turning centre the mean of w x (w x r) is 5e-3 m/s^2."""
     rng, arm = np.random.default_rng(3), np.array([0.0, 3.0, 0.0])
@@ -123,6 +161,7 @@ def test_slow_and_irregular_swaying_needs_longer_windows() -> None:
             )
         )  # fmt: skip
 
+    assert seconds(0.1) == 15.0  # 1.2 periods or more
     assert seconds(0.5) < seconds(0.06) < seconds(0.03, 0.04, 0.05, 0.06)
 
 

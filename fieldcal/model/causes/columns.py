@@ -223,7 +223,7 @@ def earth_anyhow(view: RowView) -> Array:
     position and on the way; and however it lies, its upright part along the force. Not
     where gyroscopes show which way it points. (n, 6, 4), rad/s.
     """
-    free = ~view.plain.oriented & ~view.plain.earth_seen
+    free = view.plain.earth_unseen
     f = view.x.f
     up = f / np.maximum(np.linalg.norm(f, axis=1), 1e-12)[:, None]
     along = np.hstack([np.zeros_like(up), up])[:, :, None]

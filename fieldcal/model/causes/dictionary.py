@@ -256,7 +256,7 @@ class Dictionary(ColumnTable):
             wide = np.full(len(own), 1 / priors.FREE)
             own = self.add(basis, 2 * self.places) + own
             yield Group("earth aside", "gyr", own, wide, fixed=priors.FREE)
-        if not (self.x.oriented | shown).all():
+        if self.x.earth_unseen.any():
             at = self.add(General("earth anyhow", columns.earth_anyhow), 4)
             size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
             yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed=1.0)

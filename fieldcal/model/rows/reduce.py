@@ -86,6 +86,7 @@ class RowSource:
     left : (p, 6) variance that a swaying base leaves of each window's mean, SI squared
     white : (6,) deviation of one sample on such a base, where what is slow of the noise
         was taken out with what swayed
+    unsure_gravity : m/s^2, standard deviation of what swaying takes from gravity
 
     """
 
@@ -97,6 +98,7 @@ class RowSource:
     pace: float = 1.0
     left: Array | None = None
     white: Array | None = None
+    unsure_gravity: float = 0.0
 
     @property
     def whole(self) -> RowSource:
@@ -147,7 +149,7 @@ def reduce(source: RowSource) -> Rows:
         off = np.hypot(off, np.sqrt(source.left[out.x.position]))
     # the Earth turns a device of unknown orientation about any of its axes; one that
     # was never turned has it in its bias, and some gyroscopes show where it points
-    free = ~out.x.oriented & (len(held) > 1) & ~out.x.earth_seen
+    free = out.x.earth_unseen & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
     return replace(out, common=off, alike=alike)
@@ -216,7 +218,7 @@ def _experience(
         transport=about.under_way.rate,
         mounting=about.mounting,
         latitude=about.latitude,
-        gravity_sigma=gravity_sigma(about),
+        gravity_sigma=float(np.hypot(gravity_sigma(about), source.unsure_gravity)),
         **known_attitudes(about, position),
     )
     free = ~x.oriented & ~x.rate.any(axis=1)

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.gravity import G0
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
@@ -49,6 +50,8 @@ class Swaying:
     amplitude, hz : rad, Hz, of one wave with all its power
     spread : (2,) standard deviations of both over the windows
     seconds : that a window needs, s
+    gravity : m/s^2, standard deviation of what swaying takes from gravity in all
+        windows: without gyroscopes nobody knows whether the base turns or is pushed
 
     """
 
@@ -59,24 +62,32 @@ class Swaying:
     hz: float
     spread: tuple[float, float]
     seconds: float
+    gravity: float
 
     @property
     def sentence(self) -> str:
         """Say it to the operator."""
+        unknown = (
+            "; without gyroscopes nothing tells whether it turns or is pushed: the"
+            f" scale factors are uncertain by {1e6 * self.gravity / G0:.0f}e-6 for that"
+        )
         return (
             f"the base sways by {np.rad2deg(self.amplitude):.2g}° at {self.hz:.2g} Hz:"
             " this is taken out of the windows, and what it leaves open is in the ±;"
             f" each position needs {self.seconds:.0f} s on such a base"
+            f"{unknown if self.gravity else ''}"
         )
 
 
 def swaying(block: Block, about: Description) -> Swaying | None:
     """Look whether the base sways; None where it does not, or nobody can tell.
 
-    Gyroscopes tell turning from what pushes; positions must be known, as the device
-    turns in a hand as well, and there about nothing.
+    Gyroscopes tell turning from what pushes; without any, accelerometers leave it
+    open. Positions must be known, as the device turns in a hand as well, and there
+    about nothing.
     """
-    if not _fixed(about) or not np.isfinite(block.gyr).any(axis=0).all():
+    gyroscopes = np.isfinite(block.gyr).any(axis=0)
+    if not _fixed(about) or gyroscopes.any() != gyroscopes.all():
         return None
     scale, windows = about.nominal["gyr_scale"], spans(block, about)
     found = {
@@ -93,6 +104,7 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     if np.sqrt((amplitude**2).mean()) < WIDE:
         return None
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
+    lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
     left = np.array([
         sum(w.left for w in found[p]) / len(found[p]) ** 2 if p in found
         else _at_ends(sizes.mean(axis=0), block.t[a:b], about.gravity)
@@ -108,6 +120,7 @@ def swaying(block: Block, about: Description) -> Swaying | None:
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
         max(needed(w) for some in found.values() for w in some),
+        0.0 if gyroscopes.any() else lost,
     )
 
 

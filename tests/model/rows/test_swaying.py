@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from session_folders import recorded, write_session
 
+from benchmarks.papers import sway as pier
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
@@ -23,6 +25,7 @@ from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve
+from fieldcal.windows.sway import waves_of
 
 FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 SECONDS, RATE = 30.0, 50.0
@@ -33,6 +36,8 @@ TRUTH = device.Truth(
     gyr_bias=(2e-3, -1e-3, 3e-3), gyr_scale=device.ONE,
 )  # fmt: skip
 IRREGULAR = "sway:amplitude_deg=1,hz=0.3,spread_hz=0.04,phase_deg={},azimuth_deg={}"
+NAMES = ("bias", "scale")
+PERFECT = {"squareness": 0.0, "quadratic": 0.0, "g_sensitivity": 0.0}
 LEVEL = {"level_deg": 0.01, "angle_setting_deg": 0.01}
 
 
@@ -107,6 +112,49 @@ def test_it_calibrates_through_sway(tmp_path: Path) -> None:
     assert told["sway"]["hz"].value == pytest.approx(0.3, abs=0.02)
     needed = told["sway"]["needed_s"]
     assert needed.unit == "s" and 5 < float(needed.value) < 100
+
+
+def test_it_calibrates_accelerometers_without_gyroscopes(tmp_path: Path) -> None:
+    """Biases as on firm ground; whether it turns or is pushed, in the scale factors."""
+    block = played(3, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))
+    pair = []
+    for name, one in (("pier", block), ("firm", played(3))):
+        alone = replace(one, gyr=np.full_like(one.gyr, np.nan))
+        held = session(tmp_path / name, alone, level_deg=1e-4, angle_setting_deg=1e-4)
+        pair.append(solved(held, rests(held), left=PERFECT))
+    at = [pair[0].names.index(f"acc_{n}.{x}") for n in NAMES for x in "xyz"]
+    assert pair[0].names == pair[1].names
+    there, here = ((f.values[at], np.sqrt(np.diag(f.covariance))[at]) for f in pair)
+    assert (there[1][:3] < 1.5 * here[1][:3]).all()
+    assert np.abs(there[0] - here[0])[:3].max() < 1.5 * here[1][:3].max()
+    assert np.abs(there[0] - [*TRUTH.acc_bias, *TRUTH.acc_scale])[:3].max() < 4e-4
+    lost = np.deg2rad(1.0) ** 2 / 2  # <phi^2> / 2 of gravity
+    wider = np.sqrt(there[1][3:] ** 2 - here[1][3:] ** 2)
+    assert wider == pytest.approx([lost] * 3, rel=0.3)
+    said = " ".join(pair[0].warnings)
+    assert "each position needs" in said and "turns or is pushed" in said
+    assert "turns or is pushed" not in " ".join(pair[1].warnings)
+
+
+def test_a_part_of_a_slow_wave_is_no_drift() -> None:
+    """Of irregular waves of ten seconds, of which windows hold three."""
+    block, firm = pier.played(0, 0.1, 0.1), pier.played(0)
+    for held in (pier.held()[2], pier.held()[4]):
+        some = (block.t >= held.start) & (block.t < held.end)
+        t, six = block.t[some], block.six[some]
+        (found,) = waves_of(t, six, np.ones(3))
+        s = (t - t.mean()) / np.ptp(t) * 2
+        left = six - found.of(t) - firm.six[some]
+        assert np.abs(left[:, :3].T @ s / (s @ s)).max() < 1e-3
+
+
+def test_beating_waves_have_no_arm() -> None:
+    """One axis, and hardly any swaying in the middle of the window."""
+    waves = "sway:amplitude_deg=1,hz=0.1008,spread_hz=0.01008,phase_deg=97.12,"
+    block = played(100, f"{waves}azimuth_deg=7.375")
+    some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
+    (found,) = waves_of(block.t[some], block.six[some], np.ones(3))
+    assert np.abs(found.arm).max() < 3.0
 
 
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:

@@ -1,0 +1,175 @@
+"""How long to average: a session solved with less and less of its windows.
+
+Of each window the first T is used. A parameter then has a value x(T), its ± s(T), and
+n(T), the part of that which the means leave: fixture, level and factory leave the same
+at every T,
+
+    r^2 = s^2(T) - n^2(T)                                                          (1)
+
+White noise falls as 1 / sqrt(T), and nested means differ by
+
+    var(x(T) - x(T')) = n^2 (1 - T/T')             n the larger of both, T < T'    (2)
+
+What wins over it first, and from which T, is one of
+
+    the fixture     r > n(T)                                                       (3)
+    flicker         n^2(T) T > 2 n^2(T0) T0                 T0 the shortest time    (4)
+    drift           x(T') is further from x(T) than (2) allows                     (5)
+
+where (5) is a disturbance as well. Source: (2) of white noise, whose increments are
+independent. Units are those of the parameters; s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fieldcal.calibration import Calibration
+from fieldcal.core.errors import FieldcalError
+from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.samples import Array
+from fieldcal.evaluation.observations import angle_setting, observations, rests
+from fieldcal.session.factory import factory_errors
+from fieldcal.session.folder import Session
+from fieldcal.solve import solve
+
+TIMES = (5, 10, 15, 30, 45, 60, 120, 300, 600, 1800, 3600)
+"""Lengths that are looked at, s, and the whole."""
+
+SHORTER = 0.8
+"""Part of the whole below which a length says something else."""
+
+FAR = 4.0
+"""Standard deviations of (2) beyond which it is no noise: a hundred are looked at."""
+
+EXACT_DEG = 1e-6
+"""Level, heading and angles of a fixture that leaves nothing, deg."""
+
+
+@dataclass(frozen=True, slots=True)
+class NestedWindows:
+    """Each parameter against the averaging time.
+
+    Attributes
+    ----------
+    names, units : of the k parameters
+    seconds : (t,) T, ascending; the last is that of the whole windows
+    values, sigma, noise : (t, k) x, s and n
+
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    seconds: Array
+    values: Array
+    sigma: Array
+    noise: Array
+
+    def wins(self, name: str) -> tuple[str, float] | None:
+        """What wins over noise first and from which T, s; None where noise lasts."""
+        k = self.names.index(name)
+        x, n, rest = self.values[:, k], self.noise[:, k], self._rest(k)
+        share = 1 - self.seconds[:-1] / self.seconds[1:]
+        apart = np.maximum(n[:-1], n[1:]) * np.sqrt(share)  # (2)
+        jumped = np.append(False, np.abs(np.diff(x)) > FAR * apart)
+        white = n[0] ** 2 * self.seconds[0]
+        each = {
+            "fixture": rest > n,  # (3)
+            "flicker": n**2 * self.seconds > 2 * white,  # (4)
+            "drift": jumped,  # (5)
+        }
+        first = {
+            what: float(self.seconds[np.argmax(there)])
+            for what, there in each.items()
+            if there.any()
+        }
+        return min(first.items(), key=lambda one: one[1]) if first else None
+
+    def _rest(self, k: int) -> Array:
+        """What the means do not leave, (t,), (1)."""
+        return np.sqrt(np.maximum(self.sigma[:, k] ** 2 - self.noise[:, k] ** 2, 0.0))
+
+    def to_json(self) -> dict[str, Any]:
+        """For the result: by parameter, and what wins over noise from which time."""
+        out: dict[str, Any] = {"seconds": self.seconds.tolist(), "parameters": {}}
+        for k, name in enumerate(self.names):
+            won = self.wins(name)
+            out["parameters"][name] = {
+                "unit": self.units[k],
+                "value": self.values[:, k].tolist(),
+                "sigma": self.sigma[:, k].tolist(),
+                "noise": self.noise[:, k].tolist(),
+                "wins": None if won is None else {"what": won[0], "from_s": won[1]},
+            }
+        return out
+
+
+def nested(session: Session) -> NestedWindows | None:
+    """Solve a session for several lengths of its windows.
+
+    None where its windows are too short to be cut, or hold no samples.
+    """
+    lengths = [w[1] - w[0] for w in session.windows if w is not None]
+    if not lengths or session.about.means_only:
+        return None
+    longest = min(lengths)
+    found = [
+        (t, *both)
+        for t in [*(t for t in TIMES if t < SHORTER * longest), longest]
+        if (both := _at(session, t)) is not None
+    ]
+    while found and set(found[0][1].names) < set(found[-1][1].names):
+        found.pop(0)
+    if len(found) < 2:
+        return None
+    last = found[-1][1]
+    names = [n for n in last.names if all(n in c.names for _, *cs in found for c in cs)]
+    return NestedWindows(
+        tuple(names),
+        tuple(last.units[last.names.index(n)] for n in names),
+        np.array([t for t, _, _ in found], dtype=float),
+        np.array([_values(c, names) for _, c, _ in found]),
+        np.array([_sigmas(c, names) for _, c, _ in found]),
+        np.array([_sigmas(c, names) for _, _, c in found]),
+    )
+
+
+def _at(session: Session, seconds: float) -> tuple[Calibration, Calibration] | None:
+    """Solutions of the first seconds of each window: with all, and with noise alone.
+
+    Both have one method and one model of the tilt. None where so little is no window.
+    """
+    about = session.about
+    windows = tuple(w and (w[0], min(w[1], w[0] + seconds)) for w in about.windows)
+    try:
+        still = rests(session.with_windows(windows))
+        seen = observations(about, still.averages, still.rows)
+        whole = solve(
+            seen,
+            level_sigma_deg=about.level_deg,
+            angle_sigma_deg=angle_setting(about),
+            factory=factory_errors(about),
+        )
+        level = None if about.level_deg is None else EXACT_DEG
+        alone = solve(
+            seen,
+            level_sigma_deg=level,
+            heading_sigma_deg=EXACT_DEG,
+            angle_sigma_deg=EXACT_DEG,
+            factory=FactoryErrors(),
+        )
+    except FieldcalError:
+        return None
+    return (whole, alone) if len(still.rows) == len(about.positions) else None
+
+
+def _values(found: Calibration, names: Sequence[str]) -> Array:
+    return np.array([found.value(name) for name in names])
+
+
+def _sigmas(found: Calibration, names: Sequence[str]) -> Array:
+    return np.array([found.uncertainty(name) for name in names])

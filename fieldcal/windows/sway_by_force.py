@@ -1,0 +1,48 @@
+"""Swaying of a device without gyroscopes, by its accelerometers alone.
+
+With the force f0 at rest, small turns phi about level axes change the force by f0 x phi
+and the accelerometers across it show
+
+    phi = -f0 x (f - f0) / f0^2                                                    (1)
+
+A push to and fro looks the same: a ship surges as it rolls. Both are waves, which are
+taken out alike. Only their squares differ, the mean of which is phi^2 / 2 of gravity
+where the base turns about a centre near the device, and nothing where it is pushed.
+They are taken for those of a turn, and are as uncertain as they are large.
+
+Source: rotation kinematics to second order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.windows.sway_waves import Waves
+
+
+def leaning(y: Array, force: Array) -> Array:
+    """Phi (m, 3) of forces (m, 3) by (1), rad, its mean being none."""
+    angle: Array = -np.cross(force, y - y.mean(axis=0)) / float(force @ force)
+    return angle
+
+
+def turning(waves: Waves) -> Waves:
+    """The waves (k, 3) of accelerometers with those of gyroscopes beside, (k, 6).
+
+    The rate is what (1) makes of them: phi = c cos wt + s sin wt turns with w s cos wt
+    - w c sin wt.
+    """
+    force, pulse = waves.force, 2 * np.pi * waves.hz[:, None] * waves.scale
+    cos, sin = (
+        -np.cross(force, part) / float(force @ force) for part in (waves.cos, waves.sin)
+    )
+    return replace(
+        waves,
+        cos=np.hstack([waves.cos, pulse * sin]),
+        sin=np.hstack([waves.sin, -pulse * cos]),
+        left=np.concatenate([waves.left, np.zeros(3)]),
+        noise=np.concatenate([waves.noise, np.full(3, np.nan)]),
+    )

@@ -1,0 +1,84 @@
+"""Plans of one's own positions, and of a base that sways."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fieldcal.cli import main
+from fieldcal.planning.planner import GRADES, Grade
+from fieldcal.planning.swaying_base import seconds_needed
+
+FACES = """
+format = 1
+[[position]]
+rotation_vector_deg = [0.0, 0.0, 0.0]
+[[position]]
+quaternion = [0.0, 0.0, 0.0, 1.0]
+[[position]]
+rotation_vector_deg = [0.0, 0.0, 90.0]
+[[position]]
+rotation_vector_deg = [0.0, 0.0, -90.0]
+[[position]]
+rotation_vector_deg = [90.0, 0.0, 0.0]
+[[position]]
+rotation_vector_deg = [-90.0, 0.0, 0.0]
+"""
+
+
+def planned(
+    capsys: pytest.CaptureFixture[str], *words: str
+) -> dict[str, dict[str, float]]:
+    assert main(["plan", "--json", "--minutes", "6", *words]) == 0
+    found: dict[str, dict[str, float]] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_attitudes_are_worth_what_their_angles_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Six faces, as one finite turn and as a quaternion."""
+    file = tmp_path / "session.toml"
+    file.write_text(FACES)
+    ours = planned(capsys, "--of", str(tmp_path))["sigma"]
+    known = planned(capsys, "--set", "six_faces")["sigma"]
+    assert ours == pytest.approx(known, rel=1e-6)
+
+
+def test_three_angles_are_planned_and_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, plan = tmp_path / "mine.toml", tmp_path / "plan.toml"
+    third = "[[position]]\nalpha_deg = 30.0\nbeta_deg = 40.0\ngamma_deg = 50.0\n"
+    file.write_text(FACES + third)
+    words = ["plan", "--of", str(file), "--sways", "0.2", "-o", str(plan)]
+    assert main([*words, "--minutes", "9"]) == 0
+    said = capsys.readouterr().out
+    assert "sways by 1° at 0.2 Hz each position needs 10 s; this plan has 60 s" in said
+    written = tomllib.loads(plan.read_text())
+    last = written["position"][-1]
+    assert (last["alpha_deg"], last["gamma_deg"]) == (30.0, 50.0)
+    assert written["site"]["sways"] is True
+
+
+def test_what_cannot_be_planned_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "table.toml"
+    file.write_text("format = 1\n[[position]]\nspeed_deg_s = 20.0\n")
+    for words in (["--of", str(file)], ["--of", str(file), "--set", "two"]):
+        assert main(["plan", *words]) == 2
+    assert main(["plan", "--sways", "0"]) == 2
+    assert "above 0" in capsys.readouterr().err
+
+
+def test_slow_swaying_and_little_noise_need_longer_windows() -> None:
+    tactical = GRADES["tactical"]
+    seconds = [seconds_needed(hz, tactical) for hz in (0.5, 0.1, 0.06)]
+    assert seconds[0] < seconds[1] < seconds[2]
+    assert seconds[1] >= 12.0  # 1.2 periods
+    quiet = Grade(1e-7, 0.0, 1e-9, 0.0)
+    assert seconds_needed(0.1, quiet) >= seconds[1]

@@ -1,0 +1,47 @@
+"""Waiting for the device to come to rest where it should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.positions import Position
+from fieldcal.core.samples import Block
+from fieldcal.planning.steps import Hold
+from fieldcal.run.waiting import SETTLE, SWUNG, PositionWait
+from fieldcal.session import description
+
+G, RATE, TURN_S = 9.81, 100.0, 3.0
+
+
+def turning_to(alpha_deg: float, sways: bool) -> float:
+    """Seconds from the end of a small turn until it has arrived."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 30.0, 1 / RATE)
+    part = np.clip((t - 5.0) / TURN_S, 0.0, 1.0)
+    sway = np.deg2rad(0.3) * np.sin(2 * np.pi * 0.2 * t) * sways
+    alpha = np.deg2rad(alpha_deg) * (1 - np.cos(np.pi * part)) / 2 + sway
+    acc = -G * np.column_stack([np.sin(alpha), np.cos(alpha), np.zeros_like(t)])
+    gyr = np.zeros_like(acc)
+    gyr[:, 2] = np.gradient(alpha, t)
+    noise = rng.standard_normal((len(t), 6)) * np.repeat([5e-3, 1e-3], 3)
+    block = Block.of(t, acc + noise[:, :3], gyr + noise[:, 3:])
+    about = description.parse(
+        {
+            "format": 1,
+            "site": {"gravity": G, "sways": sways},
+            "position": [{"alpha_deg": alpha_deg, "beta_deg": 0.0}],
+        }
+    )
+    waiting = PositionWait(Hold(0, Position.deg(alpha_deg, 0.0), 10.0), about, None)
+    for first in range(0, len(t), 10):
+        waiting.add(block[first : first + 10], float(t[first]))
+        if waiting.arrived and t[first] > 5.0:
+            return float(t[first] + 0.1 - 5.0 - TURN_S)
+    raise AssertionError("never arrived")
+
+
+@pytest.mark.parametrize("sways", [False, True])
+def test_no_window_begins_in_a_turn(sways: bool) -> None:
+    """Of 2.5 degrees in three seconds, slower than what sways may be."""
+    assert turning_to(2.5, sways) > (SWUNG - TURN_S if sways else SETTLE - 0.5)

@@ -32,9 +32,10 @@ afterwards, the mean is larger: with windows that are parts f of all samples,
 
 with d = 0 if values are rounded to the nearest step, -1/2 if they are rounded down, and
 -1/2 times the mean of their signs if they are rounded toward zero; in windows that are
-rounded to zero q is twice as large. For each of the three, the probability follows from
-(1) and (2) over all axes, with s_b of accelerometers; the three are added. Device axes,
-SI.
+rounded to zero q is twice as large. Values that were on this grid before are all moved
+by the same part of a step, so d = 0 and the sum in (4) is 1. For each of the four, the
+probability follows from (1) and (2) over all axes, with s_b of accelerometers; the
+least of them counts, times four (Bonferroni). Device axes, SI.
 """
 
 from __future__ import annotations
@@ -223,13 +224,16 @@ def centred_and_rounded(
     zero = np.abs([acc.mean(axis=0) for acc in held]) < step / 2
     white = np.array([np.diff(acc, axis=0).var(axis=0) / 2 / len(acc) for acc in held])
     mean, signs = block.acc.mean(axis=0), np.sign(block.acc).mean(axis=0)
-    found = []
-    for shift, wide in ((0.0, 1.0), (-0.5, 1.0), (-signs / 2, 1.0 + 3.0 * zero)):
-        sigma = np.sqrt((part**2 * (white + wide * step**2 / 12)).sum(axis=0))  # (4)
+    noise, own = (part**2 * white).sum(axis=0), (part**2).sum(axis=0)
+    to_zero = (part**2 * (1.0 + 3.0 * zero)).sum(axis=0)
+    ways = ((0.0, own), (-0.5, own), (-signs / 2, to_zero), (0.0, 1.0))
+    found = [1.0]
+    for shift, wide in ways:
+        sigma = np.sqrt(noise + wide * step**2 / 12)  # (4)
         _, larger = _chi2_about_zero(mean - step * shift, sigma)
         if larger >= least:
             found.append((1.0 - larger) * _chance_near_zero(sigma, repeat))
-    return min(sum(found), 1.0) if found else 1.0
+    return min(len(ways) * min(found), 1.0)
 
 
 def _noise(values: Array) -> float:

@@ -17,10 +17,12 @@ from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.widened import Widened
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
+from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.posterior.model_average import of_columns
 
 DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
 """Sigma from which a difference counts as not determined, m/s^2, rad/s, 1."""
@@ -109,6 +111,22 @@ def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, A
     return base[axes] + values, covariance, typical
 
 
+def undecided(explanation: Explanation, name: str, axes: Index) -> Array:
+    """What a calibration scatters by, as sets that may all be right have it, (k, k).
+
+    A cause and its alias leave different biases and scale factors.
+    """
+    d = explanation.dictionary
+    columns = (d.bias if name.endswith("bias") else d.scale) + axes
+    sets = explanation.average.sets
+    weight = np.array([w for _, w in sets])
+    weight /= weight.sum()
+    means = np.array([of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
+    off = means - weight @ means
+    out: Array = (weight[:, None] * off).T @ off
+    return out
+
+
 def wander(there: Widened, axes: Index) -> Array:
     """What biases wander by within a session, (k,) of some channels.
 
@@ -140,6 +158,8 @@ def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
     (one, cov, typical), (two, more, _) = (
         calibration(w, name, axes) for w in (found.real, found.sim)
     )
+    for side in (found.pairing.real, found.pairing.sim):
+        cov = cov + undecided(side.explanation, name, axes)
     sigma = np.sqrt(np.diag(cov + more))
     known = np.flatnonzero(sigma < DETERMINED[name])
     if not len(known):

@@ -39,9 +39,7 @@ class SimulatedFlexibleMount(SimulatedEffect):
     NUMBERS = {axis: Number(0.0, NOT_NEGATIVE) for axis in AXES} | {
         "damping": Number(0.05, RINGS)
     }
-    EXAMPLE = Example(
-        {"x": 3e-4, "y": 2e-4, "z": 4e-4, "damping": 0.2}, in_motion=True
-    )
+    EXAMPLE = Example({"x": 3e-4, "y": 2e-4, "z": 4e-4, "damping": 0.2}, in_motion=True)
 
     def followed(self, outputs: Outputs, t: Array) -> Array:
         """Outputs (6, n) at t (n,) s as the structure passes them on."""

@@ -97,8 +97,9 @@ class BlackboxLog(Recording):
     def _opened(self, path: Path, number: int) -> Any:
         from orangebox import Parser
 
-        # what it takes for missing is no matter of the user's
-        logging.getLogger("orangebox").addHandler(logging.NullHandler())
+        log = logging.getLogger("orangebox")
+        if not log.handlers:  # what it takes for missing is no matter of the user's
+            log.addHandler(logging.NullHandler())
         try:
             return Parser.load(str(path), number)
         except Exception as error:

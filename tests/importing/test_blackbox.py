@@ -1,5 +1,6 @@
 """Blackbox logs: frames written here as the firmware's documentation says."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,17 @@ def test_counts_become_si(
     np.testing.assert_allclose(got.t, table[:n, 1] * 1e-6)
     np.testing.assert_allclose(got.acc, table[:n, 5:] * G0 / 2048)
     np.testing.assert_allclose(got.gyr, table[:n, 2:5] * unit, rtol=1e-6)
+
+
+def test_reading_many_logs_leaves_one_handler_of_what_their_reader_says(
+    tmp_path: Path,
+) -> None:
+    """One a file made each of thousands slower than the one before."""
+    path = tmp_path / "LOG.BFL"
+    path.write_bytes(header(1.0) + frames(counts(1)))
+    for _ in range(3):
+        flights(path)
+    assert len(logging.getLogger("orangebox").handlers) == 1
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,8 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
 
     What a filter does is linear about a filter like it and not about none. Of those
     that explain something about none the likeliest is taken. They are settled beginning
-    with what explains most, until nothing is left for those that remain.
+    with what explains most. What is no filter is not, if nothing is left for it; one
+    filter leaves little of another, and which it is only both fits tell.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
@@ -143,7 +144,11 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
         own = other.evidence(members)
         if own > most:
             best, most = other, own
-        remain = [i for i in remain if other.evidence((*members, every[i])) > own]
+        remain = [
+            i
+            for i in remain
+            if lag_of(every[i]) != Lag() or other.evidence((*members, every[i])) > own
+        ]
     return best
 
 

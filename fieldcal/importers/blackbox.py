@@ -28,6 +28,9 @@ WHAT = "blackbox of Betaflight, INAV: .bbl, .bfl"
 
 BEGINS = b"H Product:Blackbox flight data recorder"
 
+MOST_LOOPS = 1 << 16
+"""Loops of the firmware between two frames at most; the counter has 16 bits."""
+
 ROWS = 1 << 14
 """Rows put together in a block."""
 
@@ -101,13 +104,15 @@ class BlackboxLog(Recording):
         if not log.handlers:  # what it takes for missing is no matter of the user's
             log.addHandler(logging.NullHandler())
         try:
-            return Parser.load(str(path), number)
+            opened = Parser.load(str(path), number)
         except Exception as error:
             # a reader made of what the file says raises what it likes
             raise InputError(
                 f"{self.path}: its headers cannot be read:"
                 f" {error or type(error).__name__}; copy it again from where it came"
             ) from error
+        _with_intervals(self.path, opened.headers)
+        return opened
 
     def _frames(self, log: Any) -> Iterator[tuple[float, ...]]:
         """Values of the frames that are whole."""
@@ -137,6 +142,23 @@ def _scales(path: Path, headers: Mapping[str, Any]) -> tuple[float, float]:
     gyr /= FINER if str(headers.get(FINE, "0")) not in ("0", "OFF") else 1
     is_rad = str(headers.get("Firmware type", "")) == MEANT
     return G0 / counts, gyr * 1e6 if is_rad else float(np.deg2rad(gyr))
+
+
+def _with_intervals(path: Path, headers: Mapping[str, Any]) -> None:
+    """Refuse intervals between frames by which their reader would count for ever.
+
+    It seeks the next loop with a frame: of num/denom, with num below 1 there is none.
+    A single 0 says that every frame stands for itself.
+    """
+    for name in ("I interval", "P interval"):
+        said = str(headers.get(name, "1"))
+        parts = [int(p) if p.strip().isdecimal() else -1 for p in said.split("/")]
+        least = 0 if len(parts) == 1 else 1
+        if not all(least <= part <= MOST_LOOPS for part in parts):
+            raise InputError(
+                f"{path}: its header {name} is {said!r}, which is no interval between"
+                " frames; copy it again from where it came"
+            )
 
 
 def _scale_of(path: Path, said: Any) -> float:

@@ -57,6 +57,32 @@ def test_reading_many_logs_leaves_one_handler_of_what_their_reader_says(
 
 
 @pytest.mark.parametrize(
+    ("line", "damaged"),
+    [(b"P interval:1/1", b"P interval:0/1"), (b"P interval:1/1", b"P interval:-1/1"),
+     (b"P interval:1/1", b"P interval:1x1"), (b"I interval:16", b"I interval:99999999"),
+     (b"P interval:1/1", b"P interval:1/0")],
+)  # fmt: skip
+def test_intervals_that_no_frame_has_are_refused(
+    tmp_path: Path, line: bytes, damaged: bytes
+) -> None:
+    """The reader would count loops for ever, looking for the next one with a frame."""
+    path = tmp_path / "LOG.BFL"
+    content = header(1.0) + frames(counts(1))
+    assert line in content
+    path.write_bytes(content.replace(line, damaged))
+    with pytest.raises(InputError, match="LOG.BFL: its header"):
+        flights(path)
+
+
+def test_a_log_of_frames_that_stand_for_themselves_is_read(tmp_path: Path) -> None:
+    """P interval 0 is what the firmware writes where there are no others."""
+    path = tmp_path / "LOG.BFL"
+    top = header(1.0).replace(b"P interval:1/1", b"P interval:0")
+    path.write_bytes(top + frames(counts(1)))
+    assert list(flights(path, repair=True))
+
+
+@pytest.mark.parametrize(
     "damaged",
     ["rx3f80P000", "0x3f8000001234", "0x7f800000", "0xbf800000", "0x7fc00000"],
 )

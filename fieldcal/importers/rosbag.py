@@ -154,4 +154,5 @@ def _of_second(
     )
     with _database(path) as base:
         for topic, logged, data in base.execute(query, sorted(wanted)):
-            yield Message(topic, logged, types.deserialize_cdr(data, kinds[topic]))
+            told = types.deserialize_cdr(data, kinds[topic])
+            yield Message(topic, int(logged), told)  # a database may hold anything

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -40,3 +42,19 @@ def test_a_bag_that_was_cut_off_is_one_sentence(
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert "cannot be read" in said and said.count("\n") == 1
+
+
+def test_a_message_of_ros_2_without_a_time_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A database takes what damage leaves: here the first message has no time."""
+    path = bag(tmp_path, turned(2, 20.0), first=False)
+    with closing(sqlite3.connect(path)) as base:
+        base.executescript(
+            "CREATE TABLE found AS SELECT * FROM messages;"
+            "DROP TABLE messages; ALTER TABLE found RENAME TO messages;"
+            "UPDATE messages SET timestamp = NULL WHERE rowid = 1;"
+        )
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "message 1" in said and "cannot be read" in said and said.count("\n") == 1

@@ -86,3 +86,18 @@ def test_an_archive_with_a_password_says_what_to_do(
     path.write_bytes(bytes(data))
     assert imported(path) == 2
     assert "unpack it, and import the file" in capsys.readouterr().err
+
+
+def test_a_name_of_which_damage_left_nothing_is_no_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "damaged.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("x", text(ROWS))
+    content = path.read_bytes()
+    at = content.index(b"PK\x01\x02") + 46  # the name in the list of files
+    path.write_bytes(content[:at] + b"\0" + content[at + 1 :])
+    with zipfile.ZipFile(path) as archive:
+        assert archive.namelist() == [""]
+    assert imported(path) == 2
+    assert "damaged.zip" in capsys.readouterr().err

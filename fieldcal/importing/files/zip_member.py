@@ -31,7 +31,8 @@ def only_member(path: Path) -> str | None:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            names = [one.filename for one in archive.infolist() if not one.is_dir()]
+            # of a name that is damaged nothing may be left, which is_dir() looks into
+            names = [n for n in archive.namelist() if not n.endswith("/")]
     except (*FAULTS, OSError, ValueError):
         return None
     names = [

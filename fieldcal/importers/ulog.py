@@ -266,8 +266,9 @@ def _unpacked(table: Table, fifo: Fifo) -> Block:
 
 
 def _three(table: Table, pattern: str, parts: Iterable[object]) -> Array:
-    columns = [np.asarray(table[pattern.format(part)], dtype=float) for part in parts]
-    return np.column_stack(columns)
+    with np.errstate(invalid="ignore"):  # of a nan that signals
+        some = [np.asarray(table[pattern.format(p)], dtype=float) for p in parts]
+    return np.column_stack(some)
 
 
 def _stamps(table: Table) -> Array:

@@ -462,6 +462,16 @@ def test_a_nan_that_signals_is_a_missing_number(tmp_path: Path) -> None:
     assert np.isnan(found.temperature).sum() == 1
 
 
+def test_a_nan_that_signals_in_a_px4_log_is_a_missing_number(tmp_path: Path) -> None:
+    small = Small("ulog", tmp_path / "file")
+    value = struct.pack("<f", small.expected.acc[5, 1])
+    assert small.content.count(value) == 1
+    signals = struct.pack("<I", 0x7FA00000)
+    small.path.write_bytes(small.content.replace(value, signals))
+    found = whole(small.path, small.wanted, small.name, repair=False)
+    assert np.isnan(found.acc[5, 1]) and np.isnan(found.acc).sum() == 1
+
+
 def test_flags_of_a_px4_log_that_end_too_early_are_read_as_far_as_they_go(
     tmp_path: Path,
 ) -> None:

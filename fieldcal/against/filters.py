@@ -9,12 +9,10 @@ import numpy as np
 from fieldcal.against.causes import Decided
 from fieldcal.against.joint import differs
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
-from fieldcal.against.widened import Widened
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings.filters import time_constants
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model import thresholds
-from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.filtered_turns import FILTERED
 
 DIRECTIONS: dict[tuple[bool, bool], Direction] = {
@@ -25,13 +23,12 @@ DIRECTIONS: dict[tuple[bool, bool], Direction] = {
 
 def filters(found: Decided) -> Iterator[Difference]:
     """The difference of two filters, by the variances of their impulse responses."""
-    groups = [_group(w) for w in (found.real, found.sim)]
+    both = (found.real, found.sim)
+    groups = [w.inference.dictionary.filters for w in both]
     if groups[0] is None or groups[1] is None:
         return
     (one, cov), (two, more) = (
-        w.estimate(g.columns[:2])
-        for w, g in zip((found.real, found.sim), groups, strict=True)
-        if g is not None
+        w.estimate(g.columns[:2]) for w, g in zip(both, groups, strict=True) if g
     )
     typical = groups[0].typical[:2]
     probability = differs(one - two, cov + more, typical)
@@ -46,8 +43,3 @@ def filters(found: Decided) -> Iterator[Difference]:
 
 def _told(square: Array, covariance: Array) -> dict[str, Quantity]:
     return time_constants(square, np.sqrt(np.diag(covariance)))
-
-
-def _group(there: Widened) -> Group | None:
-    always = there.inference.dictionary.always
-    return next((g for g in always if g.part == FILTERED), None)

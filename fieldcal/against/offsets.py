@@ -22,6 +22,7 @@ from fieldcal.diagnosis.findings.calibrated import GROUPS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.posterior.mixture import covariance_of_means
 from fieldcal.model.posterior.model_average import of_columns
 
 DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
@@ -111,7 +112,7 @@ def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, A
     return base[axes] + values, covariance, typical
 
 
-def undecided(explanation: Explanation, name: str, axes: Index) -> Array:
+def between_sets(explanation: Explanation, name: str, axes: Index) -> Array:
     """What a calibration scatters by, as sets that may all be right have it, (k, k).
 
     A cause and its alias leave different biases and scale factors.
@@ -122,9 +123,7 @@ def undecided(explanation: Explanation, name: str, axes: Index) -> Array:
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     means = np.array([of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
-    off = means - weight @ means
-    out: Array = (weight[:, None] * off).T @ off
-    return out
+    return covariance_of_means(means, weight)
 
 
 def wander(there: Widened, axes: Index) -> Array:
@@ -159,7 +158,7 @@ def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
         calibration(w, name, axes) for w in (found.real, found.sim)
     )
     for side in (found.pairing.real, found.pairing.sim):
-        cov = cov + undecided(side.explanation, name, axes)
+        cov = cov + between_sets(side.explanation, name, axes)
     sigma = np.sqrt(np.diag(cov + more))
     known = np.flatnonzero(sigma < DETERMINED[name])
     if not len(known):

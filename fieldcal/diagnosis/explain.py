@@ -19,7 +19,6 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
-from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -99,10 +98,10 @@ class Explanation:
     @cached_property
     def filters(self) -> tuple[Array, Array] | None:
         """What the way between windows says of filters, as rows; None without it."""
-        groups = [g for g in self.dictionary.always if g.part == FILTERED]
-        if not groups:
+        group = self.dictionary.filters
+        if group is None:
             return None
-        return remaining(self.best.set, self.inferred.turned, groups[0].columns)
+        return remaining(self.best.set, self.inferred.turned, group.columns)
 
     @cached_property
     def turns_held_out(self) -> Array:

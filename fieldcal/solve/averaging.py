@@ -20,7 +20,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import Mixing, Mixture
+from fieldcal.model.posterior.mixture import Mixing, Mixture, covariance_of_means
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.solve.given import Given
@@ -74,7 +74,7 @@ def averaged_over(
     means = np.array([value for _, (value, _) in found])
     values: Array = weight @ means
     covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
-    covariance += (weight[:, None] * (means - values)).T @ (means - values)
+    covariance += covariance_of_means(means, weight)
     plain, own = _at_the_end(given, mixed(given, search, (), doubt), nominal)
     return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 

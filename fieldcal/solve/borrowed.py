@@ -26,6 +26,7 @@ from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import number, pretty
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
+from fieldcal.model.posterior.mixture import covariance_of_means
 from fieldcal.solve.estimation import Estimated
 
 EVERYTHING = ""
@@ -230,9 +231,8 @@ class _Hypotheses:
         both = np.ix_(range(1, len(self.share)), ours, ours)
         covariances[both] = self.covariances[1:][:, at][:, :, at]
         mean = self.share @ means
-        off = means - mean
         covariance = np.einsum("h,hij->ij", self.share, covariances)
-        covariance += (self.share[:, None] * off).T @ off
+        covariance += covariance_of_means(means, self.share)
         return replace(found, values=mean, covariance=covariance)
 
 

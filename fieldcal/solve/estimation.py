@@ -14,7 +14,6 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
@@ -237,9 +236,9 @@ def _known(given: Given, recorded: Recorded, nominal: State) -> KnownRows | None
     lot, rows = given.wanted.lot, []
     if lot is not None and (known := known_rows(given, lot, nominal)) is not None:
         rows.append(known)
-    filters = [g.columns for g in given.always if g.part == FILTERED]
-    if filters and recorded.filters is not None and len(recorded.filters[1]):
-        rows.append(KnownRows(filters[0], *recorded.filters))
+    group, seen = given.filters, recorded.filters
+    if group is not None and seen is not None and len(seen[1]):
+        rows.append(KnownRows(group.columns, *seen))
     return KnownRows.joined(rows) if rows else None
 
 

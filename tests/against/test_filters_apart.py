@@ -26,7 +26,7 @@ def side(square: tuple[float, float], sigma: tuple[float, float]) -> Any:
         assert columns.tolist() == [7, 8], "variances alone"
         return values, covariance
 
-    dictionary = SimpleNamespace(always=[GROUP])
+    dictionary = SimpleNamespace(filters=GROUP)
     return SimpleNamespace(
         estimate=estimate, inference=SimpleNamespace(dictionary=dictionary)
     )
@@ -69,8 +69,8 @@ def test_filters_that_are_alike_are_no_difference(
 
 
 def test_without_turns_nothing_is_said() -> None:
-    bare = SimpleNamespace(inference=SimpleNamespace(dictionary=SimpleNamespace(
-        always=[])))  # fmt: skip
+    nothing = SimpleNamespace(filters=None)
+    bare = SimpleNamespace(inference=SimpleNamespace(dictionary=nothing))
     assert not against(side(SOME, SIGMA), bare)
 
 
@@ -87,5 +87,5 @@ def test_sets_that_may_all_be_right_have_biases_apart() -> None:
     explanation = cast(Explanation, SimpleNamespace(
         dictionary=SimpleNamespace(bias=2, scale=8), average=SimpleNamespace(sets=sets)
     ))  # fmt: skip
-    found = offsets.undecided(explanation, "acc_bias", np.array([0, 1]))
+    found = offsets.between_sets(explanation, "acc_bias", np.array([0, 1]))
     np.testing.assert_allclose(found, [[3.0, 0.0], [0.0, 0.0]], atol=1e-12)

@@ -121,9 +121,10 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
     """A fit settled with late gyroscopes, or with what only motion shows besides.
 
     What a filter does is linear about a filter like it and not about none. Of those
-    that explain something about none the likeliest is taken. They are settled beginning
-    with what explains most. What is no filter is not, if nothing is left for it; one
-    filter leaves little of another, and which it is only both fits tell.
+    that explain something about none the likeliest is taken, beginning with the one
+    that explains most. An effect that is no filter is passed over if nothing is left
+    for it. Filters of first and second order are both tried, since one leaves little of
+    the other.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)

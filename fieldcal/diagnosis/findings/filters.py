@@ -21,22 +21,19 @@ from fieldcal.model.causes.filtered_turns import FILTERED
 
 def of_filters(explanation: Explanation) -> Iterator[FoundEffect]:
     """The filter that is likelier there than not, if there is one."""
-    groups = [g for g in explanation.dictionary.always if g.part == FILTERED]
-    for group in groups:
-        effect = catalogue()[FILTERED]
-        chance = effect.chance(explanation.dictionary.x)
-        rise = explanation.raised(group.columns.tolist())
-        odds = rise + np.log(chance) - np.log1p(-chance)
-        probability = float(1 / (1 + np.exp(-odds)))
-        state = explanation.best.set.state
-        at = [int(np.flatnonzero(state.columns == c)[0]) for c in group.columns[:2]]
-        sigma = np.sqrt(np.diag(state.inverse)[at])
-        found = time_constants(state.estimate[at], sigma)
-        if probability >= thresholds.NAMED and found:
-            evidence = {"log_evidence": rise}
-            yield FoundEffect(
-                FILTERED, found, evidence=evidence, probability=probability
-            )
+    group = explanation.dictionary.filters
+    if group is None:
+        return
+    chance = catalogue()[FILTERED].chance(explanation.dictionary.x)
+    rise = explanation.raised(group.columns.tolist())
+    odds = rise + np.log(chance) - np.log1p(-chance)
+    probability = float(1 / (1 + np.exp(-odds)))
+    state = explanation.best.set.state
+    at = [int(np.flatnonzero(state.columns == c)[0]) for c in group.columns[:2]]
+    found = time_constants(state.estimate[at], np.sqrt(np.diag(state.inverse)[at]))
+    if probability >= thresholds.NAMED and found:
+        evidence = {"log_evidence": rise}
+        yield FoundEffect(FILTERED, found, evidence=evidence, probability=probability)
 
 
 def time_constants(square: Array, sigma: Array) -> dict[str, Quantity]:

@@ -25,7 +25,7 @@ from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.causes.effect_causes import at_points, of_effects
-from fieldcal.model.causes.filtered_turns import filtered_turns
+from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.causes.random_causes import flicker_of_few, of_chance
 from fieldcal.model.causes.unknown_causes import of_no_effect
@@ -143,6 +143,11 @@ class Dictionary(ColumnTable):
             if same is not None and some:
                 found[same.key] = (same, min(some, key=group.apart))
         return tuple(found.values())
+
+    @property
+    def filters(self) -> Group | None:
+        """What filters of the sensors make of turns; None where no turn is used."""
+        return next((g for g in self.always if g.part == FILTERED), None)
 
     @cached_property
     def by_width(self) -> list[AlikeGroups]:

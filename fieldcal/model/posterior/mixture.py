@@ -140,8 +140,7 @@ class Mixing:
         covariance = np.einsum(
             "h,hij->ij", weight, np.array([e.inverse[:k, :k] for _, e, _ in every])
         )
-        off = means - mean
-        covariance += (weight[:, None] * off).T @ off
+        covariance += covariance_of_means(means, weight)
         tau = np.array([t for _, _, t in every])
         scatter = np.sqrt(weight @ tau**2)
         return Mixture(
@@ -246,3 +245,13 @@ class Mixing:
         unit = self.dictionary.unit[:3][[c for c in self.dictionary.observed if c < 3]]
         out: Array = priors.UNKNOWN_ACC * unit * np.ones(len(at))
         return out
+
+
+def covariance_of_means(means: Array, weight: Array) -> Array:
+    """Covariance (k, k) of the means (n, k) of hypotheses of some weights, sum 1.
+
+    It is added to the mean of their covariances (law of total covariance).
+    """
+    off = means - weight @ means
+    out: Array = (weight[:, None] * off).T @ off
+    return out

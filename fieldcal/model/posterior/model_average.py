@@ -31,7 +31,7 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import Eliminated, inverse_of, root_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import KEPT
+from fieldcal.model.posterior.mixture import KEPT, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.reported import reported
 
@@ -129,9 +129,8 @@ def averaged(
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     mean: Array = weight @ np.array(means)
-    off = np.array(means) - mean
     cov = np.einsum("s,sij->ij", weight, np.array(covs))
-    return mean, cov + (weight[:, None] * off).T @ off  # (1)
+    return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
 def _left_out(one: Set, pick: Array, left: Sequence[Group]) -> tuple[Array, Array]:

@@ -123,8 +123,8 @@ def widened(
 def on_all_axes(member: Member) -> Member:
     """The same effect with all its parameters.
 
-    A device has it on every axis. On some alone it was found where the others are told
-    from bias and scale factor by nothing; these hold what they do.
+    A device has it on every axis. Where positions do not distinguish it from bias and
+    scale factor on some axes, it was found on the others alone.
     """
     cause, group = member
     same = [*group.siblings(cause.variants), group]

@@ -57,8 +57,8 @@ BESIDE = 10
 """Samples to either side that tell whether something shakes the device."""
 
 AROUND, CHANCE = 500, 1e-4
-"""Samples to either side whose tail is known, and how likely one of it may be to go as
-far: what shakes is no noise with a bell's tail, and rectified it has an exponential."""
+"""Samples to either side whose tail is looked at, and the chance that a sample of that
+tail goes as far. Rectified vibration has an exponential tail, and not a normal one."""
 
 AT_ONCE = 1 << 16
 """Samples looked at together: an hour of them need not be in memory once more."""

@@ -111,7 +111,7 @@ class BlackboxLog(Recording):
                 f"{self.path}: its headers cannot be read:"
                 f" {error or type(error).__name__}; copy it again from where it came"
             ) from error
-        _with_intervals(self.path, opened.headers)
+        _check_intervals(self.path, opened.headers)
         return opened
 
     def _frames(self, log: Any) -> Iterator[tuple[float, ...]]:
@@ -144,7 +144,7 @@ def _scales(path: Path, headers: Mapping[str, Any]) -> tuple[float, float]:
     return G0 / counts, gyr * 1e6 if is_rad else float(np.deg2rad(gyr))
 
 
-def _with_intervals(path: Path, headers: Mapping[str, Any]) -> None:
+def _check_intervals(path: Path, headers: Mapping[str, Any]) -> None:
     """Refuse intervals between frames by which their reader would count for ever.
 
     It seeks the next loop with a frame: of num/denom, with num below 1 there is none.

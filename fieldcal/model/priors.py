@@ -38,8 +38,8 @@ CLOSURE = 5e-4
 timing and the hand take half a milliradian."""
 
 FILTERED_S = 0.1
-"""Time constant of a filter of the sensors, s: of 1.6 Hz. Usual are 5 to 260 Hz; the
-turns that suffer by it tell it, and the others cost nothing."""
+"""Standard deviation of the time constant of a filter of the sensors, s: 1.6 Hz. Data
+sheets have 5 to 260 Hz; where a turn does not show it, scale factors are less certain."""
 
 FLICKER_ACC, FLICKER_GYR = 2e-3, 1e-4
 """Typical flicker noise, m/s^2 and rad/s: where Allan deviations of consumer grade stay

@@ -1,0 +1,43 @@
+"""Six faces behind a slow filter, whose turns about two axes lead elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from session_folders import places, recorded, write_session
+
+from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.solution import solved
+from fieldcal.model import priors
+from fieldcal.session.folder import Session
+from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
+from fieldcal.sim_device.vocabulary import parse
+
+FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
+DEVICE = Profile(
+    noise=NoiseFigures(
+        acc=(3e-3,) * 3, gyr=(3e-4,) * 3, acc_instability=ZERO, gyr_instability=ZERO
+    ),
+    effects=(parse("bandwidth:acc=0.1,gyr=0.1"),),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("known_s", "right"), [(priors.FILTERED_S, True), (1e-4, False)]
+)
+def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
+    known_s: float, right: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of sensors that are taken to be quick, one is five sigmas off."""
+    monkeypatch.setattr(priors, "FILTERED_S", known_s)
+    positions = places(FACES, 20.0, 6.0)
+    block = recorded(DEVICE, positions, seed=1)
+    session = Session.open(write_session(tmp_path / "faces", block, positions))
+    found = solved(session, rests(session))
+    pulls = []
+    for axis, true in zip("xyz", DEVICE.truth.gyr_scale, strict=True):
+        name = f"gyr_scale.{axis}"
+        assert found.uncertainty(name) < 1e-3
+        pulls.append(abs(found.value(name) - true) / found.uncertainty(name))
+    assert max(pulls) < 3.0 if right else max(pulls) > 4.0

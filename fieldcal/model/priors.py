@@ -39,7 +39,7 @@ timing and the hand take half a milliradian."""
 
 FILTERED_S = 0.1
 """Standard deviation of the time constant of a filter of the sensors, s: 1.6 Hz. Data
-sheets have 5 to 260 Hz; where a turn does not show it, scale factors are less certain."""
+sheets have 5 to 260 Hz; where turns do not show it, scale factors are less certain."""
 
 FLICKER_ACC, FLICKER_GYR = 2e-3, 1e-4
 """Typical flicker noise, m/s^2 and rad/s: where Allan deviations of consumer grade stay

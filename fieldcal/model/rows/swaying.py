@@ -162,7 +162,8 @@ def _at_rest(
             six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
         if q in found:
             waves, last = found[q][0], start - 1 - round(NEAR_S * rate)
-            turned = waves.turn(block.t[last : last + 1])[0]
+            # the rate falls to rest from this sample to the next one
+            turned = waves.turn(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.of(block.t[last + 1 : start])[:, 3:]
             six[start - 2 * few : start - few, 3:] -= turned * scale * rate / few
     return replace(block, acc=six[:, :3], gyr=six[:, 3:])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from session_folders import recorded, write_session
 
 from benchmarks.papers import sway as pier
 from fieldcal.calibration import Calibration
+from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare
@@ -155,6 +158,33 @@ def test_beating_waves_have_no_arm() -> None:
     some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
     (found,) = waves_of(block.t[some], block.six[some], np.ones(3))
     assert np.abs(found.arm).max() < 3.0
+
+
+def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
+    """From one attitude at rest to the same: the integral of the rate is zero.
+
+    At 25 Hz the base moves by 0.03 deg in half a sample, which is no noise.
+    """
+    rate, hz, size = 25.0, 0.31, np.deg2rad(0.9)
+    t = np.arange(0.0, 168.0, 1 / rate)
+    held = [(3.02 + 41.07 * i, 36.02 + 41.07 * i) for i in range(4)]
+    pulse, noise = 2 * np.pi * hz, np.random.default_rng(5)
+    turned, rates = size * np.sin(pulse * t), size * pulse * np.cos(pulse * t)
+    six = noise.normal(size=(len(t), 6)) * 1e-5
+    six[:, 1] += G0 * np.cos(turned)  # a rotation about x of what lies level
+    six[:, 2] -= G0 * np.sin(turned)
+    six[:, 3] += rates
+    block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
+    about = description.parse(
+        {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+                      for a, b in held]}
+    )  # fmt: skip
+    found = swaying(block, about)
+    assert found is not None
+    for (_, end), (start, _) in pairwise(held):
+        gap = slice(*np.searchsorted(t, [end, start]))
+        angle = trapezoid(found.block.gyr[gap, 0], t[gap])
+        assert abs(angle) < np.deg2rad(0.004)
 
 
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:

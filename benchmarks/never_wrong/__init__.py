@@ -38,26 +38,34 @@ GROUPED = {
     "the faces left out, by which gravity bears witness to angles": (
         "faces left out",
     ),
-    "positions in the wrong order": ("positions swapped",),
+    "positions in the wrong order, one forgotten": (
+        "positions swapped", "a position forgotten",
+    ),
+    "angles exchanged, counted the other way, in radians": (
+        "angles exchanged", "an angle counted the other way", "angles in radians",
+    ),
+    "windows that begin while it is turned": ("windows begun early",),
     "a position, an angle, or the gauge off": (
         "a position off", "a repeated angle off", "gauge long",
         "two positions or angles off",
     ),
-    "table tilted; level not said or wrong; angles not said": (
-        "table tilted", "level and angles not said", "level said wrongly",
+    "table tilted or kicked; level not said or wrong; angles not said": (
+        "table tilted", "table kicked", "level and angles not said",
+        "level said wrongly",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
         "latitude not said", "other hemisphere", "gravity said wrongly",
     ),
-    "mounting not said, an output reversed, outputs exchanged": (
+    "mounting not said; outputs or triads reversed or exchanged": (
         "mounting not said", "an output reversed", "outputs exchanged",
+        "a triad reversed", "triads in other axes",
     ),
     "another unit (g, deg/s, rad/s)": (
         "g labelled m/s²", "deg/s labelled rad/s", "rad/s labelled deg/s",
     ),
-    "time in ns, windows twice, a copied output": (
-        "time in ns", "windows overlapping", "windows listed 20 times",
-        "a gyroscope copied",
+    "time in ns, lost samples, windows twice, a copied output": (
+        "time in ns", "samples lost, time counted", "windows overlapping",
+        "windows listed 20 times", "a gyroscope copied",
     ),
     "a mean or a bias taken out": (
         "mean of acc removed", "mean of acc removed, rounded", "bias of gyr tracked",
@@ -67,8 +75,8 @@ GROUPED = {
     "filter, delay of the gyroscopes, lever arm": (
         "filter", "delay of the gyroscopes", "lever arm",
     ),
-    "biases that wander, or keep something of a turn": (
-        "bias that a turn leaves", "wandering biases",
+    "biases that warm up, wander, or keep something of a turn": (
+        "warm-up", "wandering biases", "bias that a turn leaves",
     ),
     "cut toward zero, clipped": ("cut toward zero", "clipped"),
 }  # fmt: skip

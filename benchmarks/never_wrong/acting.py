@@ -8,8 +8,9 @@ Written apart from everything that estimates. Device axes, m/s^2 and rad/s:
     W(t) = W(t - d)                            a delay of the gyroscopes
     U += s sign(f - f_before)                  what stays of the last turn
     U += q, W += r                             biases that wander by a random walk
+    U += c e^(-t/T), W += d e^(-t/T)           a device that warms up
 
-Sway turns the base about its level axis by a sine.
+Sway turns the base about its level axis by a sine, a kick by an angle that stays.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+KICK_S = 0.3
+"""How long a kick takes, s."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Acting:
     filtered, delayed : s
     stays : m/s^2, what the last turn leaves
     acc_walk, gyr_walk : what biases wander by in 100 s
+    acc_cold, gyr_cold, warming : what biases are off by at first, and T, s
+    kicked, kick_s : rad by which the base is turned for good, and when
 
     """
 
@@ -47,12 +53,20 @@ class Acting:
     stays: float = 0.0
     acc_walk: float = 0.0
     gyr_walk: float = 0.0
+    acc_cold: float = 0.0
+    gyr_cold: float = 0.0
+    warming: float = 1.0
+    kicked: float = 0.0
+    kick_s: float = 0.0
 
     def tilted(self, t: Floats) -> tuple[Floats, Floats]:
-        """Tilt of a base that sways, rad, and its rate, rad/s, (n,)."""
+        """Tilt of a base that sways or is kicked, rad, and its rate, rad/s, (n,)."""
         phase = 2 * np.pi * self.sway_hz * t
         rate = 2 * np.pi * self.sway_hz * self.swaying * np.cos(phase)
-        return self.swaying * np.sin(phase), rate
+        part = np.clip((t - self.kick_s) / KICK_S, 0.0, 1.0)
+        turned = self.kicked * (part - np.sin(2 * np.pi * part) / (2 * np.pi))
+        kick = self.kicked * (1 - np.cos(2 * np.pi * part)) / KICK_S
+        return self.swaying * np.sin(phase) + turned, rate + kick
 
     def felt(self, t: Floats, f: Floats, w: Floats) -> Floats:
         """The force where the accelerometers are, (n, 3)."""
@@ -76,9 +90,13 @@ class Acting:
     ) -> tuple[Floats, Floats]:
         """What biases are off by, (n, 3) each; nothing at the end."""
         step = np.sqrt((t[1] - t[0]) / 100.0)
+        warm = np.exp(-t / self.warming)[:, None] * np.array([1.0, -0.7, 0.4])
         walks = []
-        for size in (self.acc_walk, self.gyr_walk):
+        for size, cold in (
+            (self.acc_walk, self.acc_cold), (self.gyr_walk, self.gyr_cold),
+        ):  # fmt: skip
             walk = np.cumsum(rng.normal(0, size * step, (len(t), 3)), axis=0)
+            walk += cold * warm
             walks.append(walk - walk[t <= windows[-1, 1]][-1])
         acc, gyr = walks
         left, last = np.zeros(3), None

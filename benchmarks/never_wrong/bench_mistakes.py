@@ -132,6 +132,19 @@ def wandering(bench: Bench, rng: Rng) -> Bench:
     return _acting(bench, **walk)
 
 
+def warming(bench: Bench, rng: Rng) -> Bench:
+    """The device was switched on just before; biases come to rest in 30 to 600 s."""
+    cold = {"acc_cold": _size(rng, 1e-3, 0.1), "gyr_cold": _size(rng, 1e-5, 2e-3)}
+    return _acting(bench, warming=_size(rng, 30, 600), **cold)
+
+
+def kicked(bench: Bench, rng: Rng) -> Bench:
+    """Somebody kicks the table in a position: it stands 0.02 to 1 degrees otherwise."""
+    start, end = bench.windows[_one(bench, rng)]
+    size = float(np.deg2rad(_size(rng, 0.02, 1.0))) * float(rng.choice([-1, 1]))
+    return _acting(bench, kicked=size, kick_s=float(rng.uniform(start, end)))
+
+
 BEFORE: dict[str, Before] = {
     "a repeated angle off": repeated_angle,
     "gauge long": gauge_long,
@@ -147,6 +160,8 @@ BEFORE: dict[str, Before] = {
     "lever arm": on_an_arm,
     "bias that a turn leaves": stays,
     "wandering biases": wandering,
+    "warm-up": warming,
+    "table kicked": kicked,
 }
 
 

@@ -19,7 +19,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import tomlkit
 
-from benchmarks.never_wrong.mistakes import Written
+from benchmarks.never_wrong.written import Written
 from fieldcal.cli import main
 from fieldcal.commands.help import INTERRUPTED
 

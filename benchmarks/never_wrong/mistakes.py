@@ -1,4 +1,4 @@
-"""Mistakes of a plan, a cable, a firmware or a file, once something was recorded.
+"""Mistakes of a cable, a firmware or a file, once something was recorded.
 
 Each takes a session that is about to be written (what the device does, what it put out,
 what session.toml says of it) and spoils one thing of it.
@@ -6,87 +6,13 @@ what session.toml says of it) and spoils one thing of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded
-
-Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Written:
-    """A session: its tables and its samples; `ending` of the file of samples."""
-
-    about: dict[str, Any]
-    samples: Samples
-    ending: str = "parquet"
-
-
-After = Callable[[Written, Bench, Rng], Written]
-
-
-# -- of what is said
-
-
-def swapped(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Two positions are written down in the wrong order."""
-    rows = [dict(row) for row in written.about["position"]]
-    i, j = rng.choice(bench.stated or len(rows), 2, replace=False)
-    for key in ("alpha_deg", "beta_deg"):
-        if key in rows[i]:
-            rows[i][key], rows[j][key] = rows[j][key], rows[i][key]
-    return replace(written, about={**written.about, "position": rows})
-
-
-def _site(written: Written, **more: Any) -> Written:
-    site = {**written.about["site"], **more}
-    site = {key: value for key, value in site.items() if value is not None}
-    return replace(written, about={**written.about, "site": site})
-
-
-def latitude_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Nobody says where the bench is."""
-    return _site(written, latitude_deg=None, height_m=None)
-
-
-def other_hemisphere(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The latitude has the wrong sign."""
-    return _site(written, latitude_deg=-bench.latitude)
-
-
-def level_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Nobody says how level the base is, nor how well angles are set."""
-    return _site(written, level_deg=None, angle_setting_deg=None)
-
-
-def level_said_wrongly(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The base is said to be level to 0.01 degrees, however it stands."""
-    return _site(written, level_deg=0.01)
-
-
-def default_mounting(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The device is mounted otherwise, and nobody says so."""
-    about = {**written.about, "frame": {"mounting": ["+x", "+y", "+z"]}}
-    return replace(written, about=about)
-
-
-def overlapping(written: Written, bench: Bench, rng: Rng) -> Written:
-    """A window of the list begins before the one before it ends."""
-    rows = [dict(row) for row in written.about["position"]]
-    i = int(rng.integers(1, len(rows)))
-    rows.insert(i, {**rows[i - 1], "start_s": rows[i - 1]["start_s"] + 1.0})
-    return replace(written, about={**written.about, "position": rows})
-
-
-def listed_often(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Every window is listed 20 times."""
-    rows = [dict(row) for row in written.about["position"] for _ in range(20)]
-    return replace(written, about={**written.about, "position": rows})
-
+from benchmarks.never_wrong.said_mistakes import SAID
+from benchmarks.never_wrong.written import After, Rng, Written, tables
 
 # -- of units, wiring and order
 
@@ -130,6 +56,29 @@ def axes_exchanged(written: Written, bench: Bench, rng: Rng) -> Written:
     acc = s.acc[:, order] if triad == 0 else s.acc
     gyr = s.gyr[:, order] if triad == 1 else s.gyr
     return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def triad_turned_round(written: Written, bench: Bench, rng: Rng) -> Written:
+    """All of a triad has the other sign: gravity for specific force, left for right."""
+    s = written.samples
+    if rng.integers(2):
+        return replace(written, samples=replace(s, acc=-s.acc))
+    return replace(written, samples=replace(s, gyr=-s.gyr))
+
+
+def triads_unlike(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The gyroscopes are a chip of their own, whose axes are called otherwise."""
+    s = written.samples
+    return replace(written, samples=replace(s, gyr=np.roll(s.gyr, 1, axis=1)))
+
+
+def samples_lost(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Samples of 0.05 to 1 s are lost on a way, and time is counted by samples."""
+    s, way = written.samples, int(rng.integers(1, len(bench.windows)))
+    middle = (bench.windows[way - 1, 1] + bench.windows[way, 0]) / 2
+    lost = s.within(middle, middle + np.exp(rng.uniform(np.log(0.05), 0.0)))
+    t = s.t[: np.count_nonzero(~lost)]
+    return replace(written, samples=Samples(t, s.acc[~lost], s.gyr[~lost]))
 
 
 def gyr_copied(written: Written, bench: Bench, rng: Rng) -> Written:
@@ -180,66 +129,29 @@ def cut_toward_zero(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=acc), ending=ending)
 
 
-def gravity_said(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The gravity that is written down is off by 0.05 to 0.3 %."""
-    off = rng.uniform(5e-4, 3e-3) * rng.choice([-1, 1])
-    return _site(written, gravity=bench.gravity * (1 + off))
-
-
 def clipped(written: Written, bench: Bench, rng: Rng) -> Written:
     """The full scale is 8 to 9.6 m/s^2."""
     s, most = written.samples, rng.uniform(8, 9.6)
     return replace(written, samples=replace(s, acc=np.clip(s.acc, -most, most)))
 
 
-AFTER: dict[str, After] = {
-    "positions swapped": swapped,
-    "latitude not said": latitude_unsaid,
-    "other hemisphere": other_hemisphere,
-    "level and angles not said": level_unsaid,
-    "mounting not said": default_mounting,
-    "windows overlapping": overlapping,
-    "windows listed 20 times": listed_often,
+AFTER: dict[str, After] = SAID | {
     "g labelled m/s²": acc_in_g,
     "deg/s labelled rad/s": gyr_in_deg,
     "rad/s labelled deg/s": gyr_said_deg,
     "time in ns": time_in_ns,
+    "samples lost, time counted": samples_lost,
     "an output reversed": axis_turned_round,
+    "a triad reversed": triad_turned_round,
     "outputs exchanged": axes_exchanged,
+    "triads in other axes": triads_unlike,
     "a gyroscope copied": gyr_copied,
     "mean of acc removed": acc_mean_taken,
     "mean of acc removed, rounded": mean_taken_and_rounded,
     "bias of gyr tracked": gyr_tracked,
     "cut toward zero": cut_toward_zero,
-    "gravity said wrongly": gravity_said,
     "clipped": clipped,
-    "level said wrongly": level_said_wrongly,
 }
-
-
-def tables(bench: Bench) -> dict[str, Any]:
-    """What an honest session.toml says of a bench."""
-    site: dict[str, Any] = {"latitude_deg": bench.latitude, "height_m": bench.height}
-    if bench.level_deg is not None:
-        site["level_deg"] = bench.level_deg
-    if bench.angles_deg is not None and not bench.imported:
-        site["angle_setting_deg"] = bench.angles_deg
-    rows: list[dict[str, float]] = []
-    for (alpha, beta), (start, end) in zip(bench.angles, bench.windows, strict=True):
-        row = {"start_s": float(start), "end_s": float(end)}
-        if len(rows) < bench.stated:
-            row |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
-        rows.append(row)
-    about: dict[str, Any] = {
-        "format": 1,
-        "device": {"name": "drawn", "serial": "N-1", "grade": bench.grade},
-        "site": site,
-        "frame": {"mounting": list(bench.mounting)},
-        "position": rows,
-    }
-    if not bench.imported:
-        about["run"] = {"procedure": "positions"}
-    return about
 
 
 def session(bench: Bench, names: tuple[str, ...], rng: Rng) -> Written:

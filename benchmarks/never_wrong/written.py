@@ -1,0 +1,51 @@
+"""A session that is about to be written: what was put out, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.never_wrong.bench import Bench, Samples
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Written:
+    """A session: its tables and its samples; `ending` of the file of samples."""
+
+    about: dict[str, Any]
+    samples: Samples
+    ending: str = "parquet"
+
+
+After = Callable[[Written, Bench, Rng], Written]
+"""A mistake that is made once something was recorded."""
+
+
+def tables(bench: Bench) -> dict[str, Any]:
+    """What an honest session.toml says of a bench."""
+    site: dict[str, Any] = {"latitude_deg": bench.latitude, "height_m": bench.height}
+    if bench.level_deg is not None:
+        site["level_deg"] = bench.level_deg
+    if bench.angles_deg is not None and not bench.imported:
+        site["angle_setting_deg"] = bench.angles_deg
+    rows: list[dict[str, float]] = []
+    for (alpha, beta), (start, end) in zip(bench.angles, bench.windows, strict=True):
+        row = {"start_s": float(start), "end_s": float(end)}
+        if len(rows) < bench.stated:
+            row |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
+        rows.append(row)
+    about: dict[str, Any] = {
+        "format": 1,
+        "device": {"name": "drawn", "serial": "N-1", "grade": bench.grade},
+        "site": site,
+        "frame": {"mounting": list(bench.mounting)},
+        "position": rows,
+    }
+    if not bench.imported:
+        about["run"] = {"procedure": "positions"}
+    return about

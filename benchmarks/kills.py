@@ -198,20 +198,31 @@ def _ended(
 
 
 def series(
-    kind: str, runs: int, seed: int = 1, most: int | None = None
+    kind: str,
+    runs: int,
+    seed: int = 1,
+    most: int | None = None,
+    speed: str = SPEED,
+    until: float = 1.1,
 ) -> list[Outcome]:
-    """So many runs that are ``killed`` or ``pulled``, each `most` times at most."""
+    """So many runs that are ``killed`` or ``pulled``, each `most` times at most.
+
+    Instants lie in the first part of a whole run, or behind it if `until` is above 1;
+    `speed` is the device's time against the clock.
+    """
     rng, outcomes = np.random.default_rng(seed), []
     one = {"killed": killed, "pulled": pulled}[kind]
     times = {} if most is None else {"most": most}
     folder = Path(tempfile.mkdtemp(prefix="fieldcal-kills-"))
     try:
         for first in range(0, runs, DEVICES):
-            bench = Bench(folder, seed + first)
+            bench = Bench(folder, seed + first, speed)
             bench.start(folder / f"whole-{first}").communicate()
             whole = recorded(folder / f"whole-{first}")
             for number in range(first, min(runs, first + DEVICES)):
-                outcomes.append(one(bench, f"run-{number}", rng, 1.1 * whole, **times))
+                outcomes.append(
+                    one(bench, f"run-{number}", rng, until * whole, **times)
+                )
                 shutil.rmtree(folder / f"run-{number}", ignore_errors=True)
             bench.device.close()
     finally:

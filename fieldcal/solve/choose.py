@@ -242,7 +242,7 @@ class _Session:
             return self._with("none"), [self._level_taken()]
         if len(usable) == 1:
             name = next(iter(usable))
-            return self._with(name), [f"the tilt is taken as {name}"]
+            return self._whole(name, usable), [f"the tilt is taken as {name}"]
         ahead = usable["angle_offset"].score - usable["base_tilt"].score
         best, other = TILTS if ahead >= 0 else TILTS[::-1]
         ahead = abs(ahead)
@@ -258,8 +258,14 @@ class _Session:
                 " both; more positions with both angles turned would tell"
             )
         weight = 1 / (1 + float(np.exp(min(ahead, 50.0))))
-        found = self._with(best)
+        found = self._whole(best, usable)
         return found.mixed_with(usable[best], usable[other], weight), [note]
+
+    def _whole(self, tilt: Tilt, by_windows: dict[Tilt, Estimated]) -> Estimated:
+        """The set by all rows, where there are more than those it was chosen by."""
+        if self.turning is None and not self.recorded.shown:
+            return by_windows[tilt]
+        return self._with(tilt)
 
     def _level_taken(self) -> str:
         extra = ladder_remedy(self.observations, parameters("angle_offset"))

@@ -199,7 +199,8 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
 @pytest.mark.parametrize("runs", [1, pytest.param(6, marks=pytest.mark.thorough)])
 def test_runs_that_are_broken_end_with_right_numbers(kind: str, runs: int) -> None:
     """A few of what benchmarks/kills.py does by the hundred."""
-    outcomes = series(kind, runs, seed=11, most=1)
+    # the kill must come before the end also where it waits seconds for a processor
+    outcomes = series(kind, runs, seed=11, most=1, speed="20", until=0.5)
     assert sum(one.broken for one in outcomes) > runs / 2
     for one in outcomes:
         assert one.lost == 0 and one.says == ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -49,6 +49,13 @@ class Position:
             float(np.deg2rad(beta)),
             gamma=float(np.deg2rad(gamma)),
         )
+
+    def times(self, size: float) -> Position:
+        """The same with angles that are so many times as large."""
+        if self.alpha is None or self.beta is None:
+            return self
+        alpha, beta, gamma = (size * a for a in (self.alpha, self.beta, self.gamma))
+        return replace(self, alpha=alpha, beta=beta, gamma=gamma)
 
     @property
     def oriented(self) -> bool:

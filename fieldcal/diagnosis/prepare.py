@@ -78,6 +78,7 @@ def prepare(block: Block, about: Description) -> Prepared:
     about.refuse_overlap()
     known = known_terms(about.model)
     checked = check(block, about)
+    about = about.with_angles_times(checked.angles)
     sways = swaying(masked(checked.block, checked.usable), about)
     if sways is not None:
         checked = _without_sway(checked, sways, about)

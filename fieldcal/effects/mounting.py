@@ -10,7 +10,9 @@ turns by an angle that the gyroscopes must at least turn through:
 
 which is 1 to about 2, and 57.3 times that where deg/s are taken for rad/s; and where
 the axes of the gyroscopes are not those of the accelerometers, gravity does not turn as
-they say (`rate_axes`). Source: model of this project.
+they say (`rate_axes`). Angles that are written in radians are tried in the same way as
+axes are: they leave the force nearly where it was at home. Source: model of this
+project.
 
 >>> import numpy as np
 >>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
@@ -22,14 +24,16 @@ they say (`rate_axes`). Source: model of this project.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.physics.effect import Chain
+from fieldcal.physics.experience import Experience
 from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns, signed_axes
 from fieldcal.physics.recording import CheckedSamples, Fault
 
@@ -46,6 +50,9 @@ UNITS = {"g": G0, "mg": 1e-3 * G0, "m/s^2 read as g": 1 / G0, "deg/s": np.pi / 1
 NEAR = 0.05
 
 RATES = {"deg/s": np.pi / 180, "mrad/s": 1e-3, "rad/s read as deg/s": 180 / np.pi}
+ANGLES = {"rad": 180 / np.pi}
+"""What the stated angles are to be multiplied by, if they have another unit."""
+
 USUAL, AROUND = 1.5, 4.0
 """Angle turned over the least that it can be, and by what factor that may be off: units
 are 17 apart and more."""
@@ -65,6 +72,27 @@ def turned_axes(measured: Array, f: Array) -> tuple[Array, float]:
     if odds[best][1] > FITS * measured.size:
         return every[0], 0.0
     return every[best], odds[best][0] - odds[0][0]
+
+
+def angle_unit(x: Experience, held: Index, measured: Array) -> str:
+    """Unit of the stated angles, if it is not the degree; empty if it is.
+
+    Parameters
+    ----------
+    x : positions
+    held : (n,) those whose angles are known
+    measured : (n, 3) m/s^2 in them, with the nominal calibration taken out
+
+    """
+    if len(held) < 2:
+        return ""
+    said = max(_odds(measured, x.f[held] @ axes.T)[0] for axes in signed_axes())
+    for name, size in ANGLES.items():
+        other = x.turned(alpha=size * x.alpha, beta=size * x.beta, gamma=size * x.gamma)
+        likely, squares = _odds(measured, other.f[held])
+        if squares <= FITS * measured.size and likely - said > BETTER:
+            return name
+    return ""
 
 
 def _odds(measured: Array, f: Array) -> tuple[float, float]:
@@ -135,14 +163,20 @@ def _of_rates(
     """Gyroscopes in another unit or other axes, which a matrix (3, 3) puts right."""
     six = recording.block.six
     six[:, 3:] = six[:, 3:] @ undo.T
+    return replace(
+        _all_along(recording), channel="gx", values=values, size=1.0, mended=six
+    )
+
+
+def _all_along(recording: CheckedSamples) -> Fault:
+    """A fault of all forces, from the first sample to the last."""
     return Fault(
-        channel="gx",
-        values=values,
+        channel="ax",
+        values={},
         sigmas={},
         from_s=float(recording.block.t[0]),
         to_s=float(recording.block.t[-1]),
-        size=1.0,
-        mended=six,
+        size=recording.x.gravity,
     )
 
 
@@ -157,7 +191,8 @@ class Mounting(Chain):
     cure = (
         "Correct [frame] mounting, or the unit, by the drawing on the device; where"
         " gyr_axes says that gx gy gz lie along other axes than the accelerometers',"
-        " import again with --columns that name them so, such as -gy,gx,gz."
+        " import again with --columns that name them so, such as -gy,gx,gz. Write"
+        " angles in degrees."
     )
     source = "model of this project"
 
@@ -173,6 +208,9 @@ class Mounting(Chain):
         if unit:
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
         oriented = recording.x.oriented[held]
+        if angle := angle_unit(recording.x, np.array(held)[oriented], acc[oriented]):
+            fault, size = _all_along(recording), ANGLES[angle]
+            return [replace(fault, values={"angles": angle}, angles=size)]
         force = np.where(oriented[:, None], recording.x.f[held], acc)
         if rate := rate_unit(turns_seen(recording, held, force)):
             return [_of_rates(recording, RATES[rate] * np.eye(3), {"unit": rate})]
@@ -221,12 +259,5 @@ class Mounting(Chain):
         six = recording.block.six
         acc = six[:, :3] @ undo.T * unit
         gyr = six[:, 3:] @ undo.T @ (np.eye(3) if rates is None else rates.T)
-        return Fault(
-            channel="ax",
-            values=values,
-            sigmas={},
-            from_s=float(recording.block.t[0]),
-            to_s=float(recording.block.t[-1]),
-            size=recording.x.gravity,
-            mended=np.hstack([acc, gyr]),
-        )
+        mended = np.hstack([acc, gyr])
+        return replace(_all_along(recording), values=values, mended=mended)

@@ -155,9 +155,11 @@ def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
         effect = catalogue()[name]
         if isinstance(effect, Chain) and effect.misread:
             values = ", ".join(f"{k} = {v}" for k, v in fault.values.items())
+            mended = fault.mended is not None
             sentences.append(
                 f"session.toml is wrong about the {name} ({values}): mend it and solve"
-                " again; the numbers are those of samples that were put right"
+                " again; the numbers are those of"
+                f" {'samples that were put right' if mended else 'what it states'}"
             )
     if not sentences:
         return calibration

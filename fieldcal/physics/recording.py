@@ -100,6 +100,7 @@ class Fault:
     sigma : significance, in standard deviations
     mended : (n, 6) outputs put right, where they can be
     channels : every channel concerned, if there are several
+    angles : what stated angles are to be multiplied by to be right
 
     """
 
@@ -113,6 +114,7 @@ class Fault:
     sigma: float = np.inf
     mended: Array | None = None
     channels: tuple[str, ...] = ()
+    angles: float = 1.0
 
 
 def medians(values: Array) -> Array:

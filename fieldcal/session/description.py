@@ -188,6 +188,12 @@ class Description:
                     " device cannot be in both; mend start_s and end_s"
                 )
 
+    def with_angles_times(self, size: float) -> Description:
+        """The same with all angles of positions so many times as large."""
+        if size == 1.0:
+            return self
+        return replace(self, positions=tuple(p.times(size) for p in self.positions))
+
     def numbered(self, positions: Iterable[int]) -> tuple[int, ...]:
         """Return what session.toml counts them as; a recording without any is 0."""
         numbers = self.numbers or (0,)

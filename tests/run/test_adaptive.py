@@ -124,6 +124,7 @@ def of_device(folder: Path, *effects: SimulatedEffect) -> Bench:
 ADAPTIVE = {"procedure": "adaptive"}
 
 
+@pytest.mark.thorough
 def test_it_ends_at_go_also_if_it_was_stopped_on_the_way(bench: Bench) -> None:
     """What cannot be reached is not chosen again; what is taken again is the same."""
     bench.hand.wants = {2: "repeat", 3: "stop"}
@@ -199,6 +200,7 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     assert all("one position more" in t and "then GO is expected" in t for t in said)
 
 
+@pytest.mark.thorough
 def test_two_positions_and_those_of_a_remedy_are_solved_together(
     tmp_path: Path,
 ) -> None:

@@ -56,6 +56,11 @@ class Checked:
         return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
 
     @property
+    def angles(self) -> float:
+        """What the stated angles are to be multiplied by."""
+        return float(np.prod([fault.angles for _, fault in self.faults]))
+
+    @property
     def pace(self) -> float:
         """Seconds of the device's clock in a true second."""
         found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]

@@ -85,6 +85,7 @@ class General:
         step up and down, and the step
     each : whether every position has columns of its own, which follow each other; in
         `sides` all positions are then changed at once
+    along : whether rows of a turn have it by those beside them
 
     """
 
@@ -92,6 +93,7 @@ class General:
     of: Callable[[RowView], Array]
     sides: Sides | None = None
     each: bool = False
+    along: bool = False
 
 
 def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> General:

@@ -32,7 +32,7 @@ FILTERED = "bandwidth"
 
 def filtered_turns(table: ColumnTable) -> Group:
     """Columns of v of the accelerometers and of the gyroscopes, then of c of both."""
-    at = table.add(General(FILTERED, _bent), 4) + np.arange(4)
+    at = table.add(General(FILTERED, _bent, along=True), 4) + np.arange(4)
     tau = priors.FILTERED_S
     size = np.array([tau**2, tau**2, 2 * tau**3, 2 * tau**3])
     return Group("device", FILTERED, at, size, fixed=1.0)

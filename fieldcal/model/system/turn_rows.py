@@ -19,13 +19,14 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import triads_of
-from fieldcal.model.causes.columns import Course, General, RowView
+from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.way_rows import WayRows, on_the_way, settling
+from fieldcal.model.system.met_columns import Met, met_columns
+from fieldcal.model.system.way_rows import WayRows, settling
 from fieldcal.model.turns.attitude import closures, geometry, rows_of
 from fieldcal.model.turns.turn import Turn, Turning, moved
 
@@ -97,7 +98,6 @@ class Turns:
         `windows` are the rows of the windows about the same state, `known` is what they
         say; None where that is still to be sought, and the way is not looked at.
         """
-        out: list[TurnRows] = []
         seen = self.way and known is not None and not _strange(known)
         self.scale, self.known = state.scale, known if seen else None
         self.at_ends = {
@@ -108,8 +108,12 @@ class Turns:
         if self.dictionary.free.any():
             self.means = _means(windows, self.dictionary)
             self.spread = _spread(windows, self.dictionary)
-        out += [self._rows(t, state, values) for t in self.turning.turns(state)]
-        return _steadied(out)
+        turns = list(self.turning.turns(state))
+        views = [self._view(turn, state) for turn in turns]
+        met = met_columns(turns, views, self.dictionary, self.at_ends, self.known)
+        return _steadied(
+            [self._rows(*one, values) for one in zip(turns, views, met, strict=True)]
+        )
 
     def courses(self, state: State, terms: Sequence[Term]) -> Iterator[Array]:
         """Outputs that some terms make in each turn, at its edges, (m + 1, 6)."""
@@ -122,14 +126,16 @@ class Turns:
 
     # -- rows
 
-    def _rows(self, turn: Turn, state: State, values: Array) -> TurnRows:
+    def _view(self, turn: Turn, state: State) -> RowView:
+        """A turn as columns see it."""
+        since = self.turning.after(turn.x.t, turn.positions[1])
+        return RowView(turn.x, turn.x, since, state)
+
+    def _rows(self, turn: Turn, view: RowView, met: Met, values: Array) -> TurnRows:
         """Closure and way of one turn, by all columns that reach them."""
-        d = self.dictionary
-        view = RowView(
-            turn.x, turn.x, self.turning.after(turn.x.t, turn.positions[1]), state
-        )
+        d, state = self.dictionary, view.state
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
-        index, close, general = self._met(turn, view)
+        index, close, general = met.index, met.closing, met.general
         loose = dict(self._loose_ends(turn)) if d.free.any() else {}
         ends: Array = np.zeros((3, 3))
         for p, bent in loose.items():
@@ -152,36 +158,6 @@ class Turns:
             seen_by = WayRows(turn, view, d, self.known, self.rows.noise)
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
-
-    def _met(
-        self, turn: Turn, view: RowView
-    ) -> tuple[Index, Array, list[tuple[Index, Array]]]:
-        """Columns that a turn can meet, and how its closure moves with each, (3, k).
-
-        Then what the way is to be looked at by: columns and outputs of each basis.
-        """
-        d, weights = self.dictionary, turn.weights(view.state.scale[3:])
-        at, closing, general = [], [], []
-        for first, one in d.bases:
-            if isinstance(one, Course):
-                if d.free.any():  # it turns the force that is seen at the ends
-                    width = 3 * one.width
-                    at.append(first + np.arange(width))
-                    closing.append(np.zeros((3, width)))
-                if not one.timed:
-                    continue
-                table = one.of(view)
-                for c in (3, 4, 5):
-                    at.append(first + c * table.shape[1] + np.arange(table.shape[1]))
-                    closing.append(weights[:, :, c - 3] @ table)
-                continue
-            columns, outputs, bent = self._of_basis(turn, view, first, one)
-            at.append(columns)
-            closing.append(np.einsum("ijc,jck->ik", weights, outputs[:, 3:]) - bent)
-            if self.known is not None:
-                kept = on_the_way(columns, d, self.known)
-                general.append((columns[kept], outputs[:, :, kept]))
-        return np.concatenate(at), np.concatenate(closing, axis=1), general
 
     def _closure_variance(self, turn: Turn, view: RowView) -> float:
         """Variance of a closure about every axis: noise, time steps and filters, rad^2.
@@ -217,16 +193,6 @@ class Turns:
                 sides.append(closures(f, held, turn.attitude[-1])[0])
             bent = (sides[0] - sides[1]).T / (2 * step)
             yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
-
-    def _of_basis(
-        self, turn: Turn, view: RowView, first: int, one: General
-    ) -> tuple[Index, Array, Array]:
-        """Columns, outputs at the edges (m + 1, 6, k), how the closure moves (3, k)."""
-        if first in self.at_ends:
-            return self.at_ends[first].met_by(turn, view.state.scale)
-        table = one.of(view)
-        columns = first + np.arange(table.shape[2])
-        return columns, table, np.zeros((3, table.shape[2]))
 
 
 def _strange(known: Set) -> bool:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,13 @@ from fieldcal.physics.experience import Experience
 
 LEAST = np.deg2rad(1.0)
 """A smaller turn says nothing."""
+
+PER_ROW = (
+    "alpha", "beta", "gamma", "f", "w", "w_dot", "slope", "bend", "missed", "f_bend",
+    "t", "lasts", "since_start", "since_turn", "warming", "heating", "variance",
+    "position", "rate", "speed", "speed_sigma", "attitude_sigma",
+)  # fmt: skip
+"""Fields of what is experienced that differ from row to row."""
 
 RIDS = 3
 """Times that what the state has wrong is taken out: each leaves a percent of it."""
@@ -252,14 +260,16 @@ def _on_the_way(source: RowSource) -> RowSource:
 
 def only(x: Experience, rows: Sequence[int]) -> Experience:
     """Some rows."""
-    per_row = {
-        name: getattr(x, name)[list(rows)]
-        for name in ("alpha", "beta", "f", "w", "w_dot", "slope", "t", "lasts",
-                     "since_start", "since_turn", "warming", "heating", "variance",
-                     "position", "rate", "speed", "speed_sigma", "gamma",
-                     "attitude_sigma")
-    }  # fmt: skip
-    return replace(x, **per_row)
+    some: dict[str, Any] = {n: getattr(x, n)[list(rows)] for n in PER_ROW}
+    return replace(x, **some)
+
+
+def joined(some: Sequence[Experience]) -> Experience:
+    """Rows of one session, one after the other."""
+    every: dict[str, Any] = {
+        n: np.concatenate([getattr(x, n) for x in some]) for n in PER_ROW
+    }
+    return replace(some[0], **every)
 
 
 def moved(x: Experience, state: State) -> Experience:

@@ -1,0 +1,42 @@
+"""Columns that turns meet: those of all turns at once are those of each by itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.concealed import kinds
+from fieldcal.diagnosis.explain import explain
+from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.causes.columns import RowView
+from fieldcal.model.system import turn_rows
+from fieldcal.model.system.met_columns import Met, met_columns
+from fieldcal.model.turns.turn import Turn
+
+
+def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With every column that a session has, on the way as well."""
+    seen: list[tuple[Met, Met]] = []
+
+    def both(turns: list[Turn], views: list[RowView], *known: Any) -> list[Met]:
+        out = met_columns(turns, views, *known)
+        for turn, view, met in zip(turns, views, out, strict=True):
+            (alone,) = met_columns([turn], [view], *known)
+            seen.append((met, alone))
+        return out
+
+    monkeypatch.setattr(turn_rows, "met_columns", both)
+    session = kinds()["gyro_scale"][0](np.random.default_rng(7))
+    found = explain(prepare(session.record(7), session.about))
+    assert "gyro_scale" in [one.name for one in found.standing]
+    assert len(seen) > 10 and any(met.general for met, _ in seen)
+    for met, alone in seen:
+        np.testing.assert_array_equal(met.index, alone.index)
+        np.testing.assert_allclose(met.closing, alone.closing, rtol=1e-12, atol=1e-300)
+        for (columns, outputs), (own, other) in zip(
+            met.general, alone.general, strict=True
+        ):
+            np.testing.assert_array_equal(columns, own)
+            np.testing.assert_allclose(outputs, other, rtol=1e-12, atol=1e-300)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.never_wrong import mistakes
 from benchmarks.never_wrong.bench import drawn
 from benchmarks.never_wrong.bench_mistakes import spoilt
 from benchmarks.never_wrong.judging import (
@@ -23,7 +24,9 @@ LIMIT = 600.0
 
 def of(folder: Path, seed: int, *names: str) -> Judged:
     rng = np.random.default_rng(seed)
-    bench = spoilt(drawn(rng), names, rng)
+    bench = drawn(rng)
+    names = names or mistakes(seed, rng, "")
+    bench = spoilt(bench, names, rng)
     write(folder, session(bench, names, rng))
     return judged(folder, bench.truth, bench.grade, False, LIMIT)
 
@@ -44,6 +47,12 @@ def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
 ) -> None:
     found = of(tmp_path / "six", 93_000_015)
     assert found.go and 0 < found.off < WRONG
+
+
+def test_a_gauge_as_long_as_the_gyroscopes_are_weak_is_seen(tmp_path: Path) -> None:
+    """0.25 % and 0.27 %: turns show neither, and a K2 of 3 mg/g2 was taken for both."""
+    found = of(tmp_path / "wide", 99_400_097)
+    assert found.off < 3.0
 
 
 @pytest.mark.thorough

@@ -91,6 +91,7 @@ class Inference(Refinement):
         """
         members: tuple[Member, ...] = ()
         seen: set[tuple[tuple[str, int], ...]] = set()
+        passed: dict[tuple[Member, ...], None] = {}
         for _ in range(PASSES):
             seen.add(Search.key(found.members))
             if found.members != members:
@@ -102,6 +103,9 @@ class Inference(Refinement):
                 # points, estimated beside, would be taken off the way a second time
                 state, values, found = self.settled(state, values, members, found.sizes)
             search = Search(self.dictionary, self.gram(state, values, found))
+            for before in passed:
+                search.evaluated(before)  # it may be as likely as what replaced it
+            passed[found.members] = None
             found = search.run(members, thorough=False)
             same = frozenset(c.key for c, _ in members)
             if thorough and found.keys == same:

@@ -48,7 +48,7 @@ class Search(Offers):
         """
         changes = [self._followed, self._replaced]
         if thorough:
-            changes += [self._paired, self._instead, self._wider]
+            changes += [self._paired, self._instead, self._wider, self._beside_usual]
         best = self.evaluated(start)
         for _ in range(MOST):
             better = self._step(best, changes)
@@ -147,6 +147,31 @@ class Search(Offers):
                 members[i] = (cause, whole)
                 wide = self.evaluated(tuple(members), there.sizes)
                 found.append(self._followed(wide, there.score))
+        return max(found, key=_score)
+
+    def _beside_usual(self, there: Set) -> Set:
+        """The best set with another cause in the place of one, beside what is usual.
+
+        What every device has is left out where it does not show. It may not show as
+        another cause does the opposite, such as a gauge that is as long as gyroscopes
+        are weak: neither of the two then raises the evidence without the other.
+        """
+        missing = [
+            (c, c.variants[0])
+            for c in self.dictionary.causes
+            if c.usual and c.key not in there.keys
+        ]
+        others = {c.key for c, _ in there.members if not c.usual}
+        if not (missing and others):
+            return there
+        whole, found = self.evaluated((*there.members, *missing)), [there]
+        near, beside = there.score - OTHERWISE, there.sizes.instability
+        for i, (cause, _) in enumerate(whole.members):
+            if cause.key in others:
+                less = self.without(whole, i)
+                other = self._followed(less, near, beside)
+                if other is not less:
+                    found.append(self.upheld(other.members))
         return max(found, key=_score)
 
     def _instead(self, there: Set) -> Set:

@@ -40,6 +40,7 @@ def decided(
     return assess(solved(session, still), session, still, bounds, None)
 
 
+@pytest.mark.thorough  # as test_adaptive has it of a run that asks for it at once
 def test_the_position_that_is_asked_for_makes_it_go(tmp_path: Path) -> None:
     five = [p.degrees or (0.0, 0.0) for p in FIVE]
     loose = replace(LIMITS, acc_bias_sigma=1.0, acc_scale_sigma=1.0)

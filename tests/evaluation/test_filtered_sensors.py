@@ -24,7 +24,11 @@ DEVICE = Profile(
 
 
 @pytest.mark.parametrize(
-    ("known_s", "right"), [(priors.FILTERED_S, True), (1e-4, False)]
+    ("known_s", "right"),
+    [
+        (priors.FILTERED_S, True),
+        pytest.param(1e-4, False, marks=pytest.mark.thorough),
+    ],
 )
 def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
     known_s: float, right: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -56,6 +56,7 @@ def test_white_noise_falls_with_the_root_of_the_time(tmp_path: Path) -> None:
     assert {made.wins(f"acc_bias.{axis}") for axis in "xyz"} == {None}
 
 
+@pytest.mark.thorough
 def test_what_the_fixture_leaves_stays(tmp_path: Path) -> None:
     made = found(tmp_path, setting=0.05)
     k = made.names.index("acc_bias.y")

@@ -101,7 +101,7 @@ def test_a_procedure_brings_its_positions(name: str) -> None:
         ),
         (
             {"run": {}, "position": [{"alpha_deg": 1}]},
-            '[[position]] number 1 = {"alpha_deg": 1} cannot be: give alpha_deg and beta_deg,',
+            '{"alpha_deg": 1} cannot be: give alpha_deg and beta_deg, rotation',
         ),
         ({"run": {}, "position": POSITIONS[:1] * 3}, "are the same"),
         ({"run": {}}, "are not enough"),

@@ -5,7 +5,8 @@
 For every kind of session: how often it is named right or honestly aliased, how much of
 what is said is not there, how the numbers hold against their intervals, and by how much
 positions left out are predicted better. Seeds and effects are not known to the
-diagnosis.
+diagnosis. Runs of a navigator whose set-up is wrong are solved and not diagnosed
+(`navigators`).
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
 
 import numpy as np
 
 from benchmarks._words import how_many, option
 from benchmarks.concealed import draws, others, setups
 from benchmarks.concealed.judging import Outcome, judged
+from benchmarks.concealed.navigators import NAVIGATORS
 from benchmarks.concealed.sessions import Session, plain
 from benchmarks.concealed.tables import printed
 from fieldcal.diagnosis import diagnose
@@ -28,6 +31,9 @@ from fieldcal.sim_device.effects import kind
 Draw = Callable[[np.random.Generator], Session]
 
 USUAL, QUICK = 600, 100
+EACH = 3
+"""How often a kind is drawn, of the weights of all."""
+
 SIGMAS = (10.0, 30.0)
 SEED = 20_981_000
 """Of the first session; another one draws sessions that nobody has looked at."""
@@ -94,13 +100,25 @@ def outcome(seed: int, session: Session) -> Outcome:
     return judged(session, seed, told, time.perf_counter() - start)
 
 
+def of_navigators(count: int, only: str, first: int) -> Iterator[Outcome]:
+    """What is said of runs of a navigator with a wrong set-up, each like a kind."""
+    mine = {k: draw for k, draw in NAVIGATORS.items() if only in k}
+    rest = sum(weight for k, (_, weight) in kinds().items() if only in k)
+    each = max(1, round(count * EACH / (rest or EACH * max(len(mine), 1))))
+    for k, draw in enumerate(mine.values(), len(kinds())):
+        for seed in range(1000 * k + first, 1000 * k + first + each):
+            yield draw(np.random.default_rng(seed)).outcome(seed)
+
+
 def main() -> None:
     """Print the tables."""
     count = how_many(QUICK if "--quick" in sys.argv else USUAL)
+    only, first = option("only"), int(option("seed", str(SEED)))
     found = []
-    for seed, session in drawn(count, option("only"), int(option("seed", str(SEED)))):
-        one = outcome(seed, session)
+    diagnosed = (outcome(seed, one) for seed, one in drawn(count, only, first))
+    for one in chain(diagnosed, of_navigators(count, only, first)):
         found.append(one)
         if not one.right:
-            print(f"{one.label} (seed {seed}): {one.verdict} {one.named}", flush=True)
+            where = f"{one.label} (seed {one.seed})"
+            print(f"{where}: {one.verdict} {one.named}", flush=True)
     printed(found)

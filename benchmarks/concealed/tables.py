@@ -84,7 +84,9 @@ def power(found: Sequence[Outcome]) -> str:
 
 def reliability(found: Sequence[Outcome]) -> str:
     """Of what is said with a probability, how much is so; and the log score."""
-    claims = np.array([c for o in found for c in o.claims], dtype=float)
+    claims = np.array([c for o in found for c in o.claims], dtype=float).reshape(-1, 2)
+    if not len(claims):
+        return "nothing is said with a probability"
     lines = ["| said with P | how often | mean P | is so |", "|---|---|---|---|"]
     for low in np.arange(0.5, 1.0, 0.1):
         top = 1.0 + 1e-9 if low > 0.85 else low + 0.1

@@ -2,15 +2,14 @@
 
     python -m benchmarks noise [RECORDINGS]
 
-First rmse over the bound, exactly from dense covariances, of sizes and of their
-squares, and the scatter of errors in stated sigma. The bound is that of estimates
-without a bias: those of squares have none, while the root of one that is known to a
-third is too small on average. Then recordings, simulated and real, cut in halves: how
-often the band of 68 of 100 from the first half holds the Allan deviation of the second
-at 10 to 1000 s, with the standard error of that by the scatter of the series, and the
-mean log score, beside allantools (the first half's deviations as they are), avar and
-allan-variance (their fits), all with the scatter of the second half's estimate for
-white noise. Last the processor time and memory of ten million samples.
+First rmse over the bound, exactly from dense covariances, with its standard error, and
+the scatter of errors in stated sigma. Then recordings, simulated and real (`rests`),
+cut in halves: how often the band of 68 of 100 from the first half holds the Allan
+deviation of the second at 10 to 1000 s, for real ones from 1 s on as well, with the
+standard error of that by the scatter of the series, and the mean log score, beside
+allantools (the first half's deviations as they are), avar and allan-variance (their
+fits), all with the scatter of the second half's estimate for white noise. Last the
+processor time and memory of ten million samples.
 """
 
 from __future__ import annotations
@@ -19,26 +18,31 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from importlib import import_module
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks._words import how_many
-from benchmarks.injected.recorded import REAL
 from benchmarks.noise.peers import THEIRS, allan_variance, white_freedom
 from benchmarks.noise.processes import bound, covariance, noise, recording
+from benchmarks.noise.rests import rests
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.noise import estimate, reduced
 from fieldcal.noise.levels import CosineLevels
-from fieldcal.noise.likelihood import Flags, NoiseFit, Powers, fit
+from fieldcal.noise.likelihood import (
+    Flags,
+    NoiseFit,
+    Powers,
+    information_of,
+    levels_of,
+)
 from fieldcal.noise.measured import measured
+from fieldcal.noise.reference import most_probable
 from fieldcal.noise.spectrum import CosineSpectrum
 
-DT, SHORT, EACH = 0.1, 600, 1000
+DT, SHORT, EACH = 0.1, 600, 4000
 CASES: list[dict[str, float]] = [
     {"N": 1.0}, {"N": 1.0, "K": 1.0}, {"N": 1.0, "K": 0.3}, {"N": 1.0, "B": 1.0},
     {"N": 1.0, "Q": 0.3}, {"N": 1.0, "Q": 0.3, "K": 1.0},
@@ -50,6 +54,10 @@ KINDS: dict[str, dict[str, float]] = {
     "white, walk, ramp": {"N": 1.0, "K": 0.02, "R": 2e-4},
 }  # fmt: skip
 FIRST, LAST = 10.0, 1000.0
+SOON = 1.0
+"""From which averaging time on real recordings count: some last a minute only."""
+
+NAMES = ["ours", *THEIRS]
 TEN_MILLION = 10_000_000
 
 
@@ -69,36 +77,30 @@ def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
             c, spectrum.last.values[:, c], np.ones(len(spectrum.last.bin))
         )
         powers = Powers(power, count, np.zeros(len(power), dtype=bool))
-        one = _most_likely(spectrum, powers, sizes)
-        value, stated = np.zeros(len(sizes)), np.full(len(sizes), np.nan)
-        places = [list(sizes).index(term) for term in one.terms]
-        value[places] = np.exp(one.x / 2)
-        stated[places] = np.sqrt(np.diag(one.covariance)) / 2
-        found.append(value)
-        sigma.append(stated)
+        one = _most_probable(spectrum, powers, sizes)
+        found.append(np.exp(one.x / 2))
+        sigma.append(np.sqrt(np.diag(one.covariance)) / 2)
     return np.array(found), np.array(sigma)
 
 
-def _most_likely(
+def _most_probable(
     spectrum: CosineSpectrum, powers: Powers, sizes: dict[str, float]
 ) -> NoiseFit:
-    """Fit the processes, less those that are not there at all."""
-    for gone in range(len(sizes)):
-        fits = [
-            fit(spectrum, powers, names, 2 * np.log([sizes[n] for n in names]))
-            for names in combinations(sizes, len(sizes) - gone)
-        ]
-        if some := [f for f in fits if f]:
-            return max(some, key=lambda f: f.log_likelihood)
-    raise AssertionError("one process is always there")
+    """Sizes of processes that are known to be there, sought from the true ones."""
+    x = 2 * np.log(list(sizes.values()))
+    level, slopes = levels_of(spectrum, tuple(sizes), x)
+    start = NoiseFit(
+        tuple(sizes), x, information_of(powers, slopes), level, 0.0, np.zeros(0)
+    )
+    return most_probable(spectrum, powers, start)
 
 
 def beside_the_bound() -> None:
-    """Print rmse over the bound of each size."""
+    """Print rmse over the bound of each size, with its standard error."""
     rng = np.random.default_rng(1)
     peer = find_spec("allan_variance") is not None
     print(f"rmse over the Cramer-Rao bound, {SHORT} samples, {EACH} recordings each")
-    print(f"{'truth':26} {'size':4} {'bound':>8} {'ours':>6} {'square':>6} {'pull':>6} "
+    print(f"{'truth':22} {'size':4} {'bound':>8} {'ours':>15} {'pull':>6} "
           f"{'allan-variance':>15}")  # fmt: skip
     for sizes in CASES:
         whole = sum(s**2 * covariance(SHORT, DT, p) for p, s in sizes.items())
@@ -108,16 +110,21 @@ def beside_the_bound() -> None:
             allan_variance(values, DT, sizes) if peer else np.full(found.shape, np.nan)
         )
         truth, best = np.array(list(sizes.values())), bound(SHORT, DT, sizes)
+        pull = np.std(np.log(found / truth) / sigma, axis=0)
         name = " ".join(f"{p}={s:g}" for p, s in sizes.items())
         for i, process in enumerate(sizes):
-            there = found[:, i] > 0
-            pull = np.log(found[there, i] / truth[i]) / sigma[there, i]
-            rmse = [np.sqrt(np.mean((f[:, i] / truth[i] - 1) ** 2)) / best[i]
-                    for f in (found, theirs)]  # fmt: skip
-            off = (found[:, i] / truth[i]) ** 2 - 1
-            square = np.sqrt(np.mean(off**2)) / (2 * best[i])
-            print(f"{name:26} {process:4} {best[i]:8.4f} {rmse[0]:6.3f} {square:6.3f} "
-                  f"{np.std(pull):6.3f} {rmse[1]:15.3f}")  # fmt: skip
+            (ratio, error), (other, _) = (
+                _over(f[:, i] / truth[i] - 1, best[i]) for f in (found, theirs)
+            )
+            print(f"{name:22} {process:4} {best[i]:8.4f} {ratio:7.3f} ± {error:.3f} "
+                  f"{pull[i]:6.3f} {other:15.3f}", flush=True)  # fmt: skip
+
+
+def _over(errors: Array, best: float) -> tuple[float, float]:
+    """Root mean square of relative errors over the bound, and its standard error."""
+    squares = (errors / best) ** 2
+    ratio = float(np.sqrt(squares.mean()))
+    return ratio, float(squares.std() / np.sqrt(len(squares)) / (2 * ratio))
 
 
 def scored(variance: Array, freedom: Array, deviation: Array) -> tuple[Array, Flags]:
@@ -134,8 +141,8 @@ Series = list[tuple[Array, Flags]]
 """Log scores and whether bands hold, (t,) each, of one channel after the other."""
 
 
-def halves(block: Block) -> dict[str, Series]:
-    """Log scores and whether bands hold, of each estimator."""
+def halves(block: Block, first: float = FIRST) -> dict[str, Series]:
+    """Log scores and whether bands hold, of each estimator, from a time on, s."""
     out: dict[str, Series] = {}
     middle = len(block) // 2
     model = estimate([reduced([block[:middle]])])
@@ -145,7 +152,9 @@ def halves(block: Block) -> dict[str, Series]:
     for name, channel in model.channels.items():
         place = CHANNELS.index(name)
         seen = measured(second.stretches, place)
-        asked = (seen.tau >= FIRST) & (seen.tau <= min(LAST, length / 4))
+        asked = (seen.tau >= first) & (seen.tau <= min(LAST, length / 4))
+        if not asked.any():
+            continue
         tau, deviation = seen.tau[asked], seen.deviation[asked]
         said = channel.predicted(tau, length)
         held = (said.low < deviation) & (deviation < said.high)
@@ -168,55 +177,38 @@ def simulated(kind: str, number: int) -> Iterator[Block]:
         yield recording(noise(rng, n, DT, 6, **KINDS[kind]), DT)
 
 
-def real() -> Iterator[Block]:
-    """Real recordings at rest that lie beside the project."""
-    import gzip
-
-    from fieldcal.core.gravity import G0
-
-    counts = REAL / "tomisuarez_mpu6050/example_data_tinit_calc.csv.gz"
-    if counts.is_file():
-        with gzip.open(counts, "rt") as text:
-            rows = np.genfromtxt(text, delimiter=",", skip_header=4)[:, :6]
-        rows = rows[np.isfinite(rows).all(axis=1)]
-        rows *= np.repeat([G0 / 16384, np.pi / 180 / 131], 3)
-        yield recording(rows, 0.01)
-    stem = "sunsided_mpu6050_temp/set-2__unmoved-with-x-pointing-forward-10min__"
-    files = [REAL / f"{stem}{k}.mat" for k in ("accelerometer", "gyroscope")]
-    if all(f.is_file() for f in files) and find_spec("h5py"):
-        h5py = import_module("h5py")
-        parts = []
-        for file in files:
-            with h5py.File(file) as content:
-                parts.append(np.array(content[next(iter(content))]).T)
-        rows = np.hstack([parts[0][:, 1:4] * G0, np.deg2rad(parts[1][:, 1:4])])
-        yield recording(rows, float(parts[0][-1, 0] - parts[0][0, 0]) / (len(rows) - 1))
-
-
 def prediction(number: int) -> None:
     """Print how often bands hold, and mean log scores."""
-    names = ["ours", *THEIRS]
     print(f"\nsecond half from the first, {FIRST:g} to {LAST:g} s: held by 68 of 100,"
           " and mean log score")  # fmt: skip
-    print(f"{'':22}" + "".join(f"{n:>20}" for n in names))
+    print(f"{'':22}" + "".join(f"{n:>20}" for n in NAMES))
     whole: dict[str, Series] = {}
-    sources: dict[str, Callable[[], Iterator[Block]]] = {
-        kind: lambda kind=kind: simulated(kind, number)  # type: ignore[misc]
-        for kind in KINDS
-    }
-    for kind, blocks in {**sources, "real, at rest": real}.items():
-        out: dict[str, Series] = {}
-        for block in blocks():
-            for name, series in halves(block).items():
-                out.setdefault(name, []).extend(series)
-                if kind in KINDS:
-                    whole.setdefault(name, []).extend(series)
-        _row(kind, out, names)
-    _row("all simulated", whole, names)
+    for kind in KINDS:
+        _row(kind, _added(whole, simulated(kind, number), FIRST))
+    _row("all simulated", whole)
+    real = dict(rests())
+    print(f"real recordings at rest, from {SOON:g} s on")
+    soon: dict[str, Series] = {}
+    for name, block in real.items():
+        _row(name, _added(soon, [block], SOON))
+    _row("all of these", soon)
+    _row(f"from {FIRST:g} s on", _added({}, real.values(), FIRST))
 
 
-def _row(kind: str, out: dict[str, Series], names: list[str]) -> None:
-    cells = [_cell(out[n]) if n in out else "not there" for n in names]
+def _added(
+    whole: dict[str, Series], blocks: Iterable[Block], first: float
+) -> dict[str, Series]:
+    """Series of some recordings by estimator, which are added to others as well."""
+    out: dict[str, Series] = {}
+    for block in blocks:
+        for name, series in halves(block, first).items():
+            out.setdefault(name, []).extend(series)
+            whole.setdefault(name, []).extend(series)
+    return out
+
+
+def _row(kind: str, out: dict[str, Series]) -> None:
+    cells = [_cell(out[n]) if n in out else "not there" for n in NAMES]
     print(f"{kind:22}" + "".join(f"{c:>20}" for c in cells), flush=True)
 
 

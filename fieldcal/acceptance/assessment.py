@@ -20,6 +20,7 @@ from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.temperature import since_last
 from fieldcal.acceptance.verification import Verification, planned, verify
+from fieldcal.acceptance.warmed import WarmedFamily, warmed
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
@@ -51,7 +52,7 @@ def assess(
     """
     marks = list(session.marks())
     warnings = list(found.warnings)
-    earlier: Sequence[Calibration] | None = None
+    earlier: WarmedFamily | None = None
     usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
     if history is not None and serial:
@@ -59,7 +60,7 @@ def assess(
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
             usual = family(runs)
-            earlier = [run.calibration for run in usual]
+            earlier = warmed(found, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
     dead = broken(session.block.six)
@@ -68,7 +69,8 @@ def assess(
         temperatures=[a.temperature for a in still.averages],
         link=_link(session, still.averages, marks),
         verification=_verification(found, session, marks, limits),
-        family=earlier,
+        family=earlier.calibrations if earlier else None,
+        warmth=earlier.sigma if earlier else {},
         doubts=[*_doubts(marks), *dead, *taken_out],
         windows=still.at_rest(session).averages,
         held=[session.about.positions[i] for i in still.rows],

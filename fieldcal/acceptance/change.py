@@ -5,7 +5,7 @@ The history is compared with; nothing of it enters the calibration.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,9 +17,22 @@ from fieldcal.history.family import expected
 
 
 def check_change(
-    found: Calibration, limits: GradeLimits, family: Sequence[Calibration] | None
+    found: Calibration,
+    limits: GradeLimits,
+    family: Sequence[Calibration] | None,
+    warmth: Mapping[str, float],
 ) -> list[Check]:
-    """Compare each group with what the history lets expect, by its worst parameter."""
+    """Compare each group with what the history lets expect, by its worst parameter.
+
+    Parameters
+    ----------
+    found : the calibration
+    limits : of its grade
+    family : earlier ones, at its temperature; None without a history
+    warmth : by how much parameters may differ because earlier ones were taken at
+        other temperatures, 1 sigma by full name
+
+    """
     if family is None:
         says = "no comparison with earlier calibrations: no serial number (--serial)"
         return [Check("change", None, says)]
@@ -30,7 +43,10 @@ def check_change(
     checks = []
     for group in dict.fromkeys(group_of(n) for n in known):
         names = [n for n in known if group_of(n) == group]
-        made = [_compared(found, n, limits, family, len(known)) for n in names]
+        made = [
+            _compared(found, n, limits, family, len(known), warmth.get(n, 0.0))
+            for n in names
+        ]
         checks += sorted(filter(None, made), key=lambda c: c.value or 0.0)[:1]
     return checks
 
@@ -41,6 +57,7 @@ def _compared(
     limits: GradeLimits,
     family: Sequence[Calibration],
     together: int,
+    warmth: float,
 ) -> Check | None:
     """One parameter against earlier runs; all parameters share the probability."""
     earlier = [c for c in family if name in c.names]
@@ -48,7 +65,8 @@ def _compared(
     repeat = limits.repeat(parameter.group)
     if not earlier or repeat is None:
         return None
-    value, sigma = found.value(name), found.uncertainty(name)
+    value = found.value(name)
+    sigma = float(np.hypot(found.uncertainty(name), warmth))
     usual = expected(
         np.array([c.value(name) for c in earlier]),
         np.array([c.uncertainty(name) for c in earlier]),
@@ -59,7 +77,8 @@ def _compared(
     unit = shown_unit(found.units[found.names.index(name)])
     says = (
         f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
-        f" calibration{'s' if usual.runs > 1 else ''} by {value - usual.mean:+.2g}"
+        f" calibration{'s' if usual.runs > 1 else ''}"
+        f"{' at other temperatures' if warmth else ''} by {value - usual.mean:+.2g}"
         f" ± {usual.sigma(sigma):.2g}{unit}"
         f"{'' if ok else ': out of family; inspect the device before you use it'}"
     )

@@ -8,7 +8,7 @@ for NO-GO. The history is compared with; nothing of it enters the calibration.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,9 @@ class Circumstances:
     temperatures : mean of each window, deg C, nan where unknown
     link : counts of `driver.Health`; empty where unknown
     verification : of a position that was not fitted, if one was held
-    family : earlier calibrations of the device, oldest first; None without a history
+    family : earlier calibrations of the device at this temperature, oldest first; None
+        without a history
+    warmth : by how much they may differ for having been taken at others, 1 sigma
     doubts : sentences about what happened on the way that make it NO-GO
     windows : that it was made of
     held : positions that have one; empty where all have
@@ -79,6 +81,7 @@ class Circumstances:
     link: Mapping[str, int] | None = None
     verification: Verification | None = None
     family: Sequence[Calibration] | None = None
+    warmth: Mapping[str, float] = field(default_factory=dict)
     doubts: Sequence[str] = ()
     windows: Sequence[Average] = ()
     held: Sequence[Position] = ()
@@ -103,7 +106,7 @@ def decide(
         *check_uncertainty(found, about, limits, circumstances.windows),
         *_site(found, about),
         *check_level(found, about),
-        *check_change(found, limits, circumstances.family),
+        *check_change(found, limits, circumstances.family, circumstances.warmth),
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
         *check_link(circumstances.link, limits),

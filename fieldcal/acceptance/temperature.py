@@ -38,8 +38,8 @@ def since_last(
     where nothing changed or no temperature is known.
 
     """
-    points = [p for run in earlier if (p := _point(run.taken_at, run.calibration))]
-    now = _point("now", found)
+    points = [p for run in earlier if (p := as_point(run.taken_at, run.calibration))]
+    now = as_point("now", found)
     if now is None or not points:
         return None
     then = points[-1]
@@ -72,7 +72,7 @@ def since_last(
     return {**out, "parameters": document(changes), "says": [says]}
 
 
-def _point(name: str, found: Calibration) -> ThermalPoint | None:
+def as_point(name: str, found: Calibration) -> ThermalPoint | None:
     """A calibration as a point; None where it has no temperature or is no good."""
     try:
         return point(name, found)

@@ -69,6 +69,10 @@ class GradeLimits:
         """Largest uncertainty of a group's parameters; None where none is set."""
         return getattr(self, f"{group}_sigma", None)
 
+    def per_kelvin(self, group: str) -> float:
+        """Usual temperature coefficient of a group, 1 sigma; 0 where none is set."""
+        return float(getattr(self, f"{group}_per_k", 0.0))
+
     def repeat(self, group: str) -> float | None:
         """Spread of a group from run to run while no history tells; None unknown."""
         return getattr(self, f"{group}_repeat", None)

@@ -170,7 +170,7 @@ def _at(found: ThermalModel, to: float, last: ThermalPoint) -> dict[str, Any]:
 
 def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
     from fieldcal.calibration.wording import number, pretty, title
-    from fieldcal.thermal.wording import costs
+    from fieldcal.thermal.wording import TOLD, costs
 
     say = sys.stdout.write
     say(
@@ -197,7 +197,7 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
         )
         say("".join(f"  {line}\n" for line in told))
         if rest:
-            say(f"  less than 2 of its ±: {', '.join(map(title, rest))}\n")
+            say(f"  less than {TOLD:.0f} of its ±: {', '.join(map(title, rest))}\n")
 
 
 def _parameters(

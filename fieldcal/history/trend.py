@@ -87,13 +87,23 @@ def trend(
         if usual is not None:
             if len(before):
                 usually = expected(before[:, 0], before[:, 1], usual)
-                chance = usually.chance(value, sigma)
+                apart = _kelvins(run, family(runs[:i]))
+                warmth = apart * limits.per_kelvin(group_of(name))
+                chance = usually.chance(value, float(np.hypot(sigma, warmth)))
             known = _values(family(runs[: i + 1]), name)
             shown = known if len(known) else np.array([[value, sigma]])
             spread = expected(shown[:, 0], shown[:, 1], usual).spread
         odd = bool(chance < limits.family_chance / together)
         points.append(TrendPoint(run, value, sigma, unit, chance, odd, spread))
     return points
+
+
+def _kelvins(run: HistoryRun, before: Sequence[HistoryRun]) -> float:
+    """How far the temperature is from that of the runs before; 0 where not known."""
+    known = [r.temperature for r in before if r.temperature is not None]
+    if run.temperature is None or not known:
+        return 0.0
+    return abs(run.temperature - float(np.mean(known)))
 
 
 def _values(runs: Sequence[HistoryRun], name: str) -> np.ndarray[Any, Any]:

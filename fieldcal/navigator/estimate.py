@@ -26,8 +26,15 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.frames import force_home
 from fieldcal.core.samples import Array
 from fieldcal.model import priors, thresholds
-from fieldcal.navigator.growth import PHI, PLACE, growth, matrix
 from fieldcal.navigator.large_angles import beyond_first_order
+from fieldcal.navigator.mistakes import ATTITUDES, SCATTER, mistakes
+from fieldcal.navigator.run_rows import (
+    RunPosterior,
+    RunRows,
+    Setup,
+    posterior,
+    run_rows,
+)
 from fieldcal.navigator.solution import Run
 
 NAMES = tuple(f"{g}.{x}" for g in ("acc_bias", "acc_scale", "gyr_bias") for x in "xyz")
@@ -36,41 +43,18 @@ UNITS = ("m/s^2",) * 3 + ("1",) * 3 + ("rad/s",) * 3
 SIZES = 3.0 * np.repeat([priors.BIAS_ACC, priors.SCALE, priors.BIAS_GYR], 3)
 """Before anything is seen: a few times what consumer grade reaches."""
 
-BEGAN_M = 10.0
-"""How far from where it is a navigator may begin, m: the first position is noisy."""
-
 NEAR = {"fatol": 0.02, "xatol": 0.03}
 """Where the search for N_a, N_g, q and J ends: ln of the evidence, and of each."""
 
 PASSES = 2
-"""How often what is not linear in the parameters is taken off."""
+"""How often rows are taken about what was found."""
+
+ASIDE = np.repeat([1e-7, 1e-4, 1e-4], 3)
+"""Steps of rate, force and angle by which slopes are taken: small ones of each."""
 
 LEAST = (1e-6, 1e-8, 1e-6, 1e-6)
 MOST = (0.1, 1e-2, 10.0, 0.3)
 """N_a in m/s^2/sqrt(Hz), N_g in rad/s/sqrt(Hz), q in m/s and m, J in m/s^2."""
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """What is known of the place and the runs.
-
-    Attributes
-    ----------
-    earth : (3,) rad/s in base axes
-    gravity : m/s^2
-    attitudes : (r, 3, 3) C of each run, device to base
-    common : (3,) rad, 1 sigma of phi about each base axis
-    own : (r,) rad, 1 sigma of each phi_r about any axis
-    used : which of velocity (3) and position (3) was recorded, East, down, north
-
-    """
-
-    earth: Array
-    gravity: float
-    attitudes: Array
-    common: Array
-    own: Array
-    used: Sequence[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +68,7 @@ class Drift:
     noise : N_a, N_g, q, J
     chi2, dof : of all rows with that noise, and rows less parameters
     tilt : (3,) rad, phi; `tilt_sigma` its ±
+    off : what of the set-up is not as it was told, as `mistakes` name it
 
     """
 
@@ -96,6 +81,7 @@ class Drift:
     dof: int
     tilt: Array
     tilt_sigma: Array
+    off: tuple[str, ...]
 
     def calibration(self) -> Calibration:
         """As every estimate of this program."""
@@ -112,20 +98,96 @@ class Drift:
 
 
 def estimate(runs: Sequence[Run], setup: Setup) -> Drift:
-    """Estimate the parameters from runs at rest, (1), (2)."""
-    linear = [_rows(run, setup, r) for r, run in enumerate(runs)]
-    sizes = np.concatenate([SIZES, setup.common])
-    rows, noise = linear, None
+    """Estimate the parameters from runs at rest, (1), (2).
+
+    Where the runs are likelier with a base that is not level, with another azimuth or
+    with a run that was not set as entered, by more than such mistakes are rare, that is
+    what they are solved with, and it is said.
+    """
+    linear = [run_rows(run, setup, r) for r, run in enumerate(runs)]
+    best, off = _solved(runs, linear, setup), list[str]()
+    while True:
+        tried = {
+            name: _solved(runs, linear, other, best.noise)
+            for name, other in mistakes(best.setup)
+            if name not in off
+            and (_hoped(best, other) or (name == ATTITUDES and best.scatters))
+        }
+        name = max(tried, key=lambda n: tried[n].found.score, default="")
+        if not name or tried[name].gain(best) < thresholds.SAME:
+            break
+        best, off = tried[name], [*off, name]
+    return _drift(best, (*off, *([SCATTER] if best.scatters else ())))
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    """A set-up with the noise and the parameters of its greatest evidence."""
+
+    setup: Setup
+    rows: Sequence[RunRows]
+    noise: Array
+    found: RunPosterior
+
+    @property
+    def sizes(self) -> Array:
+        """Before anything is seen, (12,)."""
+        return np.concatenate([SIZES, self.setup.common])
+
+    def gain(self, other: _Solved) -> float:
+        """Evidence over that of another set-up, ln."""
+        return self.found.score - other.found.score
+
+    @property
+    def scatters(self) -> bool:
+        """Whether the runs differ by more than what else is known of them."""
+        calm = posterior(self.rows, self.sizes, _calm(self.noise)).score
+        return self.found.score - calm > thresholds.SAME
+
+
+def _calm(noise: Array) -> Array:
+    """The same without scatter of the runs."""
+    return np.append(noise[:3], LEAST[3])
+
+
+def _hoped(best: _Solved, other: Setup) -> bool:
+    """Whether another set-up is likelier at the noise of the best, or without scatter.
+
+    What a mistake leaves unexplained is in the scatter of the runs; what all attitudes
+    do to it shows only once it is sought.
+    """
+    rows, sizes = _set(best.rows, other), np.concatenate([SIZES, other.common])
+    each = (best.noise, _calm(best.noise))
+    score = max(posterior(rows, sizes, noise).score for noise in each)
+    return score > best.found.score
+
+
+def _set(rows: Sequence[RunRows], setup: Setup) -> list[RunRows]:
+    """Rows with each attitude as well known as a set-up says."""
+    pairs = zip(rows, setup.own.tolist(), strict=True)
+    return [replace(one, sigma=sigma) for one, sigma in pairs]
+
+
+def _solved(
+    runs: Sequence[Run],
+    linear: Sequence[RunRows],
+    setup: Setup,
+    near: Array | None = None,
+) -> _Solved:
+    """Parameters of a set-up; the noise is sought near some if given."""
+    linear, sizes = _set(linear, setup), np.concatenate([SIZES, setup.common])
+    rows, noise = linear, near
     for _ in range(PASSES):
         noise = _likeliest(rows, sizes, noise)
-        found = _posterior(rows, sizes, noise)
+        mean = posterior(rows, sizes, noise).mean
+        own = [one.own(noise, mean) for one in rows]
         pairs = zip(linear, runs, strict=True)
         rows = [
-            one.less(_beyond(run, setup, r, found.mean))
+            _about(one, run, setup, r, mean, own[r])
             for r, (one, run) in enumerate(pairs)
         ]
     noise = _likeliest(rows, sizes, noise)
-    return _drift(_posterior(rows, sizes, noise), noise, sum(len(r.y) for r in rows))
+    return _Solved(setup, rows, noise, posterior(rows, sizes, noise))
 
 
 def _likeliest(rows: Sequence[RunRows], sizes: Array, near: Array | None) -> Array:
@@ -137,22 +199,37 @@ def _likeliest(rows: Sequence[RunRows], sizes: Array, near: Array | None) -> Arr
     def worse(logs: Array) -> float:
         inside = np.clip(logs, least, most)
         beyond = float(np.sum((logs - inside) ** 2))
-        return 100.0 * beyond - _posterior(rows, sizes, np.exp(inside)).score
+        return 100.0 * beyond - posterior(rows, sizes, np.exp(inside)).score
 
     start = _coarsely(worse, least, most) if near is None else np.log(near)
     found = minimize(worse, start, method="Nelder-Mead", options=NEAR)
     return np.asarray(np.exp(np.clip(found.x, least, most)))
 
 
-def _beyond(run: Run, setup: Setup, r: int, mean: Array) -> Array:
-    """What errors (12,) do to a run beyond the first order, (n,)."""
-    c, force = setup.attitudes[r], force_home(setup.gravity)
+def _about(
+    one: RunRows, run: Run, setup: Setup, r: int, mean: Array, own: Array
+) -> RunRows:
+    """Rows of a run that are linear about errors (12,) and phi_r (3,), not about none.
+
+    A base that leans by a degree takes 1.5 mm/s^2 off gravity.
+    """
+    c = setup.attitudes[r]
+    force = force_home(setup.gravity)
+    f = c.T @ force
     bias, scale, rate, phi = np.split(mean, 4)
-    errors = np.concatenate([rate, bias + scale * (c.T @ force), phi])
-    more = beyond_first_order(
-        run.step, len(run.values), c, (setup.earth, force), errors
-    )
-    return np.asarray(more[:, list(setup.used)].ravel())
+    errors = np.concatenate([rate, bias + scale * f, phi + own])
+
+    def beyond(at: Array) -> Array:
+        inputs = (setup.earth, force)
+        more = beyond_first_order(run.step, len(run.values), c, inputs, at)
+        return np.asarray(more[:, list(setup.used)].ravel())
+
+    there = beyond(errors)
+    slopes = [(beyond(errors + d) - there) / d.max() for d in np.diag(ASIDE)]
+    by_rate, by_force, by_phi = np.split(np.column_stack(slopes), 3, axis=1)
+    more = np.hstack([by_force, by_force * f, by_rate, by_phi])
+    y = one.y - there + more @ mean + by_phi @ own
+    return replace(one, y=y, design=one.design + more, turn=one.turn + by_phi)
 
 
 def _coarsely(worse: Callable[[Array], float], least: Array, most: Array) -> Array:
@@ -162,95 +239,13 @@ def _coarsely(worse: Callable[[Array], float], least: Array, most: Array) -> Arr
     return np.asarray(points[int(np.argmin([worse(p) for p in points]))])
 
 
-@dataclass(frozen=True, slots=True)
-class RunRows:
-    """Rows (1) of one run.
-
-    Attributes
-    ----------
-    y : (n,) what the solution is off by
-    design : (n, 12) of the parameters in the order of `NAMES`, and of phi
-    own : (n, n) covariance of phi_r and p_r
-    jitter : (n, n) of j_r of 1 m/s^2
-    rate_noise, force_noise : (n, n) K_g and K_a
-
-    """
-
-    y: Array
-    design: Array
-    own: Array
-    jitter: Array
-    rate_noise: Array
-    force_noise: Array
-
-    def less(self, more: Array) -> RunRows:
-        """The rows less what is not in the columns, (n,)."""
-        return replace(self, y=self.y - more)
-
-    def covariance(self, noise: Array) -> Array:
-        """R of the rows by N_a, N_g, q, J, (n, n)."""
-        force, rate, out, jitter = noise**2
-        whole = self.own + jitter * self.jitter + out * np.eye(len(self.y))
-        return np.asarray(whole + force * self.force_noise + rate * self.rate_noise)
-
-
-def _rows(run: Run, setup: Setup, r: int) -> RunRows:
-    grown = growth(matrix(setup.earth, setup.gravity), run.step, len(run.values))
-    used = np.array(setup.used)
-    take = (9 * np.arange(len(run.values))[:, None] + 3 + used).ravel()
-    start, constant = (
-        part.reshape(-1, part.shape[2])[take] for part in (grown.start, grown.constant)
-    )
-    c = setup.attitudes[r]
-    rate, force = constant[:, :3] @ c, constant[:, 3:] @ c
-    f = c.T @ force_home(setup.gravity)
-    turned = start[:, PHI] * setup.own[r]
-    began = start[:, PLACE] * (BEGAN_M if used.max() >= len(f) else 0.0)
-    pick = np.ix_(take, take)
-    return RunRows(
-        run.values[:, used].ravel(),
-        np.hstack([force, force * f, rate, start[:, PHI]]),
-        turned @ turned.T + began @ began.T,
-        force @ force.T,
-        grown.rate_noise[pick],
-        grown.force_noise[pick],
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class RunPosterior:
-    """Parameters and phi, (12,), their covariance, ln of the evidence, and chi2."""
-
-    mean: Array
-    covariance: Array
-    score: float
-    chi2: float
-
-
-def _posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPosterior:
-    """What all runs say with sizes before them (12,), and noise N_a, N_g, q, J."""
-    g, b, square, log_det = np.zeros((len(sizes),) * 2), np.zeros(len(sizes)), 0.0, 0.0
-    for one in rows:
-        lower = np.linalg.cholesky(one.covariance(noise))
-        white = np.linalg.solve(lower, np.column_stack([one.design, one.y]))
-        h, y = white[:, :-1], white[:, -1]
-        g, b, square = g + h.T @ h, b + h.T @ y, square + float(y @ y)
-        log_det += 2 * float(np.log(np.diagonal(lower)).sum())
-    m = np.eye(len(sizes)) + sizes[:, None] * g * sizes
-    covariance = sizes[:, None] * np.linalg.inv(m) * sizes
-    mean = covariance @ b
-    chi2 = square - float(b @ mean)
-    score = -0.5 * (chi2 + log_det + float(np.linalg.slogdet(m)[1]))
-    return RunPosterior(mean, covariance, score, chi2)
-
-
-def _drift(found: RunPosterior, noise: Array, count: int) -> Drift:
+def _drift(best: _Solved, off: tuple[str, ...]) -> Drift:
     """Parameters that kept less of their variance than what counts as determined."""
-    n = len(NAMES)
+    n, found = len(NAMES), best.found
     variance = np.diag(found.covariance)
     known = np.flatnonzero(variance[:n] < thresholds.DETERMINED * SIZES**2)
     values = found.mean[:n] + [name.startswith("acc_scale") for name in NAMES]
-    force, rate, out, jitter = map(float, noise)
+    force, rate, out, jitter = map(float, best.noise)
     return Drift(
         tuple(NAMES[i] for i in known),
         values[known],
@@ -258,7 +253,8 @@ def _drift(found: RunPosterior, noise: Array, count: int) -> Drift:
         tuple(name for i, name in enumerate(NAMES) if i not in known),
         (force, rate, out, jitter),
         found.chi2,
-        count - len(known),
+        sum(len(one.y) for one in best.rows) - len(known),
         found.mean[n:],
         np.sqrt(variance[n:]),
+        off,
     )

@@ -1,13 +1,15 @@
 """What errors of attitude beyond small ones do to a run at rest.
 
-    C'(t) = exp(-W t) exp(-phi_0) C exp((C^T W + e) t)                              (1)
+    C'(t) = exp(-W t) C exp((A^T W + e) t),    A = exp(phi_0) C                     (1)
     phi(t) = phi_0 - C e t - W x (phi_0 t - C e t^2 / 2)          to first order    (2)
-    d(t) = C'(t) (f + a) - C f - (C f x phi(t) + C a)                               (3)
+    d(t) = C'(t) (A^T f + a) - f - (f x phi(t) + C a)                               (3)
 
-d is what the computed force is off by beyond what `growth` has, integrated once for the
+C is the attitude that was entered, with which the navigator begins, and A the true one:
+a drift goes where the entered one says, the Earth's rate is felt as the true one is. d
+is what the computed force is off by beyond what `growth` has, integrated once for the
 velocity and twice for the position: a gyroscope that drifts by 2e-4 rad/s leans by a
 degree in two minutes, and the force by 1 mm/s^2 more than to first order. [v] stands
-for v x in the exponents. SI units; W, phi in base axes, e, a, f in device axes. Source:
+for v x in the exponents. SI units; W, phi, f in base axes, e, a in device axes. Source:
 rotation kinematics.
 """
 
@@ -18,7 +20,7 @@ import numpy as np
 from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 
-FINER = 10
+FINER = 5
 """Steps of the integration in one of the run."""
 
 
@@ -30,20 +32,20 @@ def beyond_first_order(
     Parameters
     ----------
     step, count : s between instants, and how many there are
-    c : (3, 3) from device to base axes
+    c : (3, 3) from device to base axes, as entered
     inputs : Earth's rate and force in base axes, (3,) each
     errors : (9,) e, a and phi_0, device and base axes
 
     """
     (earth, force), (e, a, phi) = inputs, np.split(errors, 3)
     t = np.arange(count * FINER + 1) * (step / FINER)
-    begun = exponential(-phi) @ c
-    turned = exponential(-t[:, None] * earth) @ begun
-    computed = turned @ exponential(t[:, None] * (c.T @ earth + e))  # (1)
+    true = exponential(phi) @ c
+    turned = exponential(-t[:, None] * earth) @ c
+    computed = turned @ exponential(t[:, None] * (true.T @ earth + e))  # (1)
     drift = c @ e
     once, twice = t[:, None], t[:, None] ** 2 / 2
     angle = phi - drift * once - np.cross(earth, phi * once - drift * twice)  # (2)
-    off = computed @ (c.T @ force + a) - force
+    off = computed @ (true.T @ force + a) - force
     off -= np.cross(force, angle) + c @ a  # (3)
     velocity = _integral(off, step / FINER)
     place = _integral(velocity, step / FINER)

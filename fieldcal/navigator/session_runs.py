@@ -15,11 +15,15 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration, limits
+from fieldcal.calibration.wording import number
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import earth_rate_home, turn
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import Array
-from fieldcal.navigator.estimate import Drift, Setup, estimate
+from fieldcal.core.sentences import join
+from fieldcal.navigator.estimate import Drift, estimate
+from fieldcal.navigator.mistakes import ATTITUDES, AZIMUTH, LEVEL, SCATTER
+from fieldcal.navigator.run_rows import Setup
 from fieldcal.navigator.solution import read, runs
 from fieldcal.session.description import Description
 
@@ -107,6 +111,7 @@ def said(found: Drift, about: Description) -> tuple[str, ...]:
         "scale factors of gyroscopes and cross-coupling hardly show in a run at rest:"
         " they are taken as the navigator has them"
     ]
+    out += _contradicted(found)
     if found.missing:
         out.append(
             f"{', '.join(found.missing)}: not determined by these runs: add attitudes"
@@ -118,6 +123,43 @@ def said(found: Drift, about: Description) -> tuple[str, ...]:
             " by along the level is in that, and never in the drift; enter the attitude"
         )
     return tuple(out)
+
+
+def _contradicted(found: Drift) -> list[str]:
+    """What of the set-up the runs contradict, a sentence each."""
+    (x, y, z), (sx, sy, sz) = np.rad2deg([-found.tilt, found.tilt_sigma])
+    out = []
+    if LEVEL in found.off:
+        out.append(
+            f"the base is not as level as stated: it leans by {_deg(x, sx)} about its x"
+            f" and by {_deg(z, sz)} about its z; the values allow for that"
+        )
+    if AZIMUTH in found.off:
+        out.append(
+            f"the base is turned by {_deg(y, sy)} about its y, which points down, from"
+            " what azimuth_deg says; the values allow for that"
+        )
+    if runs := [name for name in found.off if name.startswith("run")]:
+        out.append(
+            f"{join(runs)}: the device was not in the attitude that was entered; what"
+            " such a run tells of biases is used, and nothing of its level"
+        )
+    if ATTITUDES in found.off:
+        out.append(
+            "the device was in no attitude quite as it was entered: the base sways, or"
+            " the angles are not set as well as stated; every ± includes it"
+        )
+    if SCATTER in found.off:
+        out.append(
+            f"forces are off by {found.noise[3]:.1g} m/s² from run to run: biases"
+            " change between runs, or attitudes were not as entered; every ± includes"
+            " it"
+        )
+    return out
+
+
+def _deg(value: float, sigma: float) -> str:
+    return " ± ".join(number(float(value), float(sigma))) + "°"
 
 
 def document(found: Drift, placed: Setup) -> dict[str, Any]:
@@ -132,4 +174,5 @@ def document(found: Drift, placed: Setup) -> dict[str, Any]:
         "tilt_deg": np.rad2deg(found.tilt).tolist(),
         "tilt_sigma_deg": np.rad2deg(found.tilt_sigma).tolist(),
         "missing": list(found.missing),
+        "contradicted": list(found.off),
     }

@@ -1,7 +1,7 @@
 """Random processes of a device at rest: how large, how sure, and what follows.
 
 Here live the processes (`processes`), what a recording is reduced to in one pass
-(`levels`, `disturbed`), their estimation (`cosine`, `likelihood`, `terms`,
+(`levels`, `disturbed`), their estimation (`cosine`, `likelihood`, `reference`, `terms`,
 `covariates`, `estimate`), and what the answer says of other recordings (`prediction`,
 `filters`, `recalibration`, `alignment`, `averaging`). No effect of the catalogue, no
 position and no calibration is known here. To add a process: its Allan variance and

@@ -28,6 +28,7 @@ from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import fit, likelihood
 from fieldcal.noise.prediction import Draw
 from fieldcal.noise.processes import allan_variance
+from fieldcal.noise.reference import most_probable
 from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import Chosen
 
@@ -94,6 +95,7 @@ def two_numbers(
         n = float(np.sqrt(size)) * factor
         walk = factor * _not_exceeded(spectrum, chosen, size)
         return TwoNumbers(n, n * error, walk, np.nan, factor)
+    pair = most_probable(spectrum, chosen.powers, pair)
     sizes, spread = np.exp(pair.x), np.sqrt(np.diag(pair.covariance)) / 2
     factor = _left_out(whole, sizes[0] / tau + sizes[1] * tau / 3)
     n, k = (np.sqrt(sizes) * factor).tolist()

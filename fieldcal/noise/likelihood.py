@@ -111,6 +111,13 @@ def levels_of(
     return level, columns / level[:, None]
 
 
+def information_of(powers: Powers, slopes: Array) -> Array:
+    """J of (3), (p, p), by slopes (b, p) of the logarithms of expected powers."""
+    count = np.where(powers.free, 0.0, powers.count.sum(axis=1))
+    information: Array = 0.5 * slopes.T @ (count[:, None] * slopes)
+    return information
+
+
 def likelihood(level: Array, power: Array, count: Array) -> float:
     """Log likelihood of sums of squares, (2)."""
     return -0.5 * float(np.sum(count * np.log(level) + power / level))
@@ -122,15 +129,15 @@ def fit(
     """Most likely sizes; None where one of the processes is not there at all."""
     used = ~powers.free
     power, count = powers.power[used].sum(axis=1), powers.count[used].sum(axis=1)
-    bounds = _bounds(spectrum, terms)
-    x = np.clip(start, *bounds)
+    within = bounds(spectrum, terms)
+    x = np.clip(start, *within)
     level, slopes = (a[used] for a in levels_of(spectrum, terms, x))
     best, damping = likelihood(level, power, count), 1e-3
     for _ in range(MOST_STEPS):
         gradient = 0.5 * slopes.T @ (power / level - count)
         information = 0.5 * slopes.T @ (count[:, None] * slopes)
         step = _step(information, gradient, damping)
-        trial = np.clip(x + step, *bounds)
+        trial = np.clip(x + step, *within)
         trial_level, trial_slopes = (a[used] for a in levels_of(spectrum, terms, trial))
         found = likelihood(trial_level, power, count)
         if not found >= best:
@@ -149,7 +156,8 @@ def fit(
     return _finished(spectrum, powers, terms, x)
 
 
-def _bounds(spectrum: CosineSpectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
+def bounds(spectrum: CosineSpectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
+    """Least and greatest of each parameter, (p,) both."""
     times = sum(term in TIMED for term in terms)
     low, high = spectrum.log_times
     return (
@@ -173,7 +181,7 @@ def _finished(
     used = np.where(powers.free, 0.0, 1.0)
     count = powers.count * used[:, None]
     power = powers.power * used[:, None]
-    information = 0.5 * slopes.T @ (count.sum(axis=1)[:, None] * slopes)
+    information = information_of(powers, slopes)
     total = likelihood(level, power.sum(axis=1), count.sum(axis=1))
     total += _free_likelihood(powers)
     scores = np.empty(count.shape[1])

@@ -2,8 +2,8 @@
 
 A band holds what is not known of the processes (how large, and which, by the weights of
 `terms`), and the scatter of the estimate from a recording of its length. The sizes are
-drawn from their likelihood: from the normal distribution about its maximum, weighted by
-the likelihood and drawn again (Rubin 1987).
+drawn from their density with the reference prior (`reference`): from the normal
+distribution about its maximum, weighted by the density and drawn again (Rubin 1987).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import NoiseFit, levels_of
+from fieldcal.noise.likelihood import NoiseFit, bounds
 from fieldcal.noise.processes import (
     FAR,
     STEPS,
@@ -21,6 +21,7 @@ from fieldcal.noise.processes import (
     covariances,
     freedom,
 )
+from fieldcal.noise.reference import SizeDensity
 from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import Chosen
 
@@ -96,28 +97,29 @@ def _of_fit(
     spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
     standard = rng.standard_normal((2 * number, len(one.x)))
     steps = np.clip(standard @ spread.T, -FURTHEST, FURTHEST)
-    used = ~chosen.powers.free
-    power = chosen.powers.power[used].sum(axis=1)
-    count = chosen.powers.count[used].sum(axis=1)
-    low, high = spectrum.log_times
-    bounds = np.array([[-np.inf, np.inf]] * len(one.terms)
-                      + [[low, high]] * (len(one.x) - len(one.terms)))  # fmt: skip
-    tried = np.clip(one.x + steps, *bounds.T)
-    levels = _levels(spectrum, one, tried)[:, used]
-    weights = -0.5 * (np.log(levels) @ count + (power / levels).sum(axis=1))
+    tried = np.clip(one.x + steps, *bounds(spectrum, one.terms))
+    weights = _density(spectrum, chosen, one, tried)
     weights += 0.5 * np.sum(standard**2, axis=1)
     chance = np.exp(weights - weights.max())
     picked = rng.choice(len(tried), number, p=chance / chance.sum())
     return [Draw(one.terms, tried[i]) for i in picked]
 
 
-def _levels(spectrum: CosineSpectrum, one: NoiseFit, tried: Array) -> Array:
-    """Expected powers (d, b) of sizes (d, p)."""
-    if one.timed:
-        return np.array([levels_of(spectrum, one.terms, x)[0] for x in tried])
-    columns = np.array([spectrum.column(term) for term in one.terms])
-    levels: Array = np.exp(tried) @ columns
-    return levels
+def _density(
+    spectrum: CosineSpectrum, chosen: Chosen, one: NoiseFit, tried: Array
+) -> Array:
+    """Log density (d,) of sizes and times (d, p)."""
+    sizes = tried[:, : len(one.terms)]
+    if not one.timed:
+        of = SizeDensity.of(spectrum, chosen.powers, one.terms, one.x)
+        return of.at(sizes)
+    each = [
+        SizeDensity.of(spectrum, chosen.powers, one.terms, x).at(
+            x[None, : len(one.terms)]
+        )
+        for x in tried
+    ]
+    return np.concatenate(each)
 
 
 def predict(

@@ -18,6 +18,7 @@ import numpy as np
 from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import TIMED, Flags, NoiseFit, Powers, fit
+from fieldcal.noise.reference import most_probable
 from fieldcal.noise.spectrum import CosineSpectrum
 
 FILTERED_HZ = 1.0
@@ -37,9 +38,9 @@ class Chosen:
 
     Attributes
     ----------
-    best : the fit of the chosen processes
-    others : (weight, fit) of all that predict, the chosen one among them; their weights
-        add to 1
+    best : the chosen processes at their most probable sizes
+    others : (weight, fit) of all that predict, the chosen one among them, at their most
+        probable sizes; weights add to 1
     powers : with the bins that are left to themselves
     dispersion : by how much the powers scatter more than the processes alone would have
         them, as a factor of variance; at least 1
@@ -60,7 +61,12 @@ def choose(spectrum: CosineSpectrum, powers: Powers) -> Chosen:
     if dispersion > 1:
         powers = powers.scaled(dispersion)
         best, seen = grown(spectrum, powers)
-    return Chosen(best, _weighted(seen), powers, dispersion)
+    others = [
+        (weight, most_probable(spectrum, powers, one))
+        for weight, one in _weighted(seen)
+    ]
+    best = most_probable(spectrum, powers, best)
+    return Chosen(best, tuple(others), powers, dispersion)
 
 
 def _weighted(fits: list[NoiseFit]) -> tuple[tuple[float, NoiseFit], ...]:

@@ -12,8 +12,9 @@ from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import number, pretty, title
 from fieldcal.core.gravity import G0
 
-TOLD = 2.0
-"""A change is told from so many of its standard uncertainties on."""
+TOLD = 3.0
+"""A change is told from so many of its standard uncertainties on: a device has twenty
+parameters, of which one would reach 2 by chance."""
 
 
 def costs(

@@ -85,7 +85,12 @@ def test_json_is_the_file(told: Told, capsys: pytest.CaptureFixture[str]) -> Non
 def test_what_other_programs_are_told_follows_from_the_two_numbers(told: Told) -> None:
     programs = told.content["for"]
     density = programs["kalibr"]["gyroscope_noise_density"]
-    assert abs(density["value"] / N - 1) < 0.1
+    pairs = [
+        c["two_numbers"] for n, c in told.content["channels"].items() if n[0] == "g"
+    ]
+    loud = max(pairs, key=lambda pair: pair["N"])
+    assert density["value"] == loud["N"]
+    assert density["value"] / loud["left_out"] == pytest.approx(N, rel=0.03)
     # a step of 12 ms adds (h w)^2 to the variance of an angle: N^2 h
     held = programs["ardupilot"]["EK3_GYRO_P_NSE"]["value"]
     assert (0.012 * held) ** 2 == pytest.approx(density["value"] ** 2 * 0.012)

@@ -101,7 +101,7 @@ def test_a_procedure_brings_its_positions(name: str) -> None:
         ),
         (
             {"run": {}, "position": [{"alpha_deg": 1}]},
-            "[[position]] number 1 beta_deg is missing: give alpha_deg and beta_deg",
+            '{"alpha_deg": 1} cannot be: give alpha_deg and beta_deg, rotation',
         ),
         ({"run": {}, "position": POSITIONS[:1] * 3}, "are the same"),
         ({"run": {}}, "are not enough"),
@@ -249,6 +249,20 @@ def test_the_plan_of_the_readme_is_one() -> None:
     blocks = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
     assert len(blocks) == 1
     assert len(plan_file.task(tomllib.loads(blocks[0]), "README.md").positions) == 5
+
+
+def test_a_position_may_be_one_finite_turn() -> None:
+    """A third of a turn about the space diagonal, said twice."""
+    turns = [
+        {"rotation_vector_deg": [120 / 3**0.5] * 3},
+        {"quaternion": [0.5, 0.5, 0.5, 0.5]},
+    ]
+    made = plan_file.task({**plan(), "position": [*POSITIONS, *turns]}, "p.toml")
+    one, other = made.positions[-2:]
+    assert one.all_degrees == pytest.approx(other.all_degrees, abs=1e-6)
+    with pytest.raises(PlanError, match="rotation_vector_deg or quaternion"):
+        half = [*POSITIONS, {"alpha_deg": 10.0}]
+        plan_file.task({**plan(), "position": half}, "p.toml")
 
 
 def test_a_third_angle_wants_somebody_who_turns_it() -> None:

@@ -6,10 +6,12 @@ integrates in Earth-fixed axes, so that nothing here has the form of what estima
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 OMEGA = 7.292115e-5
 A, E2 = 6378137.0, 6.69437999014e-3

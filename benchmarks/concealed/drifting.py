@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import tomlkit
-from mechanisation import OMEGA, Array, navigated
 from scipy.spatial.transform import Rotation
+
+from benchmarks.concealed.mechanisation import OMEGA, Array, navigated
 
 LATITUDE_DEG, G, RATE_HZ = 50.45, 9.8106, 10.0
 FACES = ((0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90))
@@ -27,13 +28,16 @@ class Sensors:
     rate_noise: float = 5e-5
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Sensors:
+    def drawn(cls, rng: np.random.Generator, rate_noise: float = 5e-5) -> Sensors:
+        """Any sensors of tactical grade."""
         return cls(
-            rng.normal(0, 0.02, 3), 1 + rng.normal(0, 1e-3, 3), rng.normal(0, 2e-4, 3)
-        )
+            rng.normal(0, 0.02, 3), 1 + rng.normal(0, 1e-3, 3),
+            rng.normal(0, 2e-4, 3), rate_noise=rate_noise,
+        )  # fmt: skip
 
     @property
     def truth(self) -> dict[str, Array]:
+        """Biases and scale factors by group."""
         return {
             "acc_bias": self.acc_bias,
             "acc_scale": self.acc_scale,
@@ -58,13 +62,17 @@ def record(
     faces: Sequence[tuple[int, int]] = FACES,
     seconds: float = 100.0,
     tilt_deg: Array | None = None,
+    own_deg: Array | None = None,
     setting_deg: float = 0.01,
     azimuth_deg: float = 0.0,
     columns: Sequence[str] = ("vn", "ve", "vd"),
     aligned: str = "entered",
     out_noise: float = 1e-3,
 ) -> Path:
-    """Write session.toml and solution.csv of a base that is tilted by a little."""
+    """Write session.toml and solution.csv of a base that is tilted by a little.
+
+    `own_deg`, (r, 3), is what each attitude is off by beyond how well it is set.
+    """
     phi, n, dt = np.deg2rad(LATITUDE_DEG), int(seconds * RATE_HZ), 1 / RATE_HZ
     a = np.deg2rad(azimuth_deg)
     turned = np.array(
@@ -72,11 +80,12 @@ def record(
     )
     earth = turned @ (OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)]))
     tilt = np.zeros(3) if tilt_deg is None else np.deg2rad(tilt_deg)
+    own = np.zeros((len(faces), 3)) if own_deg is None else np.deg2rad(own_deg)
     rows, positions = [], []
     for i, (alpha, beta) in enumerate(faces):
         told = axes(alpha, beta)
         setting = np.deg2rad(rng.normal(0, setting_deg, 3))
-        real = told @ Rotation.from_rotvec(tilt + setting).as_matrix()
+        real = told @ Rotation.from_rotvec(tilt + setting + own[i]).as_matrix()
         force = sensors.acc_bias + sensors.acc_scale * (real @ [0.0, -G, 0.0])
         rate = sensors.gyr_bias + real @ earth
         if aligned == "itself":  # level by its accelerometers: that force is up

@@ -1,0 +1,136 @@
+"""Rows of runs of a navigator at rest, and what they say of parameters.
+
+    y_r = H (X_phi (phi + phi_r) + X_p p_r + X_e C e + X_a C (a + k f + j_r)) + n   (1)
+    n ~ N(0, N_a^2 K_a + N_g^2 K_g + q^2 I)                                         (2)
+
+Symbols and units as in `estimate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.frames import force_home
+from fieldcal.core.samples import Array
+from fieldcal.navigator.growth import PHI, PLACE, growth, matrix
+from fieldcal.navigator.solution import Run
+
+BEGAN_M = 10.0
+"""How far from where it is a navigator may begin, m: the first position is noisy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What is known of the place and the runs.
+
+    Attributes
+    ----------
+    earth : (3,) rad/s in base axes
+    gravity : m/s^2
+    attitudes : (r, 3, 3) C of each run, device to base
+    common : (3,) rad, 1 sigma of phi about each base axis
+    own : (r,) rad, 1 sigma of each phi_r about any axis
+    used : which of velocity (3) and position (3) was recorded, East, down, north
+
+    """
+
+    earth: Array
+    gravity: float
+    attitudes: Array
+    common: Array
+    own: Array
+    used: Sequence[int]
+
+
+@dataclass(frozen=True, slots=True)
+class RunRows:
+    """Rows (1) of one run.
+
+    Attributes
+    ----------
+    y : (n,) what the solution is off by
+    design : (n, 12) of the parameters in the order of `NAMES`, and of phi
+    sigma : rad, of phi_r about any axis
+    turn : (n, 3) columns of phi_r
+    began : (n, n) of p_r
+    jitter : (n, n) of j_r of 1 m/s^2
+    rate_noise, force_noise : (n, n) K_g and K_a
+
+    """
+
+    y: Array
+    design: Array
+    sigma: float
+    turn: Array
+    began: Array
+    jitter: Array
+    rate_noise: Array
+    force_noise: Array
+
+    def covariance(self, noise: Array) -> Array:
+        """R of the rows by N_a, N_g, q, J, (n, n)."""
+        force, rate, out, jitter = noise**2
+        turned = self.turn @ self.turn.T
+        whole = self.sigma**2 * turned + self.began + jitter * self.jitter
+        whole += out * np.eye(len(self.y))
+        return np.asarray(whole + force * self.force_noise + rate * self.rate_noise)
+
+    def own(self, noise: Array, mean: Array) -> Array:
+        """phi_r, (3,) rad, where the parameters and phi are `mean`, (12,)."""
+        left = np.linalg.solve(self.covariance(noise), self.y - self.design @ mean)
+        return np.asarray(self.sigma**2 * self.turn.T @ left)
+
+
+def run_rows(run: Run, setup: Setup, r: int) -> RunRows:
+    """Rows of the run numbered r from 0."""
+    grown = growth(matrix(setup.earth, setup.gravity), run.step, len(run.values))
+    used = np.array(setup.used)
+    take = (9 * np.arange(len(run.values))[:, None] + 3 + used).ravel()
+    start, constant = (
+        part.reshape(-1, part.shape[2])[take] for part in (grown.start, grown.constant)
+    )
+    c = setup.attitudes[r]
+    rate, force = constant[:, :3] @ c, constant[:, 3:] @ c
+    f = c.T @ force_home(setup.gravity)
+    began = start[:, PLACE] * (BEGAN_M if used.max() >= len(f) else 0.0)
+    pick = np.ix_(take, take)
+    return RunRows(
+        run.values[:, used].ravel(),
+        np.hstack([force, force * f, rate, start[:, PHI]]),
+        float(setup.own[r]),
+        start[:, PHI],
+        began @ began.T,
+        force @ force.T,
+        grown.rate_noise[pick],
+        grown.force_noise[pick],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RunPosterior:
+    """Parameters and phi, (12,), their covariance, ln of the evidence, and chi2."""
+
+    mean: Array
+    covariance: Array
+    score: float
+    chi2: float
+
+
+def posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPosterior:
+    """What all runs say with sizes before them (12,), and noise N_a, N_g, q, J."""
+    g, b, square, log_det = np.zeros((len(sizes),) * 2), np.zeros(len(sizes)), 0.0, 0.0
+    for one in rows:
+        lower = np.linalg.cholesky(one.covariance(noise))
+        white = np.linalg.solve(lower, np.column_stack([one.design, one.y]))
+        h, y = white[:, :-1], white[:, -1]
+        g, b, square = g + h.T @ h, b + h.T @ y, square + float(y @ y)
+        log_det += 2 * float(np.log(np.diagonal(lower)).sum())
+    m = np.eye(len(sizes)) + sizes[:, None] * g * sizes
+    covariance = sizes[:, None] * np.linalg.inv(m) * sizes
+    mean = covariance @ b
+    chi2 = square - float(b @ mean)
+    score = -0.5 * (chi2 + log_det + float(np.linalg.slogdet(m)[1]))
+    return RunPosterior(mean, covariance, score, chi2)

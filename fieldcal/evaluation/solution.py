@@ -51,6 +51,13 @@ from fieldcal.solve.shown import Shown
 
 Turns = Literal["auto", "yes", "no"]
 
+OTHER_ANGLES = (
+    "the positions are not those of session.toml: most of them lie elsewhere than its"
+    " angles say, by more than anybody sets an angle wrong; look for positions in"
+    " another order, a sign, or axes that are named wrongly, and solve again"
+)
+"""Said where angles say nothing."""
+
 
 @dataclass(frozen=True)
 class Laid:
@@ -206,7 +213,8 @@ def solved_as(
     recorded = None if printed else laid.recorded(turns != "no", shown)
     found = solve(laid.observations, recorded=recorded, **asked)
     angles, note = _as_shown(asked, shown, found)
-    if note:
+    others = angles > thresholds.NO_ANGLE
+    if note and not others:
         asked["angle_sigma_deg"], notes = angles, [note, *notes]
         found = solve(laid.observations, recorded=recorded, **asked)
     shows = _grade(found, about)
@@ -228,6 +236,8 @@ def solved_as(
         found = replace(found, info={**found.info, "unexamined": laid.examined[1]})
     if shown is None:
         return found
+    if others:
+        found = replace(found, warnings=(OTHER_ANGLES, *found.warnings), good=False)
     return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))
 
 

@@ -123,3 +123,7 @@ SUSPECT = 0.1
 CERTAIN = 1 - LOOKED_AT
 """Probability from which something is taken as sure: a window that is bad has no weight
 left, and no digits are told."""
+
+NO_ANGLE = 45.0
+"""Size of what angles are wrong by, deg, from which they say nothing: half of what
+parts one axis from the next. Nobody sets them so; session.toml is wrong."""

@@ -71,6 +71,14 @@ def test_what_is_off_is_in_the_uncertainties(
     assert found.go and found.off < 0.75 * was
 
 
+@pytest.mark.thorough
+def test_gyroscopes_reversed_beside_positions_exchanged_are_no_go(
+    tmp_path: Path,
+) -> None:
+    found = of(tmp_path / "wide", 99_600_085)
+    assert not found.go and "the positions are not those of session.toml" in found.says
+
+
 @pytest.mark.parametrize(
     ("mistake", "why"),
     [

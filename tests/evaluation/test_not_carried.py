@@ -12,6 +12,7 @@ import pytest
 from session_folders import SITE, places, recorded, write_session
 
 from fieldcal.cli import main
+from fieldcal.evaluation import solution
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import effect
 
@@ -202,6 +203,23 @@ def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
 
 BY_HAND = [(181.3, 0.8), (88.9, -1.6), (1.1, 91.4), (-92.0, 0.7)]
 """Faces on which the device is laid: about these angles, and nobody knows which."""
+
+
+def test_angles_that_nobody_sets_so_are_those_of_other_positions(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Their size was refused as an option that nobody had given."""
+    for size, other in ((44.0, False), (231.0, True)):
+        monkeypatch.setattr(solution, "angles_set", lambda _, size=size: size)
+        said = places([WIDE[i] for i in (0, 2, 1, 4, 3, *range(5, len(WIDE)))])
+        folder = tmp_path / str(size)
+        write_session(folder, recorded(CALM, places(WIDE)), said, site=SITE)
+        assert main(["solve", str(folder), "--json"]) == 1
+        out: dict[str, Any] = json.loads(capsys.readouterr().out)
+        assert out["verdict"] == "bad" or not other
+        assert (solution.OTHER_ANGLES in out["warnings"]) == other
 
 
 def test_faces_laid_by_hand_bear_witness_to_angles_set_badly(

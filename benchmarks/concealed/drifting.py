@@ -14,6 +14,9 @@ from scipy.spatial.transform import Rotation
 from benchmarks.concealed.mechanisation import OMEGA, Array, navigated
 
 LATITUDE_DEG, G, RATE_HZ = 50.45, 9.8106, 10.0
+BEGAN = (3.0, -2.0, 5.0)
+"""Where a navigator begins, m."""
+
 FACES = ((0, 0), (90, 0), (180, 0), (-90, 0), (0, 90), (0, -90))
 
 
@@ -73,12 +76,10 @@ def record(
 
     `own_deg`, (r, 3), is what each attitude is off by beyond how well it is set.
     """
-    phi, n, dt = np.deg2rad(LATITUDE_DEG), int(seconds * RATE_HZ), 1 / RATE_HZ
     a = np.deg2rad(azimuth_deg)
     turned = np.array(
         [[np.cos(a), 0, -np.sin(a)], [0, 1, 0], [np.sin(a), 0, np.cos(a)]]
     )
-    earth = turned @ (OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)]))
     tilt = np.zeros(3) if tilt_deg is None else np.deg2rad(tilt_deg)
     own = np.zeros((len(faces), 3)) if own_deg is None else np.deg2rad(own_deg)
     rows, positions = [], []
@@ -86,43 +87,75 @@ def record(
         told = axes(alpha, beta)
         setting = np.deg2rad(rng.normal(0, setting_deg, 3))
         real = told @ Rotation.from_rotvec(tilt + setting + own[i]).as_matrix()
-        force = sensors.acc_bias + sensors.acc_scale * (real @ [0.0, -G, 0.0])
-        rate = sensors.gyr_bias + real @ earth
-        if aligned == "itself":  # level by its accelerometers: that force is up
-            told = _levelled(told, force)
-        noise = rng.standard_normal((2, n, 3)) * np.sqrt(RATE_HZ)
-        v, p = navigated(
-            rate + sensors.rate_noise * noise[0],
-            force + sensors.force_noise * noise[1],
-            dt,
-            turned.T @ told.T,
-            phi,
-            G,
-        )
-        start = 1000.0 * i
-        both = np.vstack([np.zeros(6), np.hstack([v, p + [3.0, -2.0, 5.0]])])
-        both[0, 3:] = [3.0, -2.0, 5.0]
+        both = _solution(sensors, rng, real, told, turned, seconds, aligned)
         both += out_noise * rng.standard_normal(both.shape)
-        rows.append(np.column_stack([start + dt * np.arange(n + 1), both]))
+        start = 1000.0 * i
+        rows.append(np.column_stack([start + np.arange(len(both)) / RATE_HZ, both]))
         positions.append({"alpha_deg": float(alpha), "beta_deg": float(beta)}
                          | {"start_s": start, "end_s": start + seconds})  # fmt: skip
+    navigator = {"azimuth_deg": azimuth_deg, "azimuth_sd_deg": 0.5, "aligned": aligned}
+    about: dict[str, Any] = {
+        "format": 1,
+        "site": {
+            "latitude_deg": LATITUDE_DEG, "gravity": G, "level_deg": 0.02,
+            "angle_setting_deg": setting_deg,
+        },
+        "navigator": navigator,
+        "position": positions,
+    }  # fmt: skip
+    _write(folder, np.vstack(rows), columns, about)
+    return folder
+
+
+def _solution(
+    sensors: Sensors,
+    rng: np.random.Generator,
+    real: Array,
+    told: Array,
+    turned: Array,
+    seconds: float,
+    aligned: str,
+) -> Array:
+    """Velocity and position that a navigator computes, (n + 1, 6).
+
+    Parameters
+    ----------
+    sensors, rng : what it measures with, and their noise
+    real, told : (3, 3) base to device, as it is and as it was entered
+    turned : (3, 3) from north to the axes of the base
+    seconds, aligned : how long, and whether it levels itself
+
+    """
+    phi, n = np.deg2rad(LATITUDE_DEG), int(seconds * RATE_HZ)
+    earth = turned @ (OMEGA * np.array([0.0, -np.sin(phi), np.cos(phi)]))
+    force = sensors.acc_bias + sensors.acc_scale * (real @ [0.0, -G, 0.0])
+    rate = sensors.gyr_bias + real @ earth
+    if aligned == "itself":  # level by its accelerometers: that force is up
+        told = _levelled(told, force)
+    noise = rng.standard_normal((2, n, 3)) * np.sqrt(RATE_HZ)
+    v, p = navigated(
+        rate + sensors.rate_noise * noise[0],
+        force + sensors.force_noise * noise[1],
+        1 / RATE_HZ,
+        turned.T @ told.T,
+        phi,
+        G,
+    )
+    moved = np.vstack([np.zeros(6), np.hstack([v, p])])
+    return moved + np.array([0.0, 0.0, 0.0, *BEGAN])
+
+
+def _write(
+    folder: Path, rows: Array, columns: Sequence[str], about: dict[str, Any]
+) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     names = ("t", "ve", "vd", "vn", "pe", "pd", "pn")
     kept = [i for i, name in enumerate(names) if name in ("t", *columns)]
     np.savetxt(
-        folder / "solution.csv", np.vstack(rows)[:, kept], delimiter=",",
+        folder / "solution.csv", rows[:, kept], delimiter=",",
         header=",".join(names[i] for i in kept), comments="", fmt="%.9g",
     )  # fmt: skip
-    site = {"latitude_deg": LATITUDE_DEG, "gravity": G, "level_deg": 0.02}
-    table: dict[str, Any] = {
-        "format": 1,
-        "site": {**site, "angle_setting_deg": setting_deg},
-        "navigator": {"azimuth_deg": azimuth_deg, "azimuth_sd_deg": 0.5,
-                      "aligned": aligned},
-        "position": positions,
-    }  # fmt: skip
-    (folder / "session.toml").write_text(tomlkit.dumps(table))
-    return folder
+    (folder / "session.toml").write_text(tomlkit.dumps(about))
 
 
 def _levelled(told: Array, force: Array) -> Array:

@@ -28,7 +28,7 @@ def swapped(written: Written, bench: Bench, rng: Rng) -> Written:
     """Two positions are written down in the wrong order."""
     rows = _rows(written)
     i, j = rng.choice(bench.stated or len(rows), 2, replace=False)
-    for key in ("alpha_deg", "beta_deg"):
+    for key in ANGLES:
         if key in rows[i]:
             rows[i][key], rows[j][key] = rows[j][key], rows[i][key]
     return _saying(written, rows)

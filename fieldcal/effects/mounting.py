@@ -86,11 +86,13 @@ def angle_unit(x: Experience, held: Index, measured: Array) -> str:
     """
     if len(held) < 2:
         return ""
-    said = max(_odds(measured, x.f[held] @ axes.T)[0] for axes in signed_axes())
     for name, size in ANGLES.items():
         other = x.turned(alpha=size * x.alpha, beta=size * x.beta, gamma=size * x.gamma)
         likely, squares = _odds(measured, other.f[held])
-        if squares <= FITS * measured.size and likely - said > BETTER:
+        if squares > FITS * measured.size:
+            continue
+        said = max(_odds(measured, x.f[held] @ axes.T)[0] for axes in signed_axes())
+        if likely - said > BETTER:
             return name
     return ""
 

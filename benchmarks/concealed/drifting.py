@@ -142,7 +142,7 @@ def _solution(
         G,
     )
     moved = np.vstack([np.zeros(6), np.hstack([v, p])])
-    return moved + np.array([0.0, 0.0, 0.0, *BEGAN])
+    return np.asarray(moved + np.array([0.0, 0.0, 0.0, *BEGAN]))
 
 
 def _write(

@@ -36,6 +36,9 @@ SECONDS, TURN_S, RATE = 30.0, 8.0, 50.0
 AMPLITUDE_DEG, SPREAD = 1.0, 0.1
 """Of each wave, and of its frequency where the swaying is irregular, in itself."""
 
+EARTH = effect("earth_rate", {})
+"""Felt as by a real device: whether one feels it is told by these windows just so."""
+
 DRAWN_AGAIN = 400
 """Samples of the devices by which figures are uncertain."""
 
@@ -95,7 +98,7 @@ def played(seed: int, hz: float = 0.0, spread: float = 0.0) -> Block:
             acc=(5e-3,) * 3, gyr=(1e-3,) * 3,
             acc_instability=device.ZERO, gyr_instability=device.ZERO,
         ),
-        effects=tuple(effect("sway", w) for w in waves) if hz else (),
+        effects=(EARTH, *(effect("sway", w) for w in waves if hz)),
     )  # fmt: skip
     return simulate(profile, held(), seed=seed)
 

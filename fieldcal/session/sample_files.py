@@ -28,6 +28,9 @@ ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
 PART = 1 << 17
 """Rows that are handed over together, at most."""
 
+READ_AT_ONCE = 1 << 16
+"""Bytes of a column that are read together."""
+
 
 def find(folder: Path, stem: str = "samples") -> Path:
     """Find the samples file of a session folder.
@@ -107,7 +110,11 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
     elif path.name.endswith(".parquet"):
         import pyarrow.parquet
 
-        whole = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
+        whole = pyarrow.parquet.ParquetFile(
+            path, page_checksum_verification=True,
+            # what it reads ahead it keeps until the end: all of the file
+            pre_buffer=False, buffer_size=READ_AT_ONCE,
+        )  # fmt: skip
         if not _agrees(whole.metadata):
             read(path)  # which says so
         names = [n for n in whole.schema_arrow.names if n in COLUMNS]

@@ -276,3 +276,18 @@ def test_what_is_no_part_of_a_window_lies_within_it(tmp_path: Path, gaps: str) -
     toml = f"[[position]]\nstart_s = 0.5\nend_s = 3.5\nwithout_s = {gaps}\n"
     with pytest.raises(SessionError, match="number 1 without_s = .*start_s and end_s"):
         Session.open(folder(tmp_path, toml))
+
+
+def test_a_long_parquet_file_is_not_held_in_memory(tmp_path: Path) -> None:
+    """Of many groups of rows no more than a few are there at a time."""
+    rng = np.random.default_rng(3)
+    columns = {name: rng.normal(size=400_000) for name in HEAD.split(",")}
+    columns["t"] = np.arange(400_000) / 1000.0
+    path = tmp_path / "samples.parquet"
+    pa.parquet.write_table(pa.table(columns), path, row_group_size=20_000)
+    before, most, rows = pa.total_allocated_bytes(), 0, 0
+    for part in sample_files.blocks(path):
+        rows += len(part)
+        most = max(most, pa.total_allocated_bytes() - before)
+    assert rows == 400_000
+    assert most < path.stat().st_size / 2

@@ -20,6 +20,7 @@ from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.words.heading_words import meaning
 from fieldcal.session.arrow_columns import numbers
+from fieldcal.session.sample_files import READ_AT_ONCE
 
 WHAT = "Parquet and Arrow"
 
@@ -91,7 +92,10 @@ class ParquetFile(ColumnRecording):
             file.seek(0)
             try:
                 if magic.startswith(PARQUET):
-                    opened = pyarrow.parquet.ParquetFile(file)
+                    opened = pyarrow.parquet.ParquetFile(
+                        # what it reads ahead it keeps until the end: all of the file
+                        file, pre_buffer=False, buffer_size=READ_AT_ONCE,
+                    )  # fmt: skip
                     schema = opened.schema_arrow
                     one: dict[str, Any] = {"use_threads": False}
                     if self.wanted.columns and not every:

@@ -44,13 +44,15 @@ GROUPED = {
     "angles exchanged, counted the other way, in radians": (
         "angles exchanged", "an angle counted the other way", "angles in radians",
     ),
-    "windows that begin while it is turned": ("windows begun early",),
+    "windows that begin or end while it is turned": (
+        "windows begun early", "windows ended late",
+    ),
     "a position, an angle, or the gauge off": (
         "a position off", "a repeated angle off", "gauge long",
         "two positions or angles off",
     ),
-    "table tilted or kicked; level not said or wrong; angles not said": (
-        "table tilted", "table kicked", "level and angles not said",
+    "table tilted, kicked or sinking; level not said or wrong; angles not said": (
+        "table tilted", "table kicked", "ground gives way", "level and angles not said",
         "level said wrongly",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
@@ -63,10 +65,15 @@ GROUPED = {
     "another unit (g, deg/s, rad/s)": (
         "g labelled m/s²", "deg/s labelled rad/s", "rad/s labelled deg/s",
     ),
-    "time in ns, lost samples, windows twice, a copied output": (
-        "time in ns", "samples lost, time counted", "windows overlapping",
-        "windows listed 20 times", "a gyroscope copied",
+    "time in ns, windows twice, a copied or stuck output": (
+        "time in ns", "windows overlapping", "windows listed 20 times",
+        "a gyroscope copied", "an output stuck",
     ),
+    "lost samples, wrong bits, lines between samples, few digits, coarse times": (
+        "samples lost, time counted", "lost samples as zeros", "lost samples repeated",
+        "wrong bits", "resampled", "rates with few digits", "coarse times",
+    ),
+    "a restart between positions": ("device restarted",),
     "a mean or a bias taken out": (
         "mean of acc removed", "mean of acc removed, rounded", "bias of gyr tracked",
     ),
@@ -78,7 +85,9 @@ GROUPED = {
     "biases that warm up, wander, or keep something of a turn": (
         "warm-up", "wandering biases", "bias that a turn leaves",
     ),
-    "cut toward zero, clipped": ("cut toward zero", "clipped"),
+    "cut toward zero, clipped, wrapped around": (
+        "cut toward zero", "clipped", "wrapped around",
+    ),
 }  # fmt: skip
 """Rows of the table: what it is about, and its mistakes."""
 

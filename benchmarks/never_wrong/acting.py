@@ -10,7 +10,8 @@ Written apart from everything that estimates. Device axes, m/s^2 and rad/s:
     U += q, W += r                             biases that wander by a random walk
     U += c e^(-t/T), W += d e^(-t/T)           a device that warms up
 
-Sway turns the base about its level axis by a sine, a kick by an angle that stays.
+Sway turns the base about its level axis by a sine, a kick by an angle that stays, and
+soft ground gives way by an angle that ends in e^(-t/T).
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ class Acting:
     acc_walk, gyr_walk : what biases wander by in 100 s
     acc_cold, gyr_cold, warming : what biases are off by at first, and T, s
     kicked, kick_s : rad by which the base is turned for good, and when
+    sinking, sinks_s : rad by which soft ground gives way at last, and T, s
 
     """
 
@@ -58,14 +60,19 @@ class Acting:
     warming: float = 1.0
     kicked: float = 0.0
     kick_s: float = 0.0
+    sinking: float = 0.0
+    sinks_s: float = 1.0
 
     def tilted(self, t: Floats) -> tuple[Floats, Floats]:
-        """Tilt of a base that sways or is kicked, rad, and its rate, rad/s, (n,)."""
+        """Tilt of a base that sways, is kicked or sinks, rad; its rate, rad/s, (n,)."""
         phase = 2 * np.pi * self.sway_hz * t
         rate = 2 * np.pi * self.sway_hz * self.swaying * np.cos(phase)
         part = np.clip((t - self.kick_s) / KICK_S, 0.0, 1.0)
         turned = self.kicked * (part - np.sin(2 * np.pi * part) / (2 * np.pi))
         kick = self.kicked * (1 - np.cos(2 * np.pi * part)) / KICK_S
+        left = np.exp(-t / self.sinks_s)
+        turned += self.sinking * (1 - left)
+        rate += self.sinking / self.sinks_s * left
         return self.swaying * np.sin(phase) + turned, rate + kick
 
     def felt(self, t: Floats, f: Floats, w: Floats) -> Floats:

@@ -145,6 +145,12 @@ def kicked(bench: Bench, rng: Rng) -> Bench:
     return _acting(bench, kicked=size, kick_s=float(rng.uniform(start, end)))
 
 
+def sinking(bench: Bench, rng: Rng) -> Bench:
+    """Soft ground gives way by 0.02 to 0.5 degrees, in 50 to 500 s."""
+    size = float(np.deg2rad(_size(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
+    return _acting(bench, sinking=size, sinks_s=_size(rng, 50, 500))
+
+
 BEFORE: dict[str, Before] = {
     "a repeated angle off": repeated_angle,
     "gauge long": gauge_long,
@@ -162,6 +168,7 @@ BEFORE: dict[str, Before] = {
     "wandering biases": wandering,
     "warm-up": warming,
     "table kicked": kicked,
+    "ground gives way": sinking,
 }
 
 

@@ -1,4 +1,4 @@
-"""Mistakes of a cable, a firmware or a file, once something was recorded.
+"""Mistakes of a cable or a firmware, once something was recorded.
 
 Each takes a session that is about to be written (what the device does, what it put out,
 what session.toml says of it) and spoils one thing of it.
@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded
+from benchmarks.never_wrong.file_mistakes import OF_FILE
 from benchmarks.never_wrong.said_mistakes import SAID
 from benchmarks.never_wrong.written import After, Rng, Written, tables
 
@@ -72,15 +73,6 @@ def triads_unlike(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, gyr=np.roll(s.gyr, 1, axis=1)))
 
 
-def samples_lost(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Samples of 0.05 to 1 s are lost on a way, and time is counted by samples."""
-    s, way = written.samples, int(rng.integers(1, len(bench.windows)))
-    middle = (bench.windows[way - 1, 1] + bench.windows[way, 0]) / 2
-    lost = s.within(middle, middle + np.exp(rng.uniform(np.log(0.05), 0.0)))
-    t = s.t[: np.count_nonzero(~lost)]
-    return replace(written, samples=Samples(t, s.acc[~lost], s.gyr[~lost]))
-
-
 def gyr_copied(written: Written, bench: Bench, rng: Rng) -> Written:
     """A gyroscope's channel copies another's."""
     s = written.samples
@@ -120,6 +112,36 @@ def gyr_tracked(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, gyr=gyr))
 
 
+def restarted(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device was restarted on a way: its biases were others before.
+
+    By 0.2 to 10 mg and 5 to 500 deg/h.
+    """
+    s, way = written.samples, int(rng.integers(1, len(bench.windows)))
+    before = s.t < (bench.windows[way - 1, 1] + bench.windows[way, 0]) / 2
+    acc, gyr = s.acc.copy(), s.gyr.copy()
+    acc[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2e-3, 0.1]))), 3)
+    gyr[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2.4e-5, 2.4e-3]))), 3)
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def stuck(written: Written, bench: Bench, rng: Rng) -> Written:
+    """An output keeps a value for 5 to 60 s."""
+    s, c = written.samples, int(rng.integers(6))
+    start = float(rng.uniform(0, s.t[-1] - 5))
+    some = s.within(start, start + float(rng.uniform(5, 60)))
+    six = np.hstack([s.acc, s.gyr])
+    six[some, c] = six[some, c][0]
+    return replace(written, samples=Samples(s.t, six[:, :3], six[:, 3:]))
+
+
+def wrapped(written: Written, bench: Bench, rng: Rng) -> Written:
+    """What is beyond 8 to 9.7 m/s^2 comes out with the other sign: an overflow."""
+    s, most = written.samples, rng.uniform(8, 9.7)
+    acc = (s.acc + most) % (2 * most) - most
+    return replace(written, samples=replace(s, acc=acc))
+
+
 def cut_toward_zero(written: Written, bench: Bench, rng: Rng) -> Written:
     """Accelerations are cut toward zero to a grain larger than their noise."""
     s = written.samples
@@ -135,23 +157,29 @@ def clipped(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=np.clip(s.acc, -most, most)))
 
 
-AFTER: dict[str, After] = SAID | {
-    "g labelled m/s²": acc_in_g,
-    "deg/s labelled rad/s": gyr_in_deg,
-    "rad/s labelled deg/s": gyr_said_deg,
-    "time in ns": time_in_ns,
-    "samples lost, time counted": samples_lost,
-    "an output reversed": axis_turned_round,
-    "a triad reversed": triad_turned_round,
-    "outputs exchanged": axes_exchanged,
-    "triads in other axes": triads_unlike,
-    "a gyroscope copied": gyr_copied,
-    "mean of acc removed": acc_mean_taken,
-    "mean of acc removed, rounded": mean_taken_and_rounded,
-    "bias of gyr tracked": gyr_tracked,
-    "cut toward zero": cut_toward_zero,
-    "clipped": clipped,
-}
+AFTER: dict[str, After] = (
+    SAID
+    | OF_FILE
+    | {
+        "g labelled m/s²": acc_in_g,
+        "deg/s labelled rad/s": gyr_in_deg,
+        "rad/s labelled deg/s": gyr_said_deg,
+        "time in ns": time_in_ns,
+        "an output reversed": axis_turned_round,
+        "a triad reversed": triad_turned_round,
+        "outputs exchanged": axes_exchanged,
+        "triads in other axes": triads_unlike,
+        "a gyroscope copied": gyr_copied,
+        "mean of acc removed": acc_mean_taken,
+        "mean of acc removed, rounded": mean_taken_and_rounded,
+        "bias of gyr tracked": gyr_tracked,
+        "cut toward zero": cut_toward_zero,
+        "clipped": clipped,
+        "device restarted": restarted,
+        "an output stuck": stuck,
+        "wrapped around": wrapped,
+    }
+)
 
 
 def session(bench: Bench, names: tuple[str, ...], rng: Rng) -> Written:

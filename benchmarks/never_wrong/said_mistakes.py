@@ -134,6 +134,15 @@ def begun_early(written: Written, bench: Bench, rng: Rng) -> Written:
     return _saying(written, rows)
 
 
+def ended_late(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Windows end once the next turn has begun: one of them, or all."""
+    rows, late = _rows(written), float(rng.uniform(0.75, bench.way - 0.5))
+    one = int(rng.integers(len(rows) - 1))
+    for i in range(len(rows) - 1) if rng.integers(2) else (one,):
+        rows[i]["end_s"] += late
+    return _saying(written, rows)
+
+
 SAID: dict[str, After] = {
     "positions swapped": swapped,
     "angles exchanged": angles_exchanged,
@@ -141,6 +150,7 @@ SAID: dict[str, After] = {
     "angles in radians": angles_in_radians,
     "a position forgotten": one_forgotten,
     "windows begun early": begun_early,
+    "windows ended late": ended_late,
     "latitude not said": latitude_unsaid,
     "other hemisphere": other_hemisphere,
     "level and angles not said": level_unsaid,

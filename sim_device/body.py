@@ -11,7 +11,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.effect import SimulatedEffect
-from fieldcal.sim_device.joints import Joints, Swing
+from fieldcal.sim_device.joints import Angles, Joints, Swing
 from fieldcal.sim_device.life import Life
 from fieldcal.sim_device.motion import (
     BaseMotion,
@@ -27,8 +27,6 @@ from fieldcal.sim_device.quaternion import STILL
 from fieldcal.sim_device.random_process import stream
 from fieldcal.sim_device.temperature import course
 from fieldcal.sim_device.way import REST, Manoeuvre
-
-Angles = tuple[float, float]
 
 
 class Body:
@@ -49,6 +47,7 @@ class Body:
         self.asked = (
             float(np.deg2rad(profile.motion.alpha_deg)),
             float(np.deg2rad(profile.motion.beta_deg)),
+            float(np.deg2rad(profile.motion.gamma_deg)),
         )
         effects = profile.in_order
         settings = (e.setting(stream(seed, e.id)) for e in effects)
@@ -71,7 +70,7 @@ class Body:
         if move is not None:
             self.moves.append(move)
 
-    def turn(self, start: float, seconds: float, angles: Angles) -> Angles:
+    def turn(self, start: float, seconds: float, angles: Angles) -> tuple[float, float]:
         """Turn to `angles`; returns when it starts and ends."""
         return self.spin(start, seconds, angles, (0.0, 0.0, 0.0))
 
@@ -81,11 +80,12 @@ class Body:
         seconds: float,
         angles: Angles,
         rate: tuple[float, float, float],
-    ) -> Angles:
+    ) -> tuple[float, float]:
         """Turn to `angles` and run up to a constant `rate`; when it starts and ends."""
         if not np.isfinite([*angles, *rate, start]).all():
             raise InputError(f"cannot turn to {angles}: the angles must be numbers")
-        self.asked = (float(angles[0]), float(angles[1]))
+        alpha, beta, gamma = map(float, angles)
+        self.asked = (alpha, beta, gamma)
         self.levels.append(self._level())
         there = self._set(self.asked)
         return self.joints.spin(start, seconds, there, rate)
@@ -153,11 +153,11 @@ class Body:
         return shaking
 
     def _set(self, angles: Angles) -> Angles:
-        """Where the joints end up when asked for `angles`."""
-        there = np.array(angles)
+        """Where the joints end up when asked for `angles`; the third is set exactly."""
+        there = np.array(angles[:2])
         for setting in self._settings:
             there = setting(there)
-        return float(there[0]), float(there[1])
+        return float(there[0]), float(there[1]), angles[2]
 
     def _level(self) -> float:
         return sum(e.shaking(self._strength) for e in self.profile.effects)

@@ -2,7 +2,7 @@
 
 Requests, one key each:
 
-    {"turn": {"alpha_deg": 45, "beta_deg": 5}}      also "seconds", "at_s"
+    {"turn": {"alpha_deg": 45, "beta_deg": 5}}      also "gamma_deg", "seconds", "at_s"
     {"spin": {"rate_deg_s": [0, 30, 0]}}            a rate table; also the keys of turn
     {"bump": {}}                                    "push", "tilt_deg", "seconds"
     {"fault": {"silence_s": 2}}                     "hangup_s", "garbage_bytes",

@@ -17,6 +17,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.body import Body
 from fieldcal.sim_device.chain import SignalChain
+from fieldcal.sim_device.joints import Angles
 from fieldcal.sim_device.life import Life
 from fieldcal.sim_device.noise import RandomErrors
 from fieldcal.sim_device.profile import Profile, Truth
@@ -62,8 +63,8 @@ class VirtualDevice:
         return self._tick / self.rate
 
     @property
-    def angles(self) -> tuple[float, float]:
-        """Alpha and beta that it was last told to turn to, rad."""
+    def angles(self) -> Angles:
+        """Alpha, beta and gamma that it was last told to turn to, rad."""
         return self.body.asked
 
     @property
@@ -77,6 +78,7 @@ class VirtualDevice:
         beta: float,
         seconds: float | None = None,
         at: float | None = None,
+        gamma: float = 0.0,
     ) -> float:
         """Turn to the angles; returns the device time at which that is done.
 
@@ -89,13 +91,14 @@ class VirtualDevice:
             If the angles or the duration are not finite, or the duration not above 0.
 
         """
-        _, end = self.body.turn(self._start(at), self._duration(seconds), (alpha, beta))
+        there = (alpha, beta, gamma)
+        _, end = self.body.turn(self._start(at), self._duration(seconds), there)
         return end * self.sensing.pace
 
     def spin(
         self,
         rate: tuple[float, float, float],
-        angles: tuple[float, float] | None = None,
+        angles: tuple[float, float] | Angles | None = None,
         seconds: float | None = None,
         at: float | None = None,
     ) -> float:
@@ -109,7 +112,8 @@ class VirtualDevice:
             As for `turn`.
 
         """
-        where = self.angles if angles is None else angles
+        alpha, beta, *third = self.angles if angles is None else angles
+        where = (alpha, beta, *(third or (0.0,)))
         _, end = self.body.spin(self._start(at), self._duration(seconds), where, rate)
         return end * self.sensing.pace
 

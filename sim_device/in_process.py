@@ -24,6 +24,10 @@ class Where(Protocol):
         """Turn about the turned x, rad."""
 
     @property
+    def gamma(self) -> float:
+        """Turn about the twice turned y, rad."""
+
+    @property
     def rate(self) -> tuple[float, float, float] | None:
         """Constant rate about the procedure axes, rad/s."""
 
@@ -66,6 +70,6 @@ class InProcess(Driver):
                 raise InputError("the virtual device needs the angles of a position")
             return self.device.spin(position.rate)
         if position.rate is not None:
-            angles = (position.alpha, position.beta)
+            angles = (position.alpha, position.beta, position.gamma)
             return self.device.spin(position.rate, angles)
-        return self.device.turn(position.alpha, position.beta)
+        return self.device.turn(position.alpha, position.beta, gamma=position.gamma)

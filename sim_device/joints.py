@@ -1,8 +1,9 @@
 """How the joints that carry the device move: angles as smooth functions of time.
 
-Three joints in a row: alpha about z, beta about the turned x, and the spin of a rate
-table about an axis fixed in the device. Each moves along a polynomial of fifth degree
-that meets angle, rate and rest of acceleration at both ends:
+Four joints in a row: alpha about z, beta about the turned x, gamma about the twice
+turned y, and the spin of a rate table about an axis fixed in the device. Each moves
+along a polynomial of fifth degree that meets angle, rate and rest of acceleration at
+both ends:
 
     x(s) = sum c_k s^k,  s = t - start                              (j1)
     d = x1 - x0 - v0 T
@@ -23,8 +24,11 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-JOINTS = 3
-ALPHA, BETA, SPIN = range(JOINTS)
+JOINTS = 4
+ALPHA, BETA, GAMMA, SPIN = range(JOINTS)
+
+Angles = tuple[float, float, float]
+"""Alpha, beta and gamma, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,7 @@ class Swing:
 
     Attributes
     ----------
-    angle, rate, acceleration : (3, n) of alpha, beta and spin; rad, rad/s, rad/s^2
+    angle, rate, acceleration : (4, n) of the joints; rad, rad/s, rad/s^2
     axis : (3, n) unit axis of the spin, procedure axes
     since : (n,) s since the last turn ended, negative in a turn, inf before any
     progress : (n,) share of the last turn's duration that has passed, 0 before any
@@ -61,7 +65,7 @@ class _Segment:
 class Joints:
     """Segments of motion, appended as the device is told to move."""
 
-    angles: tuple[float, float]
+    angles: Angles
     turns: list[tuple[float, float]] = field(default_factory=list)
     spins: bool = False
     _segments: list[_Segment] = field(default_factory=list)
@@ -75,9 +79,7 @@ class Joints:
         """When the last turn ends, s; -inf before any."""
         return self.turns[-1][1] if self.turns else -np.inf
 
-    def turn(
-        self, start: float, seconds: float, angles: tuple[float, float]
-    ) -> tuple[float, float]:
+    def turn(self, start: float, seconds: float, angles: Angles) -> tuple[float, float]:
         """Turn to `angles` and stop any spin; returns when it starts and ends, s.
 
         A turn that is told while another is under way follows it.
@@ -88,7 +90,7 @@ class Joints:
         self,
         start: float,
         seconds: float,
-        angles: tuple[float, float],
+        angles: Angles,
         rate: tuple[float, float, float],
     ) -> tuple[float, float]:
         """Turn to `angles` and run up to a constant `rate`, rad/s about device axes.
@@ -113,7 +115,7 @@ class Joints:
         self,
         start: float,
         seconds: float,
-        angles: tuple[float, float],
+        angles: Angles,
         rate: Array,
         counts: bool = True,
     ) -> tuple[float, float]:
@@ -124,7 +126,7 @@ class Joints:
         coast = place[SPIN] + (speed[SPIN] + magnitude) * seconds / 2
         whole = 2 * np.pi * np.round(coast / (2 * np.pi))
         target = np.array([*angles, coast if magnitude else whole])
-        final = np.array([0.0, 0.0, magnitude])
+        final = np.array([0.0, 0.0, 0.0, magnitude])
         path = _hermite(place, speed, target, final, seconds)
         end = start + seconds
         self._segments.append(_Segment(start, axis, path))
@@ -135,7 +137,7 @@ class Joints:
         return start, end
 
     def _state(self, t: float) -> tuple[Array, Array]:
-        """Angles and rates of the joints at rest or in steady spin at `t`, (3,)."""
+        """Angles and rates of the joints at rest or in steady spin at `t`, (4,)."""
         last = self._segments[-1]
         s = t - last.start if np.isfinite(last.start) else 0.0
         return last.coefficients[0] + last.coefficients[1] * s, last.coefficients[1]
@@ -143,7 +145,8 @@ class Joints:
     def at(self, t: Array) -> Swing:
         """Where the joints are at ascending instants `t`, (n,) s."""
         n = len(t)
-        angle, rate, acceleration, axis = (np.empty((JOINTS, n)) for _ in range(4))
+        angle, rate, acceleration = (np.empty((JOINTS, n)) for _ in range(3))
+        axis = np.empty((3, n))
         for rows, segment in self._pieces(t):
             s = t[rows] - (segment.start if np.isfinite(segment.start) else 0.0)
             x, v, a = _evaluate(segment.coefficients, s)
@@ -186,7 +189,7 @@ def _hermite(x0: Array, v0: Array, x1: Array, v1: Array, seconds: float) -> Arra
 
 
 def _evaluate(c: Array, s: Array) -> tuple[Array, Array, Array]:
-    """Angles, rates and accelerations (3, n) of the polynomials `c` at `s`, (j1)."""
+    """Angles, rates and accelerations (4, n) of the polynomials `c` at `s`, (j1)."""
     if not np.any(c[1:]):
         still = np.zeros((JOINTS, len(s)))
         return c[0][:, None] + still, still, still

@@ -86,8 +86,8 @@ class SteeringKeys:
             arrow = keys[:3]
             if arrow in STEPS:
                 along = np.deg2rad(np.multiply(STEPS[arrow], self._steps))
-                alpha, beta = device.angles + along
-                device.turn(float(alpha), float(beta))
+                alpha, beta = device.angles[:2] + along
+                device.turn(float(alpha), float(beta), gamma=device.angles[2])
                 keys = keys[3:]
                 continue
             if keys[:1] == b"h":
@@ -100,7 +100,9 @@ class SteeringKeys:
 
     def _line(self) -> str:
         device = self._stream.device
-        alpha, beta = np.rad2deg(device.angles)
+        alpha, beta, gamma = np.rad2deg(device.angles)
         moving = "turning to" if device.time < device.busy_until else "at"
         host = "" if self._stream.link.attached() else "   nobody listens"
-        return f"{device.time:8.1f} s   {moving} α = {alpha:g}°, β = {beta:g}°{host}"
+        third = f", γ = {gamma:g}°" if gamma else ""
+        where = f"α = {alpha:g}°, β = {beta:g}°{third}"
+        return f"{device.time:8.1f} s   {moving} {where}{host}"

@@ -4,8 +4,8 @@ The frames follow each other from the local level to the device, each turned abo
 axis of the one before by an angle x(t) about the unit axis u:
 
     navigation (East, down, north) -> heading -> tilt of the base -> rocking
-    -> alpha about z -> beta about x -> spin of a rate table, or a way that is given
-    -> signed device axes
+    -> alpha about z -> beta about x -> gamma about y -> spin of a rate table, or a way
+    that is given -> signed device axes
 
 Attitude q, rate w and its derivative dw are handed down from frame to frame:
 
@@ -34,7 +34,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.joints import ALPHA, BETA, SPIN, Swing
+from fieldcal.sim_device.joints import ALPHA, BETA, GAMMA, SPIN, Swing
 from fieldcal.sim_device.quaternion import STILL, cross, into, multiply, turn
 
 X: Array = np.array([[1.0], [0.0], [0.0]])
@@ -170,8 +170,9 @@ def carried(
         frame = frame.turned(move.axis, move.angle(t))
     for axis, joint in ((Z, ALPHA), (X, BETA)):
         frame = frame.turned(axis, _joint(swing, joint))
-    if np.any(swing.angle[SPIN]):
-        frame = frame.turned(swing.axis, _joint(swing, SPIN))
+    for axis, joint in ((Y, GAMMA), (swing.axis, SPIN)):
+        if np.any(swing.angle[joint]):
+            frame = frame.turned(axis, _joint(swing, joint))
     return frame
 
 

@@ -10,12 +10,16 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.effect import AXES
+from fieldcal.sim_device.joints import Angles
 from fieldcal.sim_device.line_faults import KINDS, MOST
 
 if TYPE_CHECKING:
     from fieldcal.sim_device.stream import DeviceStream
 
 Reply = dict[str, Any]
+
+ANGLES = ("alpha_deg", "beta_deg", "gamma_deg")
+"""What the angles are called in orders and replies."""
 
 
 def carry_out(stream: DeviceStream, request: Mapping[str, Any]) -> Reply:
@@ -45,8 +49,10 @@ def carry_out(stream: DeviceStream, request: Mapping[str, Any]) -> Reply:
 def _turn(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     where = _angles(stream, given)
     at, seconds = _optional(given, "at_s"), _optional(given, "seconds")
-    _nothing_else("turn", given, ("alpha_deg", "beta_deg", "seconds", "at_s"))
-    return {"until_s": stream.device.turn(*where, seconds=seconds, at=at)}
+    _nothing_else("turn", given, (*ANGLES, "seconds", "at_s"))
+    alpha, beta, gamma = where
+    until = stream.device.turn(alpha, beta, seconds, at, gamma)
+    return {"until_s": until}
 
 
 def _spin(stream: DeviceStream, given: dict[str, Any]) -> Reply:
@@ -56,7 +62,7 @@ def _spin(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     if not isinstance(rate, list) or len(rate) != len(AXES):
         raise InputError("spin needs rate_deg_s, three numbers about x, y, z")
     x, y, z = (_number({"rate_deg_s": r}, "rate_deg_s", 0.0) for r in rate)
-    _nothing_else("spin", given, ("rate_deg_s", "alpha_deg", "beta_deg", "seconds"))
+    _nothing_else("spin", given, ("rate_deg_s", *ANGLES, "seconds"))
     turning = (math.radians(x), math.radians(y), math.radians(z))
     return {"until_s": stream.device.spin(turning, where, seconds, at)}
 
@@ -96,10 +102,8 @@ def _fault(stream: DeviceStream, given: dict[str, Any]) -> Reply:
 def _status(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     _nothing_else("status", given, ())
     device = stream.device
-    alpha, beta = np.rad2deg(device.angles)
     return {
-        "alpha_deg": float(alpha),
-        "beta_deg": float(beta),
+        **dict(zip(ANGLES, np.rad2deg(device.angles).tolist(), strict=True)),
         "moving": device.time < device.busy_until,
         "attached": stream.link.attached(),
         "port": stream.link.address,
@@ -123,12 +127,12 @@ _ORDERS: Mapping[str, Callable[[DeviceStream, dict[str, Any]], Reply]] = {
 }
 
 
-def _angles(stream: DeviceStream, given: dict[str, Any]) -> tuple[float, float]:
+def _angles(stream: DeviceStream, given: dict[str, Any]) -> Angles:
     """Angles asked for, rad; one that is not given stays as it is."""
-    now = np.rad2deg(stream.device.angles)
-    alpha = _number(given, "alpha_deg", float(now[0]))
-    beta = _number(given, "beta_deg", float(now[1]))
-    return math.radians(alpha), math.radians(beta)
+    now = np.rad2deg(stream.device.angles).tolist()
+    pairs = zip(ANGLES, now, strict=True)
+    alpha, beta, gamma = (math.radians(_number(given, k, v)) for k, v in pairs)
+    return alpha, beta, gamma
 
 
 def _optional(given: dict[str, Any], name: str) -> float | None:

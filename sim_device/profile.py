@@ -144,6 +144,7 @@ class Handling:
     turn_s: float = 4.0
     alpha_deg: float = 0.0
     beta_deg: float = 0.0
+    gamma_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

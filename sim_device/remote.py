@@ -63,9 +63,10 @@ class Remote:
             raise InputError(f"the virtual device refuses: {reply['error']}")
         return reply
 
-    def turn(self, alpha_deg: float, beta_deg: float) -> float:
+    def turn(self, alpha_deg: float, beta_deg: float, gamma_deg: float = 0.0) -> float:
         """Turn the device; returns the device time at which it is there, s."""
-        reply = self.ask(turn={"alpha_deg": alpha_deg, "beta_deg": beta_deg})
+        there = {"alpha_deg": alpha_deg, "beta_deg": beta_deg, "gamma_deg": gamma_deg}
+        reply = self.ask(turn=there)
         return float(reply["until_s"])
 
     def close(self) -> None:

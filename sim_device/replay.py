@@ -37,6 +37,7 @@ class HeldWindow:
     turn : when the turn that leads here starts and ends, s; None: amid the gap
     vibration : rms, m/s^2; None: as the profile has it
     way : the device is carried along to here, in device time; None: the joints turn
+    gamma : third angle, rad
 
     """
 
@@ -48,6 +49,7 @@ class HeldWindow:
     turn: tuple[float, float] | None = None
     vibration: float | None = None
     way: Manoeuvre | None = None
+    gamma: float = 0.0
 
 
 Schedule = Sequence[HeldWindow] | Sequence[tuple[float, float, float, float]]
@@ -112,7 +114,7 @@ def _windows(schedule: Schedule) -> list[HeldWindow]:
     if not windows:
         raise InputError("no window to play again: the session has no positions")
     for i, w in enumerate(windows):
-        if not np.isfinite([w.alpha, w.beta, w.start, w.end, *w.rate]).all():
+        if not np.isfinite([w.alpha, w.beta, w.gamma, w.start, w.end, *w.rate]).all():
             raise InputError(
                 f"position {i + 1} cannot be played again: its angles or times are "
                 "unknown"
@@ -134,10 +136,8 @@ def _ascending(times: Array) -> Array:
 
 def _standing_at(profile: Profile, first: HeldWindow) -> Profile:
     """Return the device switched on in the first window's position."""
-    angles = np.rad2deg([first.alpha, first.beta])
-    motion = replace(
-        profile.motion, alpha_deg=float(angles[0]), beta_deg=float(angles[1])
-    )
+    alpha, beta, gamma = np.rad2deg([first.alpha, first.beta, first.gamma]).tolist()
+    motion = replace(profile.motion, alpha_deg=alpha, beta_deg=beta, gamma_deg=gamma)
     return replace(profile, motion=motion)
 
 
@@ -154,7 +154,7 @@ def _move(sensing: Sensing, windows: list[HeldWindow]) -> None:
             middle = w.start - gap / 2
             start, end = w.turn or (middle - seconds / 2, middle + seconds / 2)
             seconds = max(end - start, shortest) / pace
-            body.spin(start / pace, seconds, (w.alpha, w.beta), w.rate)
+            body.spin(start / pace, seconds, (w.alpha, w.beta, w.gamma), w.rate)
         if w.way is not None:
             body.ways.append(replace(w.way, t=w.way.t / pace))
         if w.vibration is not None:

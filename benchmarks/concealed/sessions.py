@@ -122,7 +122,7 @@ class Session:
             speed = float(np.rad2deg(np.linalg.norm(w.rate)))
             return table | ({"speed_deg_s": speed} if speed else {})
         if self.attitudes:
-            turned = np.rad2deg(finite_turn(w.alpha, w.beta))
+            turned = np.rad2deg(finite_turn(w.alpha, w.beta, w.gamma))
             table["rotation_vector_deg"] = turned.tolist()
         elif self.angles:
             alpha, beta = np.rad2deg([w.alpha, w.beta])
@@ -160,11 +160,9 @@ class Session:
         )
 
 
-def finite_turn(alpha: float, beta: float) -> Array:
-    """About z by alpha and then about the turned x by beta, as one turn, (3,) rad."""
-    about_z = Rotation.from_rotvec([0.0, 0.0, alpha])
-    both = about_z * Rotation.from_rotvec([beta, 0.0, 0.0])
-    return np.asarray(both.as_rotvec())
+def finite_turn(alpha: float, beta: float, gamma: float) -> Array:
+    """About z, the turned x and the twice turned y, as one turn, (3,) rad."""
+    return np.asarray(Rotation.from_euler("ZXY", [alpha, beta, gamma]).as_rotvec())
 
 
 def _only(block: Block, kept: NDArray[np.bool_]) -> Block:

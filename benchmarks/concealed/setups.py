@@ -67,8 +67,13 @@ def table_of_known_speed(rng: np.random.Generator) -> Session:
 
 
 def any_attitude(rng: np.random.Generator, sigmas: float) -> Session:
-    """An effect of the accelerometers; each attitude is told as one finite turn."""
+    """An effect of the accelerometers; any attitudes, each told as one finite turn."""
     session = calm(plain(rng, ("twelve", "wide")))
+    third = rng.uniform(-np.pi, np.pi, len(session.windows)).tolist()
+    windows = tuple(
+        replace(w, gamma=gamma) for w, gamma in zip(session.windows, third, strict=True)
+    )
+    session = replace(session, windows=windows)
     name = str(rng.choice(["cross_coupling", "quadratic", "base_tilt"]))
     values = sized(session, name, drawn(name, rng, session.windows[-1].end), sigmas)
     if values is None:

@@ -76,11 +76,11 @@ class RunningDevice:
             If nothing listens any more.
 
         """
-        if position.degrees is None:
+        if position.all_degrees is None:
             return
-        alpha, beta = position.degrees
+        names = ("alpha_deg", "beta_deg", "gamma_deg")
         try:
-            self.ask(turn={"alpha_deg": alpha, "beta_deg": beta})
+            self.ask(turn=dict(zip(names, position.all_degrees, strict=True)))
         except DeviceError as error:
             raise MoverGone(str(error)) from error
 

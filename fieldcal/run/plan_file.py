@@ -207,11 +207,6 @@ def _check_third_angles(made: Task, name: str) -> None:
     third = [p for p in made.positions if p.gamma]
     if not third:
         return
-    if made.mover["kind"] == "virtual":
-        raise PlanError(
-            f"{name}: {third[0].name}: a virtual device turns about two axes: leave out"
-            " gamma_deg"
-        )
     template = made.mover.get("command", ("{gamma}",))
     if not any("{gamma}" in str(part) for part in template):
         raise PlanError(

@@ -49,13 +49,13 @@ def test_keys_turn_bump_and_quit(
     with SteeringKeys(stream, (22.5, 2.5), program, screen) as keys:
         os.write(person, RIGHT + RIGHT + LEFT + UP + DOWN + DOWN + b"?b")
         keys.serve()
-        np.testing.assert_allclose(np.rad2deg(device.angles), [22.5, -2.5])
+        np.testing.assert_allclose(np.rad2deg(device.angles), [22.5, -2.5, 0])
         assert device.busy_until == 24.0
         assert len(device.body.moves) == 1
         device.take(2500)
         os.write(person, b"h")
         keys.serve()
-        assert device.angles == (0.0, 0.0)
+        assert device.angles == (0.0, 0.0, 0.0)
         keys.serve()
         os.write(person, b"q")
         keys.serve()
@@ -87,7 +87,7 @@ def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:
     assert np.rad2deg(bump.angle(t).x).max() == pytest.approx(2.0)
     carry_out(stream, {"turn": {"alpha_deg": 10.0}})
     carry_out(stream, {"turn": {"beta_deg": 2.0}})
-    np.testing.assert_allclose(np.rad2deg(stream.device.angles), [10, 2])
+    np.testing.assert_allclose(np.rad2deg(stream.device.angles), [10, 2, 0])
 
 
 def test_what_a_reader_left_is_not_for_the_next_one() -> None:

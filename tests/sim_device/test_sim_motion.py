@@ -83,6 +83,17 @@ def test_the_rate_felt_in_a_turn_adds_up_to_the_turn() -> None:
     )
 
 
+def test_a_third_angle_turns_about_the_twice_turned_y() -> None:
+    virtual, gamma = device(), np.deg2rad(70.0)
+    end = virtual.turn(ALPHA, BETA, gamma=gamma)
+    moving = virtual.take(round(end * virtual.rate) + 1)
+    there = Rotation.from_euler("ZXY", [ALPHA, BETA, gamma])
+    got = followed(moving.gyr, 1000.0)
+    assert (got.inv() * there).magnitude() < 1e-7
+    up = there.inv().apply([0.0, -virtual.profile.gravity, 0.0])
+    np.testing.assert_allclose(virtual.take(2).acc[0], up, atol=1e-9)
+
+
 def test_the_rate_felt_while_base_and_joints_move_adds_up_too() -> None:
     virtual = device("sway:amplitude_deg=2,hz=0.7", "base_tilt:about_x_deg=20")
     frame = virtual.body.frame(np.array([0.0, 3.0]))
@@ -225,10 +236,10 @@ def test_a_rate_table_turns_steadily_and_comes_home() -> None:
 
 
 def test_rates_meet_where_segments_of_the_motion_meet() -> None:
-    joints = Joints((0.1, 0.2))
-    joints.spin(1.0, 4.0, (0.3, -0.4), (0.0, 0.0, 0.5))
-    joints.spin(9.0, 4.0, (0.3, -0.4), (0.2, 0.0, 0.5))
-    joints.turn(20.0, 3.0, (0.0, 0.0))
+    joints = Joints((0.1, 0.2, -0.7))
+    joints.spin(1.0, 4.0, (0.3, -0.4, 0.8), (0.0, 0.0, 0.5))
+    joints.spin(9.0, 4.0, (0.3, -0.4, 0.8), (0.2, 0.0, 0.5))
+    joints.turn(20.0, 3.0, (0.0, 0.0, 0.1))
     for seam in (1.0, 5.0, 9.0, 11.0, 13.0, 20.0, 23.0):
         swing = joints.at(np.array([seam - 1e-7, seam]))
         np.testing.assert_allclose(np.diff(swing.rate), 0, atol=1e-6)

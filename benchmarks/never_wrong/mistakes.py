@@ -113,12 +113,16 @@ def gyr_tracked(written: Written, bench: Bench, rng: Rng) -> Written:
 
 
 def restarted(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The device was restarted on a way: its biases were others before.
+    """The device was restarted on a way, which takes 1 s or more: its biases change.
 
     By 0.2 to 10 mg and 5 to 500 deg/h.
     """
     s, way = written.samples, int(rng.integers(1, len(bench.windows)))
-    before = s.t < (bench.windows[way - 1, 1] + bench.windows[way, 0]) / 2
+    start = float(bench.windows[way - 1, 1] + rng.uniform(0.0, bench.way - 1.0))
+    end = rng.uniform(start + 1.0, bench.windows[way, 0])
+    off = s.within(start, end)
+    s = Samples(s.t[~off], s.acc[~off], s.gyr[~off])
+    before = s.t < start
     acc, gyr = s.acc.copy(), s.gyr.copy()
     acc[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2e-3, 0.1]))), 3)
     gyr[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2.4e-5, 2.4e-3]))), 3)

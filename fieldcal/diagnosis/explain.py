@@ -30,6 +30,7 @@ from fieldcal.model.posterior.reported import reported
 from fieldcal.model.posterior.time_constants import elsewhere
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.change_points import change_points
+from fieldcal.model.rows.interruptions import interruptions
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings
@@ -199,6 +200,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     )  # fmt: skip
     dictionary.unfitted = tuple(_factory(dictionary, about, prepared))
     dictionary.tried_at(change_points(rows).tolist())
+    dictionary.expected_within(interruptions(source.block, about))
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
     # what sways is taken out of windows and closures; on the way it shakes

@@ -104,6 +104,14 @@ ALONE = 0.1
 ELSEWHERE = 1e-3
 """Chance that a latitude that somebody wrote down is another one."""
 
+RESTARTED = 0.1
+"""Chance that what begins at an instant begins where samples are missing between two
+positions: a link fails more often than a supply."""
+
+BOTH_RESTART = 20.0
+"""Odds that all axes of a triad do so if those of the other one do, by what is typical;
+and the inverse that some do, or by less."""
+
 UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 

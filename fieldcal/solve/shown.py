@@ -132,9 +132,12 @@ def _in_other_dictionary(
     for cause in {c.key: c for c in wanted.values()}.values():
         pairs = new.get(cause.key, [])
         variants = tuple(one for _, some in pairs for one in some)
-        same = replace(cause, variants=variants)
+        instants = [(at, at) for g in cause.expected for at in g.shape.values()]
+        same = replace(cause, variants=variants).expecting(instants)
         for group, some in pairs:
-            yield group, (same, some[0])
+            off = (g for g in same.expected if g.shape == group.shape)
+            own = next(off, some[0]) if group in cause.expected else some[0]
+            yield group, (same, own)
 
 
 def _variants(d: Dictionary, group: Group) -> list[Group]:

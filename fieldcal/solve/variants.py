@@ -14,6 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.gram import Eliminated, gains
+from fieldcal.model.evidence.sets import chances
 from fieldcal.model.evidence.sizing import DENSITY, Member
 from fieldcal.model.search.selection import Search
 from fieldcal.solve.shown import Shown, has_equation
@@ -90,13 +91,17 @@ def _with_and_without(
 
 
 def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Array:
-    """Evidence of every variant of a cause beside the other members, over all sizes."""
+    """Evidence of every variant of a cause beside the other members, over all sizes.
+
+    Times how likely each is before the rows are seen, where that differs.
+    """
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
     rest = _without_columns(search, members, own.columns)
     inner, pull = rest.rest(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
-    score = np.zeros(len(others))
+    beside = [m for m in members if m[0].key != member[0].key]
+    score = chances(member[0], beside) + np.zeros(len(others))
     width = np.array([len(g.columns) for g in others])
     for k in np.unique(width).tolist():
         some = np.flatnonzero(width == k)
@@ -106,7 +111,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
         gain = gains(square, pull[at] * size, top)
-        score[some] = np.logaddexp.reduce(gain + DENSITY, axis=1)
+        score[some] += np.logaddexp.reduce(gain + DENSITY, axis=1)
     return score
 
 

@@ -57,6 +57,14 @@ def test_a_gauge_as_long_as_the_gyroscopes_are_weak_is_seen(tmp_path: Path) -> N
     assert found.off < 3.0
 
 
+def test_after_a_restart_what_no_position_shows_again_is_uncertain(
+    tmp_path: Path,
+) -> None:
+    """One face is left, whose length alone is known: 0.2 m/s^2 of a bias is unseen."""
+    found = of(tmp_path / "two", 97_103_009, "device restarted")
+    assert not found.go and found.off < WRONG
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "mistake", "was"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -135,6 +135,7 @@ class Cause:
     variants : groups, one for each value of the shape
     kind : of the catalogue, random, noise that every device has, without physics, an
         angle, or asked for
+    expected : variants that are likelier than others, as the device may have been off
 
     """
 
@@ -143,6 +144,7 @@ class Cause:
     chance: float
     variants: tuple[Group, ...]
     kind: Kind = "effect"
+    expected: frozenset[Group] = frozenset()
 
     def at_once(self, other: Group) -> tuple[Group, ...]:
         """Variants that happen when a group does of the same effect on the other triad.
@@ -154,6 +156,23 @@ class Cause:
         apart = [g.apart(other) for g in self.variants]
         least = min(apart)
         return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
+
+    def expecting(self, spans: Sequence[tuple[float, float]]) -> Cause:
+        """The same with what begins within some spans, s, likelier in all its axes.
+
+        It is as large as is typical there: nothing shrinks what the rows do not show.
+        """
+        if not (spans and self.variants and self.variants[0].begins):
+            return self
+        every = max((g.params for g in self.variants), key=len)
+        some = [
+            replace(g, fixed=1.0)
+            for g in self.variants
+            if g.params == every
+            and any(a <= at <= b for at in g.shape.values() for a, b in spans)
+        ]
+        variants = (*self.variants, *some)
+        return replace(self, variants=variants, expected=frozenset(some))
 
     @property
     def usual(self) -> bool:

@@ -306,6 +306,14 @@ class Dictionary(ColumnTable):
             for group in begin.values():
                 cause, _ = self.refined(cause, group, instants)
 
+    def expected_within(self, spans: Sequence[tuple[float, float]]) -> None:
+        """Have effects that begin at an instant be likelier within these, s.
+
+        There they are as large as is typical, and in all axes of a triad.
+        """
+        self.causes = [c.expecting(spans) for c in self.causes]
+        self._changed()
+
     def exchanged(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
         """A cause with other variants, in the place of the one that was."""
         more = replace(cause, variants=variants)

@@ -53,18 +53,29 @@ class Set:
 def chances(cause: Cause, there: Iterable[Member]) -> Array:
     """Of a cause beside others, ln: of each variant, or of all alike ().
 
-    What has an instant happens to both triads at once, or it is another event. A device
-    that nobody calibrated has all that is usual.
+    What has an instant happens to both triads at once, or it is another event; most
+    likely where the device may have been off. A device that nobody calibrated has all
+    that is usual.
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
+    if cause.expected:
+        likely = [g in cause.expected for g in cause.variants]
+        each = np.log(priors.RESTARTED / len(cause.expected))
+        share = np.where(likely, np.maximum(each, share), share)
     if cause.kind != "effect":
         return share
     there = list(there)
-    same = [group for other, group in there if other.name == cause.name]
-    at_once = [g for other in same for g in cause.at_once(other)]
+    same = [m for m in there if m[0].name == cause.name]
+    at_once = [g for _, other in same for g in cause.at_once(other)]
     if at_once:
-        some = [g in at_once for g in cause.variants]
-        return np.where(some, np.log(priors.AGAIN / len(at_once)), share)
+        off = any(g in other.expected for other, g in same)
+        both = cause.expected.intersection(at_once if off else ())
+        others = 1 / priors.BOTH_RESTART if both else priors.AGAIN
+        again = set(at_once) - both
+        for some, odds in ((again, others), (both, priors.BOTH_RESTART)):
+            among = [g in some for g in cause.variants]
+            share = np.where(among, np.log(odds / max(len(some), 1)), share)
+        return share
     if same or (cause.usual and any(other.usual for other, _ in there)):
         share = np.array(np.log(priors.AGAIN / len(cause.variants)))
     return share

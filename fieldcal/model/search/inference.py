@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
+from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.proportion import in_proportion
@@ -28,6 +29,10 @@ PASSES = 8
 STAYED = 1.0
 """Largest step of a column, in standard deviations, after which rows of turns need not
 be linearised again."""
+
+SCATTERED = 4.0
+"""Instability, in that of a typical device, behind which causes may be that nothing but
+each other shows."""
 
 AFAR = 0.05
 """An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
@@ -145,7 +150,11 @@ class Inference(Refinement):
         if (far := self._afar(search)) is not None:
             yield far
         usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
-        if self._turned_otherwise(found, {c.key for c, _ in usual}):
+        keys = {c.key for c, _ in usual}
+        scatter = priors.SIZES[list(found.sizes.instability)]
+        if (scatter.max() > SCATTERED and not keys <= found.keys) or (
+            self._turned_otherwise(found, keys)
+        ):
             yield search.evaluated(usual)
 
     def _turned_otherwise(self, found: Set, usual: set[str]) -> bool:

@@ -175,7 +175,7 @@ class Offers(Sets):
         usual = any(c.usual for c, _ in there.members)
         out, apart = self.dictionary.chances.copy(), dict[int, Array]()
         for i, cause in enumerate(self.dictionary.causes):
-            if cause.name in names or (usual and cause.usual):
+            if cause.name in names or cause.expected or (usual and cause.usual):
                 shares = chances(cause, there.members)
                 out[i] = shares.min()
                 if shares.ndim:

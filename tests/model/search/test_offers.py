@@ -116,6 +116,24 @@ def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     assert chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
 
 
+def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> None:
+    at = sorted({g.shape["at_s"] for g in ACC.variants})[7]
+    acc, gyr = (c.expecting([(at - 1e-3, at + 1e-3)]) for c in (ACC, GYR))
+    ((whole,), (other,)) = acc.expected, gyr.expected
+    assert whole.shape["at_s"] == at and len(whole.params) == 3
+    assert acc.variants == (*ACC.variants, whole) and whole.fixed == 1.0
+    alone, usual = chances(acc, []), np.log(ACC.chance / len(acc.variants))
+    assert alone[-1] == pytest.approx(np.log(priors.RESTARTED))
+    np.testing.assert_allclose(alone[:-1], usual)
+    both = chances(acc, [(gyr, other)])
+    assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART))
+    there = np.array([g.shape["at_s"] == at for g in ACC.variants])
+    assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART)
+    np.testing.assert_allclose(both[:-1][~there], usual)
+    assert DRIFT.expecting([(0.0, 1e3)]) is DRIFT, "it has no instant"
+    assert ACC.expecting([]) is ACC
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -> None:
     rng, x = np.random.default_rng(seed), JUMPS.dictionary.x

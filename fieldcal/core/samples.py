@@ -115,7 +115,7 @@ class Block:
         first, last = np.searchsorted(self.t, [start, end])
         return self[int(first) : int(last)]
 
-    def __getitem__(self, rows: slice) -> Block:
+    def __getitem__(self, rows: slice | Index) -> Block:
         return Block(*(getattr(self, f.name)[rows] for f in fields(Block)))
 
 

@@ -27,6 +27,7 @@ from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.session import description, sample_files
+from fieldcal.session.blank_samples import without_blanks
 from fieldcal.session.clock import SteadyClock, steadied
 from fieldcal.session.description import Description
 from fieldcal.session.installed import as_sent, in_one_calibration, stretches
@@ -131,6 +132,12 @@ class Session:
         in the disturbances that windows were taken around.
         """
         raw, cut = sample_files.read(sample_files.find(self.folder))
+        raw, blank = without_blanks(raw)
+        if blank:
+            cut += (
+                f"{blank} samples are zero in all outputs, which no device on the"
+                " ground puts out: they count as lost",
+            )
         self.warnings += cut
         steps = np.diff(raw.t)
         if len(steps) and (said := too_quick(1 / max(float(np.median(steps)), 1e-300))):
@@ -158,7 +165,8 @@ class Session:
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
-        for raw in sample_files.blocks(sample_files.find(self.folder)):
+        for whole in sample_files.blocks(sample_files.find(self.folder)):
+            raw, _ = without_blanks(whole)
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
             yield clock.add(_left_out(part, self.about.without))
         yield clock.rest()

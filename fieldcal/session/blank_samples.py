@@ -10,21 +10,22 @@ import numpy as np
 
 from fieldcal.core.samples import Block
 
-MOST = 0.5
-"""Part of the samples from which on zeros are all that the device puts out."""
+FEWEST, MOST = 2, 0.5
+"""Rows of zeros, and the part of the samples from which on they are all that the device
+puts out: one alone may be where a counter or a test begins, and does no harm."""
 
 
 def without_blanks(block: Block) -> tuple[Block, int]:
     """The samples that came, and how many rows of zeros there were beside.
 
-    >>> b = Block.of(np.arange(3.0), np.diag([9.8, 9.8, 0.0]), np.zeros((3, 3)))
-    >>> kept, count = without_blanks(b)
+    >>> force = np.repeat([[9.8], [0.0], [9.8]], [2, 2, 3], axis=0) * [0, 1, 0]
+    >>> kept, count = without_blanks(Block.of(np.arange(7.0), force, 0 * force))
     >>> kept.t.tolist(), count
-    ([0.0, 1.0], 1)
+    ([0.0, 1.0, 4.0, 5.0, 6.0], 2)
     """
     turns = np.nan_to_num(block.gyr)  # there may be no gyroscopes
     blank = (block.acc == 0).all(axis=1) & (turns == 0).all(axis=1)
     count = int(blank.sum())
-    if not 0 < count < MOST * len(block):
+    if not FEWEST <= count < MOST * len(block):
         return block, 0
     return block[np.flatnonzero(~blank)], count

@@ -126,6 +126,8 @@ def restarted(written: Written, bench: Bench, rng: Rng) -> Written:
     acc, gyr = s.acc.copy(), s.gyr.copy()
     acc[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2e-3, 0.1]))), 3)
     gyr[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2.4e-5, 2.4e-3]))), 3)
+    if bench.grain:  # which is one of its outputs, whatever their bias
+        acc = np.round(acc / bench.grain) * bench.grain
     return replace(written, samples=Samples(s.t, acc, gyr))
 
 

@@ -144,8 +144,8 @@ def _call(words: list[str], command: str) -> None:
         said = [
             line for line in (done.stdout + done.stderr).splitlines() if line.strip()
         ]
-        last = "".join(f"\n  {shown(line)}" for line in said[-SAID:])
+        last = " | ".join(shown(line.strip()) for line in said[-SAID:])
         raise InputError(
-            f"{command}: failed with exit code {done.returncode}; it said"
-            f"{last or ' nothing'}"
+            f"{command}: failed with exit code {done.returncode}; it said:"
+            f" {last or 'nothing'}"
         )

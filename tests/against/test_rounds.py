@@ -67,7 +67,7 @@ def unread(path: Path) -> tuple[Match, list[str]]:
 @pytest.mark.parametrize(
     ("code", "told"),
     [
-        ("import sys; sys.exit('no licence')", "exit code 1; it said\n  no licence"),
+        ("import sys; sys.exit('no licence')", "exit code 1; it said: no licence"),
         ("pass", "wrote nothing to {out}"),
         ("import sys; open(sys.argv[2], 'w').write('a,b\\n')", "out"),
     ],

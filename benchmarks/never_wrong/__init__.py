@@ -73,7 +73,9 @@ GROUPED = {
         "samples lost, time counted", "lost samples as zeros", "lost samples repeated",
         "wrong bits", "resampled", "rates with few digits", "coarse times",
     ),
-    "a restart between positions": ("device restarted",),
+    "a restart, or a gap alone, between positions": (
+        "device restarted", "a gap between positions",
+    ),
     "a mean or a bias taken out": (
         "mean of acc removed", "mean of acc removed, rounded", "bias of gyr tracked",
     ),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.never_wrong.bench import Bench, Floats, Samples
-from benchmarks.never_wrong.written import After, Rng, Written
+from benchmarks.never_wrong.written import After, Rng, Written, interrupted
 
 
 def samples_lost(written: Written, bench: Bench, rng: Rng) -> Written:
@@ -17,6 +17,12 @@ def samples_lost(written: Written, bench: Bench, rng: Rng) -> Written:
     lost = s.within(middle, middle + np.exp(rng.uniform(np.log(0.05), 0.0)))
     t = s.t[: np.count_nonzero(~lost)]
     return replace(written, samples=Samples(t, s.acc[~lost], s.gyr[~lost]))
+
+
+def link_failed(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Nothing comes for 1 s or more on a way; the device goes on as before."""
+    samples, _ = interrupted(written.samples, bench, rng)
+    return replace(written, samples=samples)
 
 
 def _bursts(written: Written, rng: Rng) -> list[slice]:
@@ -85,6 +91,7 @@ def coarse_time(written: Written, bench: Bench, rng: Rng) -> Written:
 
 OF_FILE: dict[str, After] = {
     "samples lost, time counted": samples_lost,
+    "a gap between positions": link_failed,
     "lost samples as zeros": zeros,
     "lost samples repeated": held,
     "wrong bits": spikes,

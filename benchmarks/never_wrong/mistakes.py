@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded
 from benchmarks.never_wrong.file_mistakes import OF_FILE
 from benchmarks.never_wrong.said_mistakes import SAID
-from benchmarks.never_wrong.written import After, Rng, Written, tables
+from benchmarks.never_wrong.written import After, Rng, Written, interrupted, tables
 
 # -- of units, wiring and order
 
@@ -117,11 +117,7 @@ def restarted(written: Written, bench: Bench, rng: Rng) -> Written:
 
     By 0.2 to 10 mg and 5 to 500 deg/h.
     """
-    s, way = written.samples, int(rng.integers(1, len(bench.windows)))
-    start = float(bench.windows[way - 1, 1] + rng.uniform(0.0, bench.way - 1.0))
-    end = rng.uniform(start + 1.0, bench.windows[way, 0])
-    off = s.within(start, end)
-    s = Samples(s.t[~off], s.acc[~off], s.gyr[~off])
+    s, start = interrupted(written.samples, bench, rng)
     before = s.t < start
     acc, gyr = s.acc.copy(), s.gyr.copy()
     acc[before] += rng.normal(0, np.exp(rng.uniform(*np.log([2e-3, 0.1]))), 3)

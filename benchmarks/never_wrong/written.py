@@ -26,6 +26,14 @@ After = Callable[[Written, Bench, Rng], Written]
 """A mistake that is made once something was recorded."""
 
 
+def interrupted(s: Samples, bench: Bench, rng: Rng) -> tuple[Samples, float]:
+    """Samples of which those of 1 s or more on a way are missing, and since when, s."""
+    way = int(rng.integers(1, len(bench.windows)))
+    start = float(bench.windows[way - 1, 1] + rng.uniform(0.0, bench.way - 1.0))
+    off = s.within(start, rng.uniform(start + 1.0, bench.windows[way, 0]))
+    return Samples(s.t[~off], s.acc[~off], s.gyr[~off]), start
+
+
 def tables(bench: Bench) -> dict[str, Any]:
     """What an honest session.toml says of a bench."""
     site: dict[str, Any] = {"latitude_deg": bench.latitude, "height_m": bench.height}

@@ -13,6 +13,7 @@ against the size of all that was unexplained before, no cause would explain anyt
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +21,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import Cause
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed
 from fieldcal.model.evidence.sizing import Member, Sizes, Sizing, alike
@@ -59,26 +60,27 @@ def chances(cause: Cause, there: Iterable[Member]) -> Array:
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
     if cause.expected:
-        likely = [g in cause.expected for g in cause.variants]
-        each = np.log(priors.RESTARTED / len(cause.expected))
-        share = np.where(likely, np.maximum(each, share), share)
+        share = _shared(cause, share, cause.expected, priors.RESTARTED)
     if cause.kind != "effect":
         return share
     there = list(there)
     same = [m for m in there if m[0].name == cause.name]
-    at_once = [g for _, other in same for g in cause.at_once(other)]
+    at_once = {g for _, other in same for g in cause.at_once(other)}
     if at_once:
         off = any(g in other.expected for other, g in same)
-        both = cause.expected.intersection(at_once if off else ())
-        others = 1 / priors.BOTH_RESTART if both else priors.AGAIN
-        again = set(at_once) - both
-        for some, odds in ((again, others), (both, priors.BOTH_RESTART)):
-            among = [g in some for g in cause.variants]
-            share = np.where(among, np.log(odds / max(len(some), 1)), share)
-        return share
+        both = cause.expected & at_once if off else frozenset[Group]()
+        odds = 1 / priors.BOTH_RESTART if both else priors.AGAIN
+        share = _shared(cause, share, at_once - both, odds)
+        return _shared(cause, share, both, priors.BOTH_RESTART)
     if same or (cause.usual and any(other.usual for other, _ in there)):
         share = np.array(np.log(priors.AGAIN / len(cause.variants)))
     return share
+
+
+def _shared(cause: Cause, share: Array, some: AbstractSet[Group], odds: float) -> Array:
+    """What each variant has, ln, if some share other odds among them."""
+    among = [g in some for g in cause.variants]
+    return np.where(among, np.log(odds / max(len(some), 1)), share)
 
 
 class Sets:

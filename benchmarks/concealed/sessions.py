@@ -125,8 +125,10 @@ class Session:
             turned = np.rad2deg(finite_turn(w.alpha, w.beta, w.gamma))
             table["rotation_vector_deg"] = turned.tolist()
         elif self.angles:
-            alpha, beta = np.rad2deg([w.alpha, w.beta])
-            table |= {"alpha_deg": float(alpha), "beta_deg": float(beta)}
+            alpha, beta, gamma = np.rad2deg([w.alpha, w.beta, w.gamma]).tolist()
+            table |= {"alpha_deg": alpha, "beta_deg": beta}
+            if gamma:
+                table["gamma_deg"] = gamma
         if any(w.rate):
             table["rate_deg_s"] = [float(r) for r in np.rad2deg(w.rate)]
         return table

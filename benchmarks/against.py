@@ -12,7 +12,8 @@ something is said that is not so, and how the recording is predicted before and 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,12 +103,11 @@ def judged(relation: str, name: str, found: Match, seconds: float) -> Outcome:
     )
 
 
-def outcomes(count: int, first: int) -> list[Outcome]:
+def outcomes(count: int, first: int) -> Iterator[Outcome]:
     """Draw pairs, compare, and judge; what is not right is printed at once."""
-    out: list[Outcome] = []
-    every, number = drawn(), 0
-    while len(out) < count:
-        (name, draw), relation = every[number % len(every)], RELATIONS[len(out) % 4]
+    every, number, done = drawn(), 0, 0
+    while done < count:
+        (name, draw), relation = every[number % len(every)], RELATIONS[done % 4]
         seed, number = first + number, number + 1
         session = draw(np.random.default_rng(seed))
         both = pair(session, relation) if set(session.concealed) == {name} else None
@@ -117,12 +117,12 @@ def outcomes(count: int, first: int) -> list[Outcome]:
         start = time.process_time()
         found = compare(real, sim)
         one = judged(relation, name, found, time.process_time() - start)
-        out.append(one)
+        done += 1
         heard = one.named or one.aliased
         if one.false or not heard or relation != "equal" and not one.directed:
             told = [(d.id, d.direction, d.aliases) for d in found.differences]
             print(f"{relation} {name} (seed {seed}): {told}", flush=True)
-    return out
+        yield one
 
 
 def printed(found: Sequence[Outcome]) -> None:
@@ -153,5 +153,8 @@ def printed(found: Sequence[Outcome]) -> None:
 
 
 def main() -> None:
-    """Print the table."""
-    printed(outcomes(how_many(USUAL), int(option("seed", str(SEED)))))
+    """Print the table, of those that are done if it is interrupted (ctrl-c)."""
+    found: list[Outcome] = []
+    with suppress(KeyboardInterrupt):
+        found.extend(outcomes(how_many(USUAL), int(option("seed", str(SEED)))))
+    printed(found)

@@ -25,7 +25,10 @@ K^2 / (2 pi f)^2. Units: s, and those of the process.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 
@@ -68,11 +71,17 @@ def _of_a_mean(m: int, a: float) -> float:
     return float((1 + 2 * g) / m)
 
 
+@lru_cache(maxsize=4)
+def _turns(n: int) -> tuple[NDArray[np.complexfloating], Array]:
+    """exp(iw) of (6), and (-1)^k: a table of many times asks for the same."""
+    k = np.arange(1, n)
+    return np.exp(1j * np.pi * k / n), np.where(k % 2, -1.0, 1.0)
+
+
 def _further(n: int, x: float) -> Array:
     """(A_k - 1) / b of (6) for b = exp(-x)."""
-    k = np.arange(1, n)
-    turn = np.exp(1j * np.pi * k / n)
-    last = np.exp(-x * (n - 1)) * np.where(k % 2, -1.0, 1.0)
+    turn, sign = _turns(n)
+    last = np.exp(-x * (n - 1)) * sign
     rest = 1 - np.exp(-x) * turn
     g = turn / rest - turn * (1 - np.exp(-x) * last) / (n * rest**2)
     h = (turn - last) / rest

@@ -72,7 +72,8 @@ def calmed(rows: Array, dt: float, noisy: int) -> list[Calm]:
         return [Calm(rows, False, 0)]
     some = rows[: cells * size, :noisy].reshape(cells, size, noisy)
     means = np.einsum("nsc->nc", some) / size
-    squares = np.einsum("nsc,nsc->nc", some - means[:, None], some - means[:, None])
+    off = some - means[:, None]
+    squares = np.einsum("nsc,nsc->nc", off, off)
     bends = np.zeros_like(means)
     bends[1:-1] = np.diff(means, 2, axis=0)
     scale = _scale(bends)

@@ -121,10 +121,12 @@ class Reducer:
 
     def _filled(self, rows: Array) -> Array:
         """Samples with missing values as the last one known; 0 where none is."""
-        missing = ~np.isfinite(rows)
-        self._known |= ~missing[:, :CHANNELS].all(axis=0)
-        for c in np.flatnonzero(missing.any(axis=0)):
-            good = np.flatnonzero(~missing[:, c])
+        # by column: along rows of seven, what is asked costs more than the answer
+        missing = np.ascontiguousarray(~np.isfinite(rows).T)
+        found = np.logical_not(missing.all(axis=1))
+        self._known |= found[:CHANNELS]
+        for c in np.flatnonzero(missing.any(axis=1)):
+            good = np.flatnonzero(~missing[c])
             if not len(good):
                 rows[:, c] = np.nan_to_num(self._value[c])
                 continue
@@ -132,7 +134,6 @@ class Reducer:
                 self._value[c] = rows[good[0], c]
             place = np.searchsorted(good, np.arange(len(rows)), side="right") - 1
             rows[:, c] = np.where(place < 0, self._value[c], rows[good[place], c])
-        found = ~missing.all(axis=0)
         self._value[found] = rows[-1, found]
         return rows
 

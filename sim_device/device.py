@@ -98,7 +98,7 @@ class VirtualDevice:
     def spin(
         self,
         rate: tuple[float, float, float],
-        angles: tuple[float, float] | Angles | None = None,
+        angles: Angles | None = None,
         seconds: float | None = None,
         at: float | None = None,
     ) -> float:
@@ -112,8 +112,7 @@ class VirtualDevice:
             As for `turn`.
 
         """
-        alpha, beta, *third = self.angles if angles is None else angles
-        where = (alpha, beta, *(third or (0.0,)))
+        where = self.angles if angles is None else angles
         _, end = self.body.spin(self._start(at), self._duration(seconds), where, rate)
         return end * self.sensing.pace
 

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import chances
-from fieldcal.model.evidence.sizing import DENSITY, Member
+from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member
 from fieldcal.model.search.selection import Search
 from fieldcal.solve.shown import Shown, has_equation
 
@@ -111,7 +111,9 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
         gain = gains(square, pull[at] * size, top)
-        score[some] += np.logaddexp.reduce(gain + DENSITY, axis=1)
+        known = np.array([others[j].fixed is not None for j in some])
+        summed = np.logaddexp.reduce(gain + DENSITY, axis=1)
+        score[some] += np.where(known, gain[:, EVEN], summed)
     return score
 
 

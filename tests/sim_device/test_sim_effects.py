@@ -86,7 +86,9 @@ def test_every_effect_shows_somewhere(id_: str) -> None:
     profile = plain.having(effect(id_, example.given))
     count = 1_000 if example.in_motion else 12_000  # the way is over soon
     with_, without = (
-        (lambda d: (d.spin(RATE, (A, A), 1.0), d.take(count))[1])(VirtualDevice(p, 4))
+        (lambda d: (d.spin(RATE, (A, A, 0.0), 1.0), d.take(count))[1])(
+            VirtualDevice(p, 4)
+        )
         for p in (profile, plain)
     )
     if len(with_) == len(without):

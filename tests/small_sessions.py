@@ -67,7 +67,8 @@ def rows_of(x: Experience, y: Array) -> Rows:
     """Rows with white noise as usual."""
     sd = np.tile(SD, (len(x), 1))
     span = np.column_stack([x.t, x.t])
-    return Rows(x, y, sd, np.zeros_like(sd), np.full(len(x), 1.0), SD, span)
+    still = np.zeros(len(x))
+    return Rows(x, y, sd, np.zeros_like(sd), np.full(len(x), 1.0), SD, span, still)
 
 
 @dataclass(frozen=True)

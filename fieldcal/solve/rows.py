@@ -59,7 +59,7 @@ def of_means(observations: Observations) -> Recorded:
     common[x.earth_unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
     span = np.column_stack([x.t, x.t])
-    rows = Rows(x, y, sd, common, np.ones(n), level, span)
+    rows = Rows(x, y, sd, common, np.ones(n), level, span, np.zeros(n))
     return Recorded(rows, np.full((1, n), np.inf))
 
 

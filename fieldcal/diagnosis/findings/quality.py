@@ -91,8 +91,8 @@ def raw(block: Block, explanation: Explanation) -> Fitted:
         usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
     # a device that was touched is not held by hand for that: rows of the same kind
-    one_each = len(prepared.rows.x) == len(explanation.dictionary.held)
-    rows = (rows_of if one_each else reduce)(source)
+    in_hand = prepared.rows.wander.any()
+    rows = rows_of(source) if in_hand else reduce(source)
     return base_of(inference_of(source, rows, prepared), rows)
 
 

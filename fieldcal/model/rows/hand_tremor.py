@@ -21,6 +21,11 @@ the angle that it has reached at the end of a rest changes the closure of a turn
 hand also accelerates the device. Along gravity the integral of this is a speed that
 returns to zero as the angle does, so (1) and (2) hold with the speed for the mean force
 along gravity.
+
+Somebody may hold the device in some windows only, and lean it against something or put
+it down in the others. The noise of the sensors is the same in all of them: over a
+second, (2) without a hand varies by a few tenths, and a hand makes it some ten times as
+large.
 """
 
 from __future__ import annotations
@@ -30,12 +35,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.samples import GYR, Array
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.noise import grain_of
-from fieldcal.model.rows.reduce import Rows, RowSource, averaged, reduce
+from fieldcal.model.rows.reduce import Rows, RowSource, reduce
 from fieldcal.windows.noise import quickest, to_and_fro
 
 WANDERS = 6.0
@@ -47,57 +51,91 @@ FEWEST = 4
 MORE = 1.5
 """And by how much more than along the force."""
 
+STILL = 3.0
+"""Times what windows show in general that one shows in which the device lies still: in
+published recordings 1.7 at most on a table, 4 to 60 in a hand."""
+
 
 def rows_of(source: RowSource) -> Rows:
-    """Rows of a recording, one for each window of a device held by hand."""
+    """Rows of a recording, one for each window in which the device is held by hand."""
     rows = reduce(source)
     held = np.unique(rows.x.position)
     bound = spans(source.block, source.about)[held]
-    angle, noise = wander(rows), _beside_tremor(source, rows, bound)
-    if not angle and noise is None:
+    block = masked(source.block, source.usable)
+    pieces = [block.six[a:b] for a, b in bound]
+    angle, noise = wander(rows), _beside_tremor(rows, pieces, grain_of(block, bound))
+    if angle or noise is not None:
+        return _unsteady(source, reduce(source, held.tolist(), noise), held, angle)
+    some = _tremble(rows, pieces, source.rate)
+    if not some.any():
         return rows
-    samples = rows.length[:, None] * rate_of(source.block)
-    level = [
-        np.nanmedian((rows.sd * np.sqrt(samples))[rows.x.position == p], axis=0)
-        for p in held
-    ]
-    if noise is not None:
-        level, rows = [noise] * len(held), replace(rows, noise=noise)
-    shaken = [rows.x.variance[rows.x.position == p].mean(axis=0) for p in held]
-    one = averaged(source, bound, held, np.array(level), rows.noise, np.array(shaken))
+    still = rows.without(np.isin(rows.x.position, held[some]))
+    level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
+    one = reduce(source, held[some].tolist(), np.nanmedian(level, axis=0))
+    return _unsteady(source, replace(one, noise=rows.noise), held[some], 0.0)
+
+
+def _unsteady(
+    source: RowSource, rows: Rows, held: NDArray[np.intp], angle: float
+) -> Rows:
+    """Rows with what a hand adds to the means of some positions.
+
+    `angle` is by how much it turns the force at least, rad.
+    """
     block = masked(source.block, source.usable)
     unit = np.abs(source.about.nominal["acc_scale"])
-    turned, pushed = np.zeros((len(held), 3)), np.zeros(len(held))
-    for i, (a, b) in enumerate(bound):
-        white, lasts = one.sd[i], float(one.length[i])
+    at = np.flatnonzero(np.isin(rows.x.position, held))
+    turned, pushed = np.zeros((len(at), 3)), np.zeros(len(at))
+    bound = spans(source.block, source.about)[rows.x.position[at]]
+    for i, (row, (a, b)) in enumerate(zip(at, bound, strict=True)):
+        white, lasts = rows.sd[row], float(rows.length[row])
         turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
-        up = one.x.f[i] / np.linalg.norm(one.x.f[i])
+        up = rows.x.f[row] / np.linalg.norm(rows.x.f[row])
         along = (block.acc[a:b] / unit) @ up
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
         pushed[i] = _tremor_rms(along[:, None], lasts, spread)[0]
-    slow = np.sqrt(2 * (angle**2 + turned**2)) / one.length[:, None]  # (1)
-    one.sd[:, 3:] = np.hypot(one.sd[:, 3:], slow)
-    fast = np.sqrt(2.0) * pushed / one.length  # (1)
-    one.sd[:, :3] = np.hypot(one.sd[:, :3], fast[:, None] * unit)
-    first = np.searchsorted(rows.x.position, held)
-    most = max(angle, float(np.sqrt((turned**2).mean())))
-    force = most * source.about.gravity * unit
-    return replace(one, common=rows.common[first], wander=float(force.mean()))
+    sd, wanders = rows.sd.copy(), np.zeros(len(rows.x))
+    length = rows.length[at, None]
+    slow = np.sqrt(2 * (angle**2 + turned**2)) / length  # (1)
+    sd[at, 3:] = np.hypot(sd[at, 3:], slow)
+    fast = np.sqrt(2.0) * pushed[:, None] / length * unit  # (1)
+    sd[at, :3] = np.hypot(sd[at, :3], fast)
+    most = np.maximum(angle, np.sqrt((turned**2).mean(axis=1)))
+    wanders[at] = most * source.about.gravity * float(unit.mean())
+    return replace(rows, sd=sd, wander=wanders)
 
 
-def _beside_tremor(
-    source: RowSource, rows: Rows, bound: NDArray[np.intp]
-) -> Array | None:
-    """Noise of one sample beside a tremor, (6,); None where nothing trembles."""
-    block = masked(source.block, source.usable)
-    free = ~rows.x.oriented.any() and len(bound) >= FEWEST
-    if not free or not to_and_fro([block.gyr[a:b] for a, b in bound]):
+def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
+    """Windows in which a hand moves what lies still in the others, (k,).
+
+    `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
+    """
+    if rows.x.oriented.any() or len(pieces) < FEWEST:
+        return np.zeros(len(pieces), dtype=bool)
+    shown = np.array([_unrest(piece[:, GYR], rate) for piece in pieces])
+    apart: NDArray[np.bool_] = (shown / np.median(shown, axis=0)).mean(axis=1) > STILL
+    return apart
+
+
+def _unrest(rates: Array, rate: float) -> Array:
+    """Variance (2) over a second in that of the quickest noise alone, (3,)."""
+    many = min(len(rates), max(round(rate), 8))
+    parts = np.array_split(rates, len(rates) // many)
+    nothing, noise = np.zeros(3), quickest([rates]) ** 2 / rate * (many / rate) / 15
+    turned = [_tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
+    unrest: Array = np.mean(turned, axis=0) / noise
+    return unrest
+
+
+def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
+    """Noise of one sample beside a tremor, (6,); None where nothing trembles.
+
+    `pieces` are the (n_i, 6) samples of windows, `least` (6,) that of rounding.
+    """
+    free = ~rows.x.oriented.any() and len(pieces) >= FEWEST
+    if not free or not to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
-    least = grain_of(block, bound)
-    both = [
-        quickest([triad[a:b] for a, b in bound]) for triad in (block.acc, block.gyr)
-    ]
-    beside: Array = np.maximum(np.concatenate(both), least)
+    beside: Array = np.maximum(quickest(pieces), least)
     return beside
 
 

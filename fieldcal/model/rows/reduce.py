@@ -7,6 +7,7 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
@@ -46,8 +47,9 @@ class Rows:
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
+    wander : (n,) rms of what a hand adds to the force across it within the window of
+        each, m/s^2
     alike : (6,) standard deviation of an error that all windows share
-    wander : rms of what a hand adds to the force across it within windows, m/s^2
 
     """
 
@@ -58,8 +60,8 @@ class Rows:
     length: Array
     noise: Array
     span: Array
+    wander: Array
     alike: Array = field(default_factory=lambda: np.zeros(6))
-    wander: float = 0.0
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -118,8 +120,19 @@ class RowSource:
         return rate_of(self.block)
 
 
-def reduce(source: RowSource) -> Rows:
-    """Cut the windows into blocks and average them."""
+def reduce(
+    source: RowSource, whole: Container[int] = (), level: Array | None = None
+) -> Rows:
+    """Cut the windows into blocks and average them.
+
+    Parameters
+    ----------
+    source : what is cut
+    whole : positions whose window is one row, as it was held by hand
+    level : (6,) standard deviation of one sample, and in those windows; if not given,
+        what they show
+
+    """
     block, rate = masked(source.block, source.usable), source.rate
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
@@ -127,11 +140,16 @@ def reduce(source: RowSource) -> Rows:
     noise, levels = shaken.noise, shaken.levels
     if source.white is not None:
         noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)
+    if level is not None:
+        noise, levels = level, levels.copy()
+        levels[[p in whole for p in held]] = level
     source = replace(source, block=shaken.block)
     without = source.about.without
     bounds = [
-        block_bounds(block.t, (a, b), rate, len(held), without)
-        for a, b in windows[held].tolist()
+        np.array([(a, b)], dtype=np.intp)
+        if p in whole
+        else block_bounds(block.t, (a, b), rate, len(held), without)
+        for p, (a, b) in zip(held, windows[held].tolist(), strict=True)
     ]
     rows = [len(b) for b in bounds]
     out = averaged(
@@ -185,7 +203,8 @@ def averaged(
     sd[~x.force_known, :3] = np.nan
     scale = source.about.nominal["gyr_scale"]
     _without_round(x, y[:, 3:], sd[:, 3:], length, scale)
-    return Rows(x, y, sd, np.zeros_like(sd), length, noise, span)
+    still = np.zeros(len(y))
+    return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
 
 
 def _experience(

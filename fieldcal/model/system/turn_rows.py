@@ -88,6 +88,7 @@ class Turns:
     def __init__(self, turning: Turning, dictionary: Dictionary, way: bool) -> None:
         self.turning, self.dictionary = turning, dictionary
         self.rows = turning.rows
+        self.wander = dict(zip(self.rows.x.position, self.rows.wander, strict=True))
         self.way = way and not dictionary.free.any()
 
     def linearised(
@@ -140,7 +141,7 @@ class Turns:
         ends: Array = np.zeros((3, 3))
         for p, bent in loose.items():
             close = close - bent @ self.means[p][:, index]
-            ends += (bent * (self.spread[p] + self.rows.wander**2)) @ bent.T
+            ends += (bent * (self.spread[p] + self.wander[p] ** 2)) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))

@@ -36,7 +36,7 @@ def test_rows_are_means_over_a_second_with_their_noise() -> None:
     np.testing.assert_allclose(rows.noise, white, rtol=0.1)
     np.testing.assert_allclose(rows.sd, np.tile(rows.noise / 50**0.5, (20, 1)))
     np.testing.assert_allclose(rows.x.variance, np.tile(rows.noise[:3] ** 2, (20, 1)))
-    assert (rows.common < 1e-6).all() and rows.wander == 0.0
+    assert (rows.common < 1e-6).all() and not rows.wander.any()
     assert rows.used.all() and not rows.x.base_rate.any()
     np.testing.assert_allclose(rows.x.warming, 0.01 * (rows.x.t - 2.0), atol=1e-6)
     np.testing.assert_allclose(rows.x.heating, 0.01, rtol=1e-3)

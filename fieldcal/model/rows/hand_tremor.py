@@ -7,7 +7,9 @@ row, since the norm of the mean force changes only to second order in the angle.
 mean rate over T s is the difference of the angles at both ends over T. If the angle
 varies by a (rms), the error of the mean rate is
 
-    sqrt(2) a / T                                                                  (1)
+    sqrt(k) a / T                                                                  (1)
+
+with k of `hand_drift`: 2 if the hand does not turn slowly as well.
 
 The accelerometers show the slow part of the tremor, in all windows together. The
 gyroscopes show in which windows and about which axes the tremor is larger: the
@@ -19,8 +21,8 @@ with N the density of the white noise, whose integral is a random walk. Tremor i
 and not noise of the sensors: the gyroscopes follow it from one rest to the next, and
 the angle that it has reached at the end of a rest changes the closure of a turn. The
 hand also accelerates the device. Along gravity the integral of this is a speed that
-returns to zero as the angle does, so (1) and (2) hold with the speed for the mean force
-along gravity.
+returns to zero as the angle does, so (1), with k of 2, and (2) hold with the speed for
+the mean force along gravity.
 
 Somebody may hold the device in some windows only, and lean it against something or put
 it down in the others. The noise of the sensors is the same in all of them: over a
@@ -38,6 +40,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import GYR, Array
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.hand_drift import TREMBLES, drift, turning
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce
 from fieldcal.windows.noise import quickest, to_and_fro
@@ -51,9 +54,12 @@ FEWEST = 4
 MORE = 1.5
 """And by how much more than along the force."""
 
+QUIET = 0.25
+"""Share of the windows that show no more than the sensors' own noise."""
+
 STILL = 3.0
-"""Times what windows show in general that one shows in which the device lies still: in
-published recordings 1.7 at most on a table, 4 to 60 in a hand."""
+"""Times that noise which one shows in which the device lies still: in published
+recordings 2 at most on a table, 4 to 60 in a hand."""
 
 
 def rows_of(source: RowSource) -> Rows:
@@ -65,44 +71,42 @@ def rows_of(source: RowSource) -> Rows:
     pieces = [block.six[a:b] for a, b in bound]
     angle, noise = wander(rows), _beside_tremor(rows, pieces, grain_of(block, bound))
     if angle or noise is not None:
-        return _unsteady(source, reduce(source, held.tolist(), noise), held, angle)
+        return _unsteady(source, reduce(source, whole=True, level=noise), angle)
     some = _tremble(rows, pieces, source.rate)
     if not some.any():
         return rows
     still = rows.without(np.isin(rows.x.position, held[some]))
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
-    one = reduce(source, held[some].tolist(), np.nanmedian(level, axis=0))
-    return _unsteady(source, replace(one, noise=rows.noise), held[some], 0.0)
+    one = reduce(source, whole=True, level=np.nanmedian(level, axis=0))
+    return _unsteady(source, replace(one, noise=rows.noise), 0.0)
 
 
-def _unsteady(
-    source: RowSource, rows: Rows, held: NDArray[np.intp], angle: float
-) -> Rows:
-    """Rows with what a hand adds to the means of some positions.
+def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
+    """Rows of whole windows with what a hand adds to their means.
 
     `angle` is by how much it turns the force at least, rad.
     """
     block = masked(source.block, source.usable)
     unit = np.abs(source.about.nominal["acc_scale"])
-    at = np.flatnonzero(np.isin(rows.x.position, held))
-    turned, pushed = np.zeros((len(at), 3)), np.zeros(len(at))
-    bound = spans(source.block, source.about)[rows.x.position[at]]
-    for i, (row, (a, b)) in enumerate(zip(at, bound, strict=True)):
-        white, lasts = rows.sd[row], float(rows.length[row])
+    turned, pushed, turns = np.zeros((len(rows.x), 3)), np.zeros(len(rows.x)), []
+    bound = spans(source.block, source.about)[rows.x.position]
+    for i, (a, b) in enumerate(bound):
+        white, lasts = rows.sd[i], float(rows.length[i])
         turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
-        up = rows.x.f[row] / np.linalg.norm(rows.x.f[row])
-        along = (block.acc[a:b] / unit) @ up
+        up = rows.x.f[i] / np.linalg.norm(rows.x.f[i])
+        force = block.acc[a:b] / unit
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
-        pushed[i] = _tremor_rms(along[:, None], lasts, spread)[0]
-    sd, wanders = rows.sd.copy(), np.zeros(len(rows.x))
-    length = rows.length[at, None]
-    slow = np.sqrt(2 * (angle**2 + turned**2)) / length  # (1)
-    sd[at, 3:] = np.hypot(sd[at, 3:], slow)
-    fast = np.sqrt(2.0) * pushed[:, None] / length * unit  # (1)
-    sd[at, :3] = np.hypot(sd[at, :3], fast)
-    most = np.maximum(angle, np.sqrt((turned**2).mean(axis=1)))
-    wanders[at] = most * source.about.gravity * float(unit.mean())
-    return replace(rows, sd=sd, wander=wanders)
+        pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]
+        turns.append(turning(force, lasts))
+    sd, length = rows.sd.copy(), rows.length[:, None]
+    k = drift(turns, ((turned / length) ** 2).mean(axis=1))
+    slow = np.sqrt(TREMBLES * angle**2 + k * turned**2) / length  # (1)
+    sd[:, 3:] = np.hypot(sd[:, 3:], slow)
+    fast = np.sqrt(TREMBLES) * pushed[:, None] / length * unit  # (1)
+    sd[:, :3] = np.hypot(sd[:, :3], fast)
+    # between its angle at the end of a rest and the mean there
+    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * (turned**2).mean(axis=1)))
+    return replace(rows, sd=sd, wander=most * source.about.gravity * float(unit.mean()))
 
 
 def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
@@ -113,7 +117,8 @@ def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
     if rows.x.oriented.any() or len(pieces) < FEWEST:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_unrest(piece[:, GYR], rate) for piece in pieces])
-    apart: NDArray[np.bool_] = (shown / np.median(shown, axis=0)).mean(axis=1) > STILL
+    sensors = np.quantile(shown, QUIET, axis=0)
+    apart: NDArray[np.bool_] = (shown / sensors).mean(axis=1) > STILL
     return apart
 
 

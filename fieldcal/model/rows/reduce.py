@@ -7,7 +7,6 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 
 from __future__ import annotations
 
-from collections.abc import Container
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
@@ -121,16 +120,15 @@ class RowSource:
 
 
 def reduce(
-    source: RowSource, whole: Container[int] = (), level: Array | None = None
+    source: RowSource, whole: bool = False, level: Array | None = None
 ) -> Rows:
     """Cut the windows into blocks and average them.
 
     Parameters
     ----------
     source : what is cut
-    whole : positions whose window is one row, as it was held by hand
-    level : (6,) standard deviation of one sample, and in those windows; if not given,
-        what they show
+    whole : whether each window is one row, as a hand held the device
+    level : (6,) standard deviation of one sample; if not given, what windows show
 
     """
     block, rate = masked(source.block, source.usable), source.rate
@@ -141,15 +139,14 @@ def reduce(
     if source.white is not None:
         noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)
     if level is not None:
-        noise, levels = level, levels.copy()
-        levels[[p in whole for p in held]] = level
+        noise, levels = level, np.tile(level, (len(held), 1))
     source = replace(source, block=shaken.block)
     without = source.about.without
     bounds = [
         np.array([(a, b)], dtype=np.intp)
-        if p in whole
+        if whole
         else block_bounds(block.t, (a, b), rate, len(held), without)
-        for p, (a, b) in zip(held, windows[held].tolist(), strict=True)
+        for a, b in windows[held].tolist()
     ]
     rows = [len(b) for b in bounds]
     out = averaged(

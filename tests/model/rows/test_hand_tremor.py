@@ -192,21 +192,21 @@ def test_only_a_device_that_somebody_holds_trembles() -> None:
     assert rows_in_a_hand(recording(angles, 4, QUICKLY, 4)).wander.all()
 
 
-def test_of_one_that_is_held_in_some_windows_those_are_single_rows() -> None:
-    """And what is told of their means is what they are off by."""
+def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
+    """And what is told of them is what they are off by, also in the others."""
     angles = np.zeros((12, 3))
     angles[7] = 3e-3
-    pulls = []
+    pulls, others = [], []
     for seed in range(24):
         source = recording(angles, seed, QUICKLY)
-        found, alone = rows_in_a_hand(source), reduce(source)
-        held, rest = found.x.position == 7, alone.x.position != 7
-        assert held.sum() == 1 and len(found.x) == rest.sum() + 1
-        assert (found.wander[held] > 0.0).all() and not found.wander[~held].any()
-        np.testing.assert_array_equal(found.sd[~held], alone.sd[rest])
-        np.testing.assert_array_equal(found.noise, alone.noise)
+        found = rows_in_a_hand(source)
+        assert found.x.position.tolist() == list(range(12))
+        held = found.x.position == 7
+        np.testing.assert_array_equal(found.noise, reduce(source).noise)
         pulls.append(found.y[held, 3:] / found.sd[held, 3:])
-    assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.2
+        others.append(found.y[~held, 3:] / found.sd[~held, 3:])
+    assert 0.3 < np.sqrt(np.mean(np.square(pulls))) < 1.2
+    assert 0.8 < np.sqrt(np.mean(np.square(others))) < 1.1
 
 
 def test_a_table_that_shakes_in_some_windows_is_no_hand() -> None:

@@ -582,6 +582,28 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
     assert not units.asks(99.0)
 
 
+@pytest.mark.parametrize(
+    ("scale", "unit"), [(np.rad2deg(1.0), "deg/s"), (1.0, "rad/s")]
+)
+@pytest.mark.parametrize("seconds", [1.5, 4.0, 8.0])
+def test_a_slow_turn_tells_the_unit_too(
+    scale: float, unit: str, seconds: float
+) -> None:
+    """Forty-five degrees, once, as gently as a hand with a heavy box does it."""
+    units, rng = GyroUnitWatch(9.81), np.random.default_rng(5)
+    t = np.arange(2200) / 100
+    part = np.clip((t - 8.0) / seconds, 0.0, 1.0)
+    angle = np.deg2rad(45.0) * (1 - np.cos(np.pi * part)) / 2
+    gyr = np.zeros((2200, 3))
+    gyr[:, 0] = np.gradient(angle, t)
+    gyr += [0.01, -0.02, 0.015] + 2e-3 * rng.standard_normal((2200, 3))
+    acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
+    block = Block.of(t, acc + 0.02 * rng.standard_normal((2200, 3)), scale * gyr)
+    for piece in pieces(block, 0.1):
+        units.add(piece)
+    assert units.unit == unit
+
+
 def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:
     bench.engine.run(hold_all(FIVE, 10.0))
     assert not any("gyr_unit" in text for text in bench.turner.told)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
+import sys
+import termios
 from pathlib import Path
 
 import numpy as np
@@ -368,3 +371,21 @@ def test_a_terminal_without_the_letters_gets_no_drawing() -> None:
     made = ConsoleOperator("t", FIVE, ManualMover(), console)
     made.place(HOLD)
     assert "facing N" not in screen(made)
+
+
+def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hand, terminal_file = os.openpty()
+    before = termios.tcgetattr(terminal_file)
+    with os.fdopen(terminal_file) as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        with Keyboard() as keyboard:
+            os.write(hand, b"\x1a\x13r")  # Ctrl-Z, Ctrl-S: passed on, not carried out
+            assert keyboard.pressed() == "repeat"
+            os.write(hand, b"q\n")
+            assert keyboard.pressed() == "stop"
+            os.write(hand, b"rs")
+            assert keyboard.pressed() == "skip" and keyboard.pressed() is None
+        assert termios.tcgetattr(terminal_file) == before
+    os.close(hand)

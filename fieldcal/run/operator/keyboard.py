@@ -3,7 +3,8 @@
     Enter, space   confirm      r   repeat      s   skip      q   stop
 
 While it is open the terminal passes keys on at once and does not show them; Ctrl-C
-stays what it is. What is no terminal has no keys.
+stays what it is. Ctrl-Z and Ctrl-S do nothing: they would halt a run that nobody could
+see halted, and its samples would be lost. What is no terminal has no keys.
 """
 
 from __future__ import annotations
@@ -58,14 +59,17 @@ class Keyboard:
             self._keys.close()
 
     def pressed(self) -> Wish | None:
-        """What was asked for by the keys pressed since the last call: the last one."""
-        wish: Wish | None = None
+        """What was asked for by the keys pressed since the last call.
+
+        It is the last of them, but whoever wants to stop is not asked twice.
+        """
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
-        for character in (text or "").lower():
-            wish = KEYS.get(character, wish)
-        return wish
+        wishes = [KEYS[key] for key in (text or "").lower() if key in KEYS]
+        if "stop" in wishes:
+            return "stop"
+        return wishes[-1] if wishes else None
 
     def forget(self) -> None:
         """Forget keys pressed by now: they were meant for what is over."""
@@ -99,6 +103,11 @@ class PosixKeys:
 
         self._before = termios.tcgetattr(self._file)
         tty.setcbreak(self._file)
+        mode = termios.tcgetattr(self._file)
+        mode[tty.IFLAG] &= ~termios.IXON
+        no_key = os.fpathconf(self._file, "PC_VDISABLE")
+        mode[tty.CC][termios.VSUSP] = bytes([no_key])
+        termios.tcsetattr(self._file, termios.TCSADRAIN, mode)
 
     def close(self) -> None:
         """Set the terminal back."""

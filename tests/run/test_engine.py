@@ -514,6 +514,29 @@ def test_warming_up_is_noticed_also_in_whole_degrees(
     assert abs(rate - 4.0) < 4 * sigma + 0.05
 
 
+class SwitchedOff(InProcess):
+    """A device that was off after ten seconds, and is 3 K colder since."""
+
+    def receive(self, timeout: float) -> Block | None:
+        block = super().receive(timeout)
+        if block and block.t[0] < 10.0:
+            return replace(block, temperature=block.temperature + 3.0)
+        self.health.restarts = 1
+        return block
+
+
+def test_what_was_before_a_restart_is_no_cooling_down(tmp_path: Path) -> None:
+    driver = SwitchedOff(VirtualDevice(seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(driver)
+        warm_up = WarmUpWatch(0.5, 600.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
+        engine.run(hold_all(TWO[:1], 14.0))
+    assert any("started anew at 10.0" in text for text in turner.told)
+    assert not any("cooling" in v.reason.text for v in turner.views)
+    assert not any("cooling" in text for text in turner.told)
+
+
 def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
     """Two minutes of a device whose temperature changes by `rate` K/min."""
     rng = np.random.default_rng(seed)

@@ -271,6 +271,23 @@ def test_on_any_screen_instruction_reason_and_keys_are_seen(
     assert keys and keys[-1] >= len(lines) - 2
 
 
+def test_on_a_small_screen_the_present_reason_outlives_what_was_said() -> None:
+    operator = sized(40, 15)
+    operator.tell("no samples came between 536.28 s and 545.73 s: check the cable" * 2)
+    operator.tell("disturbed 12.3 s into the window on ay: a 0.1 s push of 0.13 m/s²")
+    wrong = WaitReason(
+        WaitState.MISPLACED,
+        "both angles are turned the wrong way: the device is at α = -22.3°, β = -5.1°,"
+        " asked for is α = 22.5°, β = 5°; press Enter once more to take it like this,"
+        " and the result is NO-GO",
+    )
+    operator.show(view("turning", reason=wrong))
+    lines = screen(operator, 40, 15).splitlines()
+    text = " ".join(" ".join(lines).split())
+    assert "the result is NO-GO" in text and "now 2" in text and "q stop" in lines[-1]
+    assert "536.28" not in text
+
+
 def test_the_scale_is_always_the_same() -> None:
     """35 degrees off is drawn farther than 22, and a tick is where its label says."""
     places = []

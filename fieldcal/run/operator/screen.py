@@ -102,20 +102,25 @@ class Screen:
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short(view)]
-        lines += self._sentences()
         number_of = len(self._shown.positions)
-        taken = widgets.progress(self._shown.taken, self._shown.now, number_of)
-        lines.append(Text(taken))
+        taken = Text(widgets.progress(self._shown.taken, self._shown.now, number_of))
+        room = self._console.height - 1 - len(self._console.render_lines(
+            Group(*lines, taken)))  # fmt: skip
+        lines += [*self._sentences(room), taken]
         parts = Layout()
         parts.split_column(
             Layout(Group(*lines), ratio=1), Layout(Text(SHORT_HELP), size=1)
         )
         return parts
 
-    def _sentences(self) -> list[RenderableType]:
-        """What must not be missed, and why it waits."""
-        said = self._shown.sentences
-        return [Text(f"! {text}", style="bold yellow") for text in said]
+    def _sentences(self, room: float = np.inf) -> list[RenderableType]:
+        """What must not be missed, and why it waits: the last, in so many lines."""
+        said = [
+            Text(f"! {text}", style="bold yellow") for text in self._shown.sentences
+        ]
+        while len(said) > 1 and len(self._console.render_lines(Group(*said))) > room:
+            said.pop(0)
+        return [*said]
 
     def _listing(self, rows: int) -> RenderableType:
         """The positions around the present one, with what was reached in each."""

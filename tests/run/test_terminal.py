@@ -382,12 +382,26 @@ def test_pictures_of_three_joints_stand_side_by_side_or_below_or_not_at_all() ->
     assert [line[24:].strip() for line in wide[:4]] == [x.strip() for x in arrow]
 
 
-def test_a_terminal_without_the_letters_gets_no_drawing() -> None:
-    out = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
-    console = Console(file=out, width=80, height=24, force_terminal=True)
+@pytest.mark.parametrize("size", [(80, 24), (110, 40), (60, 20), (40, 15)])
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_a_terminal_of_few_letters_gets_others_in_their_place_and_no_drawing(
+    size: tuple[int, int], encoding: str
+) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    console = Console(
+        file=out, width=size[0], height=size[1], force_terminal=True, color_system=None
+    )
     made = ConsoleOperator("t", FIVE, ManualMover(), console)
     made.place(HOLD)
-    assert "facing N" not in screen(made)
+    made.show(view("turning"))
+    console.print(made.screen())  # strictly: a letter that is not there is an error
+    out.flush()
+    lines = out.buffer.getvalue().decode(encoding).replace("\a", "").splitlines()
+    drawn = lines[-size[1] :]
+    assert max(map(len, lines)) <= size[0] and "facing N" not in "".join(lines)
+    assert "a = 22.5" in "".join(drawn)
+    if size[0] >= 80:
+        assert all(len(line) == size[0] and line[-1] in "|+" for line in drawn[1:-1])
 
 
 def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(

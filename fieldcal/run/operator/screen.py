@@ -19,6 +19,7 @@ from fieldcal.run.operator.box import pictures
 from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.instruction import TURN
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
+from fieldcal.run.operator.letters import OneForOne
 
 TALL = 32
 """Lines from which there is room for letters three lines tall."""
@@ -59,7 +60,19 @@ class Screen:
         """Draw it; as high as the terminal, so that nothing jumps."""
         columns, rows = SMALL
         if self._console.width < columns or self._console.height < rows:
-            return self._small()
+            return self._lettered(self._small())
+        return self._lettered(self._whole())
+
+    def _lettered(self, drawn: RenderableType) -> RenderableType:
+        """In letters that the terminal has."""
+        return drawn if self._has_all_letters else OneForOne(drawn)
+
+    @property
+    def _has_all_letters(self) -> bool:
+        return self._console.encoding.lower().startswith("utf")
+
+    def _whole(self) -> RenderableType:
+        """All there is, in a frame."""
         view = self._shown.view
         above: list[RenderableType] = [*self._instruction(), Text()]
         if view and self._shown.hold is view.hold:
@@ -136,8 +149,8 @@ class Screen:
 
     def _drawing(self, listing: RenderableType, rows: int) -> list[str]:
         """The box as it should stand, where there are letters and room for it."""
-        known, hold = self._console.encoding.lower().startswith("utf"), self._shown.hold
-        if not known or hold is None:
+        hold = self._shown.hold
+        if not self._has_all_letters or hold is None:
             return []
         options = self._console.options
         taken = Measurement.get(self._console, options, listing).maximum
@@ -155,7 +168,7 @@ class Screen:
         turn = hold.position if what.words == TURN and hold else None
         style = f"bold reverse {what.colour}".strip()
         width = self._console.width - 4
-        if self._console.height >= TALL:
+        if self._console.height >= TALL and self._has_all_letters:
             angles = _angles(turn, width - 4)
             lines = ["", *large(what.words), *angles, "", what.detail, ""]
         else:

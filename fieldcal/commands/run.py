@@ -94,7 +94,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         help='such as "serial:/dev/ttyUSB0?format=witmotion"; repeat it for each'
         " further device that turns with the first",
     )
-    parser.set_defaults(further_device=[], further_serial=[])
+    parser.set_defaults(further_device=[], further_serial=[], records=False)
     add(
         "--virtual",
         nargs=argparse.OPTIONAL,
@@ -256,6 +256,7 @@ def _record(
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )
+        args.records = True
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)
         )

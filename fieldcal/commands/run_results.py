@@ -123,10 +123,11 @@ def write_junit(
 def broken_off(
     args: argparse.Namespace, task: Task, folder: Path, error: BaseException
 ) -> None:
-    """Say what is kept, if anything was recorded."""
+    """Say what is kept, if anything was recorded; another run's folder is let be."""
     from fieldcal.session.marks import MARKS
 
-    if not os.path.exists(folder / MARKS):  # False where nobody may look
+    own = args.resume or args.records
+    if not own or not os.path.exists(folder / MARKS):  # False where nobody may look
         return
     if args.junit:
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -21,6 +22,7 @@ from wires import STREAMS
 pytest.importorskip("sqlite3")
 
 from fieldcal.cli import main
+from fieldcal.core.errors import SessionError
 from fieldcal.drivers.driver import open_driver
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
@@ -86,6 +88,38 @@ def test_a_run_that_heard_nothing_is_not_in_the_way_of_the_next(
     assert folder.exists() == other
     with Recorder(folder, {"grade": "tactical"}):
         pass
+
+
+def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a second terminal, before the first run has heard a sample."""
+    folder = tmp_path / "s"
+    with Recorder(folder, {"grade": "tactical"}) as recorder:
+        recorder.mark("asked", position=0)
+        there = sorted(folder.iterdir())
+        with VirtualMover(["--serial", "witmotion"], once=False) as device:
+            for port in (device.port, "/dev/nowhere"):
+                url = f"serial:{port}?format=witmotion"
+                assert main(["run", "two_position", "--level", "0.1", "--headless",
+                             "--device", url, "-o", str(folder)]) in (2, 3)  # fmt: skip
+                assert "to go on" not in capsys.readouterr().err
+                assert sorted(folder.iterdir()) == there
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(SessionError, match="is no folder; name one"):
+        Recorder(file, {"grade": "tactical"})
+
+
+def test_what_was_typed_wrong_is_one_sentence_and_one_object(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["run", "two_position", "--latitude", "50,45", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert "write 50.45; see fieldcal run --help" in err and err.count("\n") == 1
+    assert json.loads(out)["exit_code"] == 2
+    assert main(["run", "--latitude", "north"]) == 2
+    assert "'north'; see fieldcal run --help" in capsys.readouterr().err
 
 
 @contextmanager

@@ -159,6 +159,24 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
         resume(folder)
 
 
+def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:
+    folder, besides = tmp_path / "s", {"alpha_deg": 45.0, "beta_deg": -5.0}
+    recorded(folder)
+    number = len(Session.open(folder).positions)
+    with Recorder(folder, None) as recorder:
+        recorder.mark("added", position=number, name="besides", **besides)
+        recorder.mark("asked", position=number)
+        recorder.mark("skipped", position=number)
+        recorder.mark("finished")
+    other = {"alpha_deg": -45.0, "beta_deg": 5.0}
+    remedy = {"says": "", "again": [], "positions": [besides, other], "seconds": 20.0}
+    decision = {"go": False, "remedy": remedy}
+    (folder / "result.json").write_text(json.dumps({"decision": decision}))
+    _, tables, _ = resume(folder)
+    places = [p.degrees for p in plan_file.task(tables, "s").about.positions]
+    assert places[number:] == [(45.0, -5.0), (-45.0, 5.0)]
+
+
 def test_what_verified_a_no_go_is_taken_anew_behind_what_its_remedy_adds(
     tmp_path: Path,
 ) -> None:

@@ -132,9 +132,11 @@ def broken_off(
     if args.junit:
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")
     if args.resume or not _discarded(folder):
+        moved = ", with --device if its port is another now (fieldcal ports)"
         sys.stderr.write(
             f"what was recorded is kept in {folder}; to go on:"
-            f" fieldcal run --resume {shlex.quote(str(folder))}\n"
+            f" fieldcal run --resume {shlex.quote(str(folder))}"
+            f"{moved if isinstance(error, DeviceError) else ''}\n"
         )
 
 

@@ -205,7 +205,8 @@ class SessionRun:
         if left > 0:
             said = lost.fault if isinstance(lost, LinkLost) else str(lost)
             self._operator.tell(
-                f"{said}; goes on by itself once it is back, within {left:.0f} s"
+                f"{said}; goes on by itself once it is back, within {left:.0f} s; if"
+                " it has another port now (fieldcal ports), end this (q), resume there"
             )
         while monotonic() < deadline:
             with suppress(DeviceError):

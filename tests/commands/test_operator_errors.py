@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Timer
+from threading import Thread
 from time import sleep
 from typing import Any
 
@@ -23,7 +23,7 @@ pytest.importorskip("sqlite3")
 
 from fieldcal.cli import main
 from fieldcal.core.errors import SessionError
-from fieldcal.drivers.driver import open_driver
+from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -33,7 +33,10 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """The sentence that a run ends with."""
     run = ["run", "two_position", "--headless", "--device", url, "-o", str(folder)]
     assert main([*run, "--patience", "0"]) == 3
-    last = capsys.readouterr().err.strip().splitlines()[-1]
+    *before, last = capsys.readouterr().err.strip().splitlines()
+    if folder.exists():
+        assert "--resume" in before[-2]
+        assert "with --device if its port is another now" in before[-2]
     said = last.removeprefix("fieldcal run: ")
     assert said != last and not re.search(r"\.\s|[\[{<]|Error", said)
     return said
@@ -166,22 +169,29 @@ def test_a_port_that_another_program_has(
 
 
 def test_half_a_frame_at_the_end(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stream = STREAMS["mip"](60, np.random.default_rng(0))
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
+    sent = b"".join(stream.pieces)[:-7]
 
-    def dies() -> None:
-        os.write(ours, b"".join(stream.pieces)[:-7])
-        sleep(0.2)  # the kernel drops what lies in a pty that is closed
+    def dies(driver: Driver) -> None:
+        os.write(ours, sent)
+        while driver.health.received < len(sent):
+            sleep(0.01)  # the kernel drops what lies in a pty that is closed
         os.close(ours)
 
-    away = Timer(0.3, dies)
-    away.start()
+    def opened(url: str) -> Driver:
+        driver = open_driver(url)
+        Thread(target=dies, args=(driver,), daemon=True).start()
+        return driver
+
+    monkeypatch.setattr("fieldcal.drivers.driver.open_driver", opened)
     url = f"serial:{os.ttyname(theirs)}?format=mip&reconnect=0"
     said = failed(url, tmp_path / "s", capsys)
-    away.join()
     os.close(theirs)
     assert said.endswith("hung up: check cable and power, then start again")
     block = Session.open(tmp_path / "s").block

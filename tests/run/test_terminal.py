@@ -416,6 +416,10 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
             assert keyboard.pressed() == "repeat"
             os.write(hand, b"q\n")
             assert keyboard.pressed() == "stop"
+            os.write(hand, b"\x1bOP\x1bOQ\x1bOR\x1bOS\x1b[15~\x1b[1;2S\x1b[A\x1bq\x1b")
+            assert keyboard.pressed() is None  # F1 to F5, Shift-F4, an arrow, Alt-q
+            os.write(hand, b"\x1b[Br\x1bOQ")
+            assert keyboard.pressed() == "repeat"
             os.write(hand, b"rs")
             assert keyboard.pressed() == "skip" and keyboard.pressed() is None
         assert termios.tcgetattr(terminal_file) == before

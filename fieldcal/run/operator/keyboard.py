@@ -12,6 +12,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import re
 import select
 import sys
 from typing import Any, Protocol, Self
@@ -29,8 +30,15 @@ KEYS: dict[str, Wish] = {
 
 HELP = "keys: Enter confirm · r repeat · s skip · q stop"
 
+OTHER_KEYS = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
+"""What arrows, function keys and letters with Alt send: F2 ends in a Q, F4 in an S."""
+
 SHORT_HELP = "Enter ok · r again · s skip · q stop"
 """The same for a screen of 40 characters."""
+
+
+FUNCTION = ("\x00", "\xe0")
+"""What Windows sends before the code of a key without a letter: Q is Page Down."""
 
 
 class Keyboard:
@@ -66,7 +74,8 @@ class Keyboard:
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
-        wishes = [KEYS[key] for key in (text or "").lower() if key in KEYS]
+        letters = OTHER_KEYS.sub("", text or "").lower()
+        wishes = [KEYS[key] for key in letters if key in KEYS]
         if "stop" in wishes:
             return "stop"
         return wishes[-1] if wishes else None
@@ -128,7 +137,7 @@ class PosixKeys:
 
 
 class WindowsKeys:
-    """Keys of the console that the process has."""
+    """Letters of the console that the process has; its other keys are left out."""
 
     def __init__(self) -> None:
         self._console = importlib.import_module("msvcrt")
@@ -143,5 +152,9 @@ class WindowsKeys:
         """What was pressed by now."""
         text = ""
         while self._console.kbhit():
-            text += self._console.getwch()
+            key = self._console.getwch()
+            if key in FUNCTION:
+                self._console.getwch()
+            else:
+                text += key
         return text

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
-  fieldcal run adaptive --latitude 50.45
+  fieldcal run adaptive --latitude 50.45 --angles 0.01
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
   fieldcal run five_position --virtual --speed 20
   fieldcal run plan.toml --headless --json --junit run.xml > result.json
@@ -283,14 +283,16 @@ def _record(
 
 
 def _unsaid(task: Task) -> list[str]:
-    """What nobody said of base and site, without which it is NO-GO."""
+    """What nobody said of base, site and angles, without which it is NO-GO."""
     from fieldcal import procedures
+    from fieldcal.acceptance.angles import unstated
     from fieldcal.acceptance.level import level_unknown
     from fieldcal.acceptance.site import gravity_unknown
 
-    unsaid = [gravity_unknown(task.about)]
+    unsaid = [unstated(task.about)]
     if procedures.most(task.about, task.procedure) is None:
-        unsaid.insert(0, level_unknown(task.about))
+        unsaid.append(level_unknown(task.about))
+    unsaid.append(gravity_unknown(task.about))  # what matters most is said last
     return [sentence for sentence in unsaid if sentence]
 
 

@@ -308,6 +308,12 @@ def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
     assert text.endswith(f"clock -20 ± {shown} ppm")
 
 
+def test_a_clock_of_which_nothing_is_known_is_not_shown() -> None:
+    """After the computer was asleep."""
+    health = Health(samples=1234, clock=ClockLine(-93958.0, 20272.0, 0.0, 5.0))
+    assert "clock" not in link(view("averaging", health=health)).plain
+
+
 def test_leaving_out_is_asked_back() -> None:
     operator = sized(80, 24, "skip", "skip")
     assert operator.wish() is None

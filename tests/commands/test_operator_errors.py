@@ -64,6 +64,17 @@ def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.usefixtures("soon_silent")
+def test_the_right_format_with_other_columns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = "t,ax,ay,az,gx,gy,gz"
+    with VirtualMover(["--serial", f"text?columns={columns}"]) as device:
+        url = f"serial:{device.port}?format=text&columns={columns[2:]}"
+        said = failed(url, tmp_path / "s", capsys)
+    assert f"this is text with other options; try format=text&columns={columns}" in said
+
+
+@pytest.mark.usefixtures("soon_silent")
 @pytest.mark.parametrize("other", [False, True])
 def test_a_run_that_heard_nothing_is_not_in_the_way_of_the_next(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], other: bool

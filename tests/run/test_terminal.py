@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import sys
-import termios
 from pathlib import Path
 
 import numpy as np
@@ -413,6 +412,7 @@ def test_a_terminal_of_few_letters_gets_others_in_their_place_and_no_drawing(
 def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    termios = pytest.importorskip("termios")
     hand, terminal_file = os.openpty()
     before = termios.tcgetattr(terminal_file)
     with os.fdopen(terminal_file) as file:

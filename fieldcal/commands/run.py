@@ -14,7 +14,7 @@ from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_operator import operator_of
 from fieldcal.commands.run_page import LOCAL, served, told_end
 from fieldcal.commands.run_results import broken_off, write_junit
-from fieldcal.commands.run_task import make_task
+from fieldcal.commands.run_task import SESSIONS, make_task
 from fieldcal.commands.run_waits import (
     PATIENCE,
     PATIENCE_HEADLESS,
@@ -62,7 +62,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"{', '.join(procedures)}, or a plan file (a session.toml with"
         " positions, and a table [run])",
     )
-    add("--resume", type=Path, metavar="SESSION", help="continue an interrupted run")
+    add(
+        "--resume",
+        type=Path,
+        nargs=argparse.OPTIONAL,
+        const=SESSIONS,
+        metavar="SESSION",
+        help="continue an interrupted run (default: the last in sessions)",
+    )
     _add_device(parser)
     _add_task(parser)
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")

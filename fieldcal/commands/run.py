@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=argparse.OPTIONAL,
         const=SESSIONS,
         metavar="SESSION",
-        help="continue an interrupted run (default: the last in sessions)",
+        help="continue an interrupted run (default: the last)",
     )
     _add_device(parser)
     _add_task(parser)

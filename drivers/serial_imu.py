@@ -159,12 +159,18 @@ class SerialImu(Driver):
             )
         if known is None:
             return (
-                "bytes come, but no format that is known; check the baud rate, or ask "
-                f"`fieldcal ports --probe {self.name}`"
+                "bytes come, but no format that is known; check the baud rate and"
+                f" the port, or ask `fieldcal ports --probe {self.name}`"
             )
         name, like = known
         query = f"&{like.query}" if like.query else ""
-        return f"these are no {self._format} bytes; try format={name}{query}"
+        same = name == self._format
+        said = (
+            f"this is {name} with other options"
+            if same
+            else (f"these are no {self._format} bytes")
+        )
+        return f"{said}; try format={name}{query}"
 
 
 def recent(chunks: Sequence[Chunk]) -> list[Chunk]:

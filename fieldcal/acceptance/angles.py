@@ -23,6 +23,8 @@ from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
+from fieldcal.core.positions import forces
+from fieldcal.evaluation.observations import angle_setting
 from fieldcal.history.family import expected
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
@@ -38,6 +40,10 @@ REMEDY = (
     " (each a [[position]] without angles), or a verification position in which all"
     " axes measure gravity (--verify, [verification] alpha_deg = -135, beta_deg = 45)"
 )
+
+FACES, UPRIGHT = 3, 0.5
+"""Faces without angles that check those of the others, and part of g that an axis has
+to feel for its own to be checked: of small ladders one feels a tenth."""
 
 UNSEEN = 0.1
 """Largest part (1) of the mistakes of one kind that is accepted."""
@@ -101,6 +107,27 @@ def would_explain(found: Calibration, off: Mapping[str, float]) -> str:
             if size <= most and wrong.shows * size / most < SHOWN:
                 return wrong.says
     return ""
+
+
+def unstated(about: Description) -> str:
+    """Warning before a run whose angles nobody vouches for; empty if it needs none.
+
+    It needs none where each axis is to point up or down, or three faces beside the
+    ladder are to be held: gravity measures the angles there.
+    """
+    said = about.angle_setting_deg is not None or about.angles_from
+    oriented = [p for p in about.positions if p.oriented]
+    faces = len(about.positions) - len(oriented)
+    if said or _set_by_program(about) or len(oriented) < 2 or faces >= FACES:
+        return ""
+    if np.abs(forces(oriented, 1.0)).max(axis=0).min() > UPRIGHT:
+        return ""
+    return (
+        "nobody stated how well the angles are set, and they are taken as set to"
+        f" ± {angle_setting(about):g}°, which on so small a ladder is rarely enough for"
+        " GO: state it (--angles 0.01, in degrees, 1σ; fieldcal solve accepts it"
+        " afterwards)"
+    )
 
 
 def stated(found: Calibration, about: Description, limits: GradeLimits) -> bool:

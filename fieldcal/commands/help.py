@@ -6,9 +6,12 @@ A command names in ``RARE`` what its options are kept under that its help leaves
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Collection, Sequence
-from typing import Any
+from typing import Any, NoReturn
+
+from fieldcal.core.errors import InputError
 
 BROKEN, INTERRUPTED = 70, 130
 """What sysexits.h calls EX_SOFTWARE, which is no verdict and no wrong input; and what a
@@ -68,6 +71,19 @@ class CommandParser(argparse.ArgumentParser):
             self.usage = None
             for action, text in zip(left, before, strict=True):
                 action.help = text
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse what was typed in one sentence, as every other error is said.
+
+        Raises
+        ------
+        InputError
+            Always.
+
+        """
+        told = re.search(r"invalid (?:float|int) value: '(-?\d+),(\d+)'$", message)
+        point = f", write {told[1]}.{told[2]}" if told else ""
+        raise InputError(f"{message}{point}; see {self.prog} --help")
 
     def whole_help(self) -> str:
         """Help with every option, and all exit codes."""

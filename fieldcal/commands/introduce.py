@@ -82,6 +82,9 @@ def _the_one() -> DetectedDevice:
         answers.append(probe(port, LISTEN))
     known = [answer for answer in answers if answer.url]
     if len(known) == 1:
+        for one in answers:
+            if not one.url:  # the device that was meant may be behind this one
+                _tell(f"not taken: {one.port}: {one.says}")
         return known[0]
     if known:
         listed = "; ".join(f'--device "{one.url}"' for one in known)

@@ -14,7 +14,7 @@ from fieldcal.commands.introduce import introduce
 from fieldcal.commands.run_operator import operator_of
 from fieldcal.commands.run_page import LOCAL, served, told_end
 from fieldcal.commands.run_results import broken_off, write_junit
-from fieldcal.commands.run_task import make_task
+from fieldcal.commands.run_task import SESSIONS, make_task
 from fieldcal.commands.run_waits import (
     PATIENCE,
     PATIENCE_HEADLESS,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import Task
 
 EXAMPLE = """\
-  fieldcal run adaptive --latitude 50.45
+  fieldcal run adaptive --latitude 50.45 --angles 0.01
   fieldcal run five_position --device "serial:/dev/ttyUSB0?format=witmotion"
   fieldcal run five_position --virtual --speed 20
   fieldcal run plan.toml --headless --json --junit run.xml > result.json
@@ -62,7 +62,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"{', '.join(procedures)}, or a plan file (a session.toml with"
         " positions, and a table [run])",
     )
-    add("--resume", type=Path, metavar="SESSION", help="continue an interrupted run")
+    add(
+        "--resume",
+        type=Path,
+        nargs=argparse.OPTIONAL,
+        const=SESSIONS,
+        metavar="SESSION",
+        help="continue an interrupted run (default: the last)",
+    )
     _add_device(parser)
     _add_task(parser)
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")
@@ -94,7 +101,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
         help='such as "serial:/dev/ttyUSB0?format=witmotion"; repeat it for each'
         " further device that turns with the first",
     )
-    parser.set_defaults(further_device=[], further_serial=[])
+    parser.set_defaults(further_device=[], further_serial=[], records=False)
     add(
         "--virtual",
         nargs=argparse.OPTIONAL,
@@ -256,6 +263,7 @@ def _record(
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )
+        args.records = True
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)
         )
@@ -282,14 +290,16 @@ def _record(
 
 
 def _unsaid(task: Task) -> list[str]:
-    """What nobody said of base and site, without which it is NO-GO."""
+    """What nobody said of base, site and angles, without which it is NO-GO."""
     from fieldcal import procedures
+    from fieldcal.acceptance.angles import unstated
     from fieldcal.acceptance.level import level_unknown
     from fieldcal.acceptance.site import gravity_unknown
 
-    unsaid = [gravity_unknown(task.about)]
+    unsaid = [unstated(task.about)]
     if procedures.most(task.about, task.procedure) is None:
-        unsaid.insert(0, level_unknown(task.about))
+        unsaid.append(level_unknown(task.about))
+    unsaid.append(gravity_unknown(task.about))  # what matters most is said last
     return [sentence for sentence in unsaid if sentence]
 
 

@@ -123,17 +123,20 @@ def write_junit(
 def broken_off(
     args: argparse.Namespace, task: Task, folder: Path, error: BaseException
 ) -> None:
-    """Say what is kept, if anything was recorded."""
+    """Say what is kept, if anything was recorded; another run's folder is let be."""
     from fieldcal.session.marks import MARKS
 
-    if not os.path.exists(folder / MARKS):  # False where nobody may look
+    own = args.resume or args.records
+    if not own or not os.path.exists(folder / MARKS):  # False where nobody may look
         return
     if args.junit:
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")
     if args.resume or not _discarded(folder):
+        moved = ", with --device if its port is another now (fieldcal ports)"
         sys.stderr.write(
             f"what was recorded is kept in {folder}; to go on:"
-            f" fieldcal run --resume {shlex.quote(str(folder))}\n"
+            f" fieldcal run --resume {shlex.quote(str(folder))}"
+            f"{moved if isinstance(error, DeviceError) else ''}\n"
         )
 
 

@@ -14,6 +14,9 @@ from fieldcal.core.errors import InputError
 if TYPE_CHECKING:
     from fieldcal.run.plan_file import Task
 
+SESSIONS = Path("sessions")
+"""Where runs are recorded that name no folder."""
+
 EXACT_DEG = 0.001
 """How well a virtual fixture sets its angles, deg: as it turns them, to rounding."""
 
@@ -48,7 +51,7 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         name, tables = args.procedure, _tables_of_file(args)
     task = plan_file.task(_stood(overlay(tables, _site(args))), name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    return task, args.output or Path("sessions") / f"{stamp}-{task.procedure}"
+    return task, args.output or SESSIONS / f"{stamp}-{task.procedure}"
 
 
 def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
@@ -62,10 +65,22 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
             "--resume goes on with the device and place its session.toml names:"
             " leave those options out"
         )
-    session, tables, args.again = resume(args.resume)
+    session, tables, args.again = resume(_newest(args.resume))
     tables["run"] = {**tables["run"], **_given(args)}
     tables = overlay(tables, _site(args))
-    return plan_file.task(tables, f"{args.resume}/session.toml"), session.folder
+    return plan_file.task(tables, f"{session.folder}/session.toml"), session.folder
+
+
+def _newest(folder: Path) -> Path:
+    """The session that was named, or the one last written to in the folder of all."""
+    from fieldcal.session.marks import MARKS
+
+    if folder != SESSIONS:
+        return folder
+    marks = max(
+        folder.glob(f"*/{MARKS}"), key=lambda f: f.stat().st_mtime, default=None
+    )
+    return marks.parent if marks else folder
 
 
 def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SAID, IncomingSamples
 from fieldcal.run.interruptions import Disturbed, kept_notice, restart_notice
 from fieldcal.run.link_marks import MarkedRecorder
-from fieldcal.run.operator.desk import OperatorDesk
+from fieldcal.run.operator.desk import OperatorDesk, question
 from fieldcal.run.operator.protocol import Display, Operator
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
@@ -89,6 +89,7 @@ class Engine:
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._before: int | None = None
+        self._restarts = driver.health.restarts
         self._units = GyroUnitWatch(about.gravity)
         self._warned_of_unit = False
         self._desk = OperatorDesk(operator, recorder)
@@ -99,6 +100,8 @@ class Engine:
             lost_share,
         )  # fmt: skip
         driver.on_silence = self._silent
+        if warm_up:
+            warm_up.forget()  # a link opened again: nobody knows whether it was off
 
     def run(self, plan: Plan[R]) -> R:
         """Carry out a plan and return its result.
@@ -205,6 +208,9 @@ class Engine:
         """Look at samples that have just been recorded."""
         self._display.heard(block)
         if self._warm_up:
+            if self._restarts != self._driver.health.restarts:
+                self._restarts = self._driver.health.restarts
+                self._warm_up.forget()
             self._warm_up.add(block)
 
     def _silent(self) -> None:
@@ -241,8 +247,10 @@ class Engine:
                     self._desk.insisted(hold, waiting.problem)
                     return
                 insisted = self._desk.ask_back(waiting)
+            if not (waiting.usable and waiting.problem):
+                insisted = False  # moved since: that place is not asked about
             waits = self._warm_up is not None and self._warm_up.waits
-            reason = waiting.reason
+            reason = question(waiting) if insisted else waiting.reason
             if waiting.arrived and self._warm_up and self._warm_up.says and waits:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.says)
             self._display.turning(hold, waiting, reason)

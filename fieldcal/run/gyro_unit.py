@@ -28,6 +28,11 @@ EVERY = 2.0
 CALM = 0.1
 """Scatter of means of the accelerometers that is rest, m/s^2."""
 
+TURNED = 0.15
+"""Turn of gravity that tells the unit, as of `rate_size.TURNED`, rad: 45° within 9 s,
+or 22° within 4 s there and back. On a bench nothing else moves gravity, so less of a
+turn is enough than of a recording of which nobody knows what it is."""
+
 HINT = 5.0
 """Rest by the accelerometers alone after which moving rates are asked about, s."""
 
@@ -72,7 +77,7 @@ class GyroUnitWatch:
         if not self._means:
             return ""
         table = np.array(self._means)
-        reads = rate_in(table[:, 0], table[:, 1:4], table[:, 4:], self._gravity)
+        reads = rate_in(table[:, 0], table[:, 1:4], table[:, 4:], self._gravity, TURNED)
         if reads is None:
             return ""
         fits = fitting(reads, GYR_SCALES, GYR_OUT[1])
@@ -105,5 +110,5 @@ class GyroUnitWatch:
         return (
             f"the accelerometers rest, the gyroscopes read up to {size:.2g} rad/s: if"
             " they are in deg/s, begin again with gyr_unit=deg/s in the device's"
-            " address; a turn of the device will tell"
+            " address; a turn by 45° will tell"
         )

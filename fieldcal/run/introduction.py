@@ -24,6 +24,12 @@ PLAIN = ("+x", "+y", "+z")
 ZERO = 3.0
 """Standard errors within which all rates at rest are zero, as no bias leaves them."""
 
+ZEROED = (
+    "; its rates are zero at rest: it takes their bias out itself; switch that off"
+    " (gyro bias estimation, zero velocity update), or the result is NO-GO"
+)
+"""What is said of rates that have no bias."""
+
 PIECE = 0.1
 """Longest stretch that is looked at as one, s."""
 
@@ -59,7 +65,7 @@ def introduced(block: Block, gravity: float) -> Introduction:
     f: Array = np.nanmean(block.acc, axis=0)
     size = float(np.linalg.norm(f))
     centred = _centred(block.gyr)
-    zero = "; its rates are zero at rest: it takes their bias out itself" * centred
+    zero = ZEROED * centred
     if not abs(size - gravity) <= NORM * gravity:
         says = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
         return Introduction("", PLAIN, centred, says + zero)

@@ -205,7 +205,8 @@ class SessionRun:
         if left > 0:
             said = lost.fault if isinstance(lost, LinkLost) else str(lost)
             self._operator.tell(
-                f"{said}; goes on by itself once it is back, within {left:.0f} s"
+                f"{said}; goes on by itself once it is back, within {left:.0f} s; if"
+                " it has another port now (fieldcal ports), end this (q), resume there"
             )
         while monotonic() < deadline:
             with suppress(DeviceError):
@@ -277,12 +278,22 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
         last = len(session.positions)
         if remedy["positions"] and verification_window(marks, last) is not None:
             again += (last,)  # what verified goes behind the positions besides, anew
-        tables["position"] = [*tables.get("position", ()), *remedy["positions"]]
+        tables["position"] = [*tables.get("position", ()), *_besides(remedy, session)]
         run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
     fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
     if fixed and len(tables.get("position", ())) > _planned(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again
+
+
+def _besides(remedy: Mapping[str, Any], session: Session) -> list[Any]:
+    """Positions of a remedy but those left out before, which are asked for anyway."""
+    known = session.about.positions
+    left_out = {known[i].degrees for i in positions_left_out(session)}
+    return [
+        place for place in remedy["positions"]
+        if Position.deg(place["alpha_deg"], place["beta_deg"]).degrees not in left_out
+    ]  # fmt: skip
 
 
 def positions_left_out(session: Session) -> tuple[int, ...]:

@@ -17,6 +17,7 @@ from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import GAP
 from fieldcal.run.mounting_check import mounted_otherwise
 from fieldcal.run.position_check import (
+    NEAR,
     NORM,
     AcceptedPosition,
     PositionCheck,
@@ -84,7 +85,8 @@ class PositionWait:
         self._units = units
         self._others = _others(hold, about)
         self._began: float | None = None
-        self._rested = self._turned = False
+        self._first: Array | None = None
+        self._turned = False
         self._start()
         self._last = self._last_host = self._stirred = np.nan
         self.waited = self.waited_host = 0.0
@@ -93,6 +95,7 @@ class PositionWait:
         self._stillness = Stillness(self._about.sways)
         self._resting = _Resting()
         self._told = -np.inf
+        self._told_of: Array | None = None
         self.arrival: PositionCheck | None = None
         self._there = np.nan
         self.where: PositionCheck | None = None
@@ -125,15 +128,15 @@ class PositionWait:
         self.waited = self._last - self._began
         self._stillness.add(block)
         self._resting.add(block, self._stillness.since)
-        self._turned |= self._rested and self._stillness.since is None
-        self._rested |= self._stillness.since is not None
         if self._stillness.since is not None or np.isnan(self._stirred):
             self._stirred = self._last
         if self._resting.seconds > 0:
             self.f = force(self._resting.block.acc, self._about)
             self.where = self.arrival = self._judged(self.f)
+            self._first = self.f if self._first is None else self._first
+            self._turned |= self._elsewhere(self._first)
         else:
-            self.arrival, self.f, self._told = None, None, -np.inf
+            self.arrival, self.f = None, None
             now = self._judged(force(block.acc, self._about))
             self.where = replace(now, ok=False)
         if self.arrival is None or not self.arrival.ok:
@@ -208,19 +211,27 @@ class PositionWait:
         return self.waited > give_up and self.waited_host > min(give_up, LEAST)
 
     def alarm(self) -> float | None:
-        """Whether to call the operator now: once for a rest, and every minute again.
+        """Whether to call the operator now: once for a place, and every minute again.
 
         Returns the time waited if it is a reminder, s, 0 for the first time, and None
         if there is nothing to say.
         """
-        since = self._last - self._told
-        if self.reason.state is not WaitState.MISPLACED or since < REMIND:
+        if self.reason.state is not WaitState.MISPLACED or self.f is None:
+            return None
+        again = not self._elsewhere(self._told_of)
+        if again and self._last - self._told < REMIND:
             return None
         if not self._turned and self.waited < UNTURNED:
             return None
-        again = np.isfinite(self._told)
-        self._told = self._last
+        self._told, self._told_of = self._last, self.f
         return self.waited if again else 0.0
+
+    def _elsewhere(self, place: Array | None) -> bool:
+        """Whether it rests elsewhere than with that force; no gust turns it so far."""
+        if place is None or self.f is None:
+            return True
+        away = float(np.linalg.norm(self.f - place))
+        return bool(away > NEAR * self._about.gravity)
 
 
 def _others(hold: Hold, about: Description) -> dict[str, Position]:

@@ -62,6 +62,11 @@ class WarmUpWatch:
         self._n += len(temperature)
         self._last = float(t[-1])
 
+    def forget(self) -> None:
+        """Begin anew: the device was off, and no straight line leads through that."""
+        self._seconds.clear()
+        self._second, self._sum, self._n = -np.inf, 0.0, 0
+
     def _note_step(self, temperature: Array) -> None:
         steps = np.abs(np.diff(temperature))
         steps = steps[steps > 0]

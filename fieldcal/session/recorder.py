@@ -106,10 +106,9 @@ class Recorder:
         try:
             self._open(about)
         except FileExistsError as error:
-            raise SessionError(
-                f"{folder}: holds a session already; name another folder, or go on"
-                " with it by --resume"
-            ) from error
+            holds = "holds a session already; name another folder, or go on with it by"
+            said = f"{holds} --resume" if folder.is_dir() else "is no folder; name one"
+            raise SessionError(f"{folder}: {said}") from error
         except OSError as error:
             raise SessionError(
                 f"{folder}: cannot be written: {disk_says(error)}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from observed import force, observe
 
-from fieldcal.acceptance.angles import unwitnessed
+from fieldcal.acceptance.angles import unstated, unwitnessed
 from fieldcal.acceptance.decision import ANGLES, Circumstances, Decision, decide
 from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
@@ -76,6 +76,28 @@ def test_a_small_ladder_has_no_witness_and_names_the_remedy() -> None:
     assert check.ok is False and not made.go
     assert "three or more other faces" in check.says and "--verify" in check.says
     assert "--angles" in check.says
+
+
+@pytest.mark.parametrize(
+    ("places", "bare", "site", "warned"),
+    [
+        (five(), 0, {}, True),
+        (five()[::4], 0, {}, True),  # what adaptive begins with
+        ([(0, 0), (8, 8), (-8, -8)], 2, {}, True),
+        (five(), 3, {}, False),
+        (FACES, 0, {}, False),
+        ([], 6, {}, False),
+        (five(), 0, {"angle_setting_deg": 0.01}, False),
+        (five(), 0, {"angles_from": "certificate 4711"}, False),
+    ],
+)
+def test_who_is_told_before_a_run_that_nobody_vouches_for_the_angles(
+    places: list[tuple[float, float]], bare: int, site: dict[str, Any], warned: bool
+) -> None:
+    known: list[dict[str, Any]] = [{"alpha_deg": a, "beta_deg": b} for a, b in places]
+    known += [{"name": f"face {i}"} for i in range(bare)]
+    said = unstated(parse({"site": {"gravity": G, **site}, "position": known}))
+    assert ("--angles 0.01" in said and "± 0.05°" in said) == warned == bool(said)
 
 
 @pytest.mark.parametrize("site", [{}, {"angle_setting_deg": 0.003}])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -10,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Timer
+from threading import Thread
 from time import sleep
 from typing import Any
 
@@ -21,7 +22,8 @@ from wires import STREAMS
 pytest.importorskip("sqlite3")
 
 from fieldcal.cli import main
-from fieldcal.drivers.driver import open_driver
+from fieldcal.core.errors import SessionError
+from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -31,7 +33,10 @@ def failed(url: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """The sentence that a run ends with."""
     run = ["run", "two_position", "--headless", "--device", url, "-o", str(folder)]
     assert main([*run, "--patience", "0"]) == 3
-    last = capsys.readouterr().err.strip().splitlines()[-1]
+    *before, last = capsys.readouterr().err.strip().splitlines()
+    if folder.exists():
+        assert "--resume" in before[-2]
+        assert "with --device if its port is another now" in before[-2]
     said = last.removeprefix("fieldcal run: ")
     assert said != last and not re.search(r"\.\s|[\[{<]|Error", said)
     return said
@@ -56,6 +61,17 @@ def test_the_wrong_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     with VirtualMover(["--serial", "xsens"]) as device:
         said = failed(f"serial:{device.port}?format=mip", tmp_path / "s", capsys)
     assert said.endswith("these are no mip bytes; try format=xsens")
+
+
+@pytest.mark.usefixtures("soon_silent")
+def test_the_right_format_with_other_columns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = "t,ax,ay,az,gx,gy,gz"
+    with VirtualMover(["--serial", f"text?columns={columns}"]) as device:
+        url = f"serial:{device.port}?format=text&columns={columns[2:]}"
+        said = failed(url, tmp_path / "s", capsys)
+    assert f"this is text with other options; try format=text&columns={columns}" in said
 
 
 @pytest.mark.usefixtures("soon_silent")
@@ -86,6 +102,38 @@ def test_a_run_that_heard_nothing_is_not_in_the_way_of_the_next(
     assert folder.exists() == other
     with Recorder(folder, {"grade": "tactical"}):
         pass
+
+
+def test_the_same_command_once_more_leaves_the_run_that_goes_on_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a second terminal, before the first run has heard a sample."""
+    folder = tmp_path / "s"
+    with Recorder(folder, {"grade": "tactical"}) as recorder:
+        recorder.mark("asked", position=0)
+        there = sorted(folder.iterdir())
+        with VirtualMover(["--serial", "witmotion"], once=False) as device:
+            for port in (device.port, "/dev/nowhere"):
+                url = f"serial:{port}?format=witmotion"
+                assert main(["run", "two_position", "--level", "0.1", "--headless",
+                             "--device", url, "-o", str(folder)]) in (2, 3)  # fmt: skip
+                assert "to go on" not in capsys.readouterr().err
+                assert sorted(folder.iterdir()) == there
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(SessionError, match="is no folder; name one"):
+        Recorder(file, {"grade": "tactical"})
+
+
+def test_what_was_typed_wrong_is_one_sentence_and_one_object(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["run", "two_position", "--latitude", "50,45", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert "write 50.45; see fieldcal run --help" in err and err.count("\n") == 1
+    assert json.loads(out)["exit_code"] == 2
+    assert main(["run", "--latitude", "north"]) == 2
+    assert "'north'; see fieldcal run --help" in capsys.readouterr().err
 
 
 @contextmanager
@@ -132,22 +180,29 @@ def test_a_port_that_another_program_has(
 
 
 def test_half_a_frame_at_the_end(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stream = STREAMS["mip"](60, np.random.default_rng(0))
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
+    sent = b"".join(stream.pieces)[:-7]
 
-    def dies() -> None:
-        os.write(ours, b"".join(stream.pieces)[:-7])
-        sleep(0.2)  # the kernel drops what lies in a pty that is closed
+    def dies(driver: Driver) -> None:
+        os.write(ours, sent)
+        while driver.health.received < len(sent):
+            sleep(0.01)  # the kernel drops what lies in a pty that is closed
         os.close(ours)
 
-    away = Timer(0.3, dies)
-    away.start()
+    def opened(url: str) -> Driver:
+        driver = open_driver(url)
+        Thread(target=dies, args=(driver,), daemon=True).start()
+        return driver
+
+    monkeypatch.setattr("fieldcal.drivers.driver.open_driver", opened)
     url = f"serial:{os.ttyname(theirs)}?format=mip&reconnect=0"
     said = failed(url, tmp_path / "s", capsys)
-    away.join()
     os.close(theirs)
     assert said.endswith("hung up: check cable and power, then start again")
     block = Session.open(tmp_path / "s").block

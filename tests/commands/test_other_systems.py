@@ -114,7 +114,7 @@ class Console:
 
 
 def test_keys_of_a_windows_console(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "msvcrt", Console("xr"))
+    monkeypatch.setitem(sys.modules, "msvcrt", Console("x\xe0Q\x00;r\xe0S"))
     keys = WindowsKeys()
     keys.open()
     assert keys.read() == "xr" and keys.read() == ""

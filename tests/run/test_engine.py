@@ -514,6 +514,29 @@ def test_warming_up_is_noticed_also_in_whole_degrees(
     assert abs(rate - 4.0) < 4 * sigma + 0.05
 
 
+class SwitchedOff(InProcess):
+    """A device that was off after ten seconds, and is 3 K colder since."""
+
+    def receive(self, timeout: float) -> Block | None:
+        block = super().receive(timeout)
+        if block and block.t[0] < 10.0:
+            return replace(block, temperature=block.temperature + 3.0)
+        self.health.restarts = 1
+        return block
+
+
+def test_what_was_before_a_restart_is_no_cooling_down(tmp_path: Path) -> None:
+    driver = SwitchedOff(VirtualDevice(seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner = Turner(driver)
+        warm_up = WarmUpWatch(0.5, 600.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
+        engine.run(hold_all(TWO[:1], 14.0))
+    assert any("started anew at 10.0" in text for text in turner.told)
+    assert not any("cooling" in v.reason.text for v in turner.views)
+    assert not any("cooling" in text for text in turner.told)
+
+
 def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
     """Two minutes of a device whose temperature changes by `rate` K/min."""
     rng = np.random.default_rng(seed)
@@ -580,6 +603,28 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
         units.add(piece)
     assert ("they are in deg/s and not in rad/s" in units.says) == wrong
     assert not units.asks(99.0)
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit"), [(np.rad2deg(1.0), "deg/s"), (1.0, "rad/s")]
+)
+@pytest.mark.parametrize("seconds", [1.5, 4.0, 8.0])
+def test_a_slow_turn_tells_the_unit_too(
+    scale: float, unit: str, seconds: float
+) -> None:
+    """Forty-five degrees, once, as gently as a hand with a heavy box does it."""
+    units, rng = GyroUnitWatch(9.81), np.random.default_rng(5)
+    t = np.arange(2200) / 100
+    part = np.clip((t - 8.0) / seconds, 0.0, 1.0)
+    angle = np.deg2rad(45.0) * (1 - np.cos(np.pi * part)) / 2
+    gyr = np.zeros((2200, 3))
+    gyr[:, 0] = np.gradient(angle, t)
+    gyr += [0.01, -0.02, 0.015] + 2e-3 * rng.standard_normal((2200, 3))
+    acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
+    block = Block.of(t, acc + 0.02 * rng.standard_normal((2200, 3)), scale * gyr)
+    for piece in pieces(block, 0.1):
+        units.add(piece)
+    assert units.unit == unit
 
 
 def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:

@@ -105,10 +105,16 @@ def test_the_one_that_answers_is_taken_and_said(
 
 
 def test_none_and_too_many_are_questions(
-    devices: list[str], monkeypatch: pytest.MonkeyPatch
+    devices: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr("fieldcal.commands.introduce.LISTEN", 0.3)
-    devices.append(devices[0])
+    devices.append("/dev/nowhere")
+    introduce(options())
+    said = capsys.readouterr().err
+    assert "not taken: /dev/nowhere: cannot open /dev/nowhere: there is no" in said
+    devices[1] = devices[0]
     with pytest.raises(InputError, match='2 devices answer, say which: --device "ser'):
         introduce(options())
     devices[:] = ["/dev/nowhere"]

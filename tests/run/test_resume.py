@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from pathlib import Path
-from time import sleep
+from time import sleep, time
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ from processes import wait_for_samples
 
 from benchmarks.kills import Bench, series, windows
 from fieldcal.calibration import Calibration
+from fieldcal.commands import run
 from fieldcal.commands.decision_view import show_decision
+from fieldcal.commands.help import CommandParser
+from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
@@ -159,6 +163,24 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
         resume(folder)
 
 
+def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:
+    folder, besides = tmp_path / "s", {"alpha_deg": 45.0, "beta_deg": -5.0}
+    recorded(folder)
+    number = len(Session.open(folder).positions)
+    with Recorder(folder, None) as recorder:
+        recorder.mark("added", position=number, name="besides", **besides)
+        recorder.mark("asked", position=number)
+        recorder.mark("skipped", position=number)
+        recorder.mark("finished")
+    other = {"alpha_deg": -45.0, "beta_deg": 5.0}
+    remedy = {"says": "", "again": [], "positions": [besides, other], "seconds": 20.0}
+    decision = {"go": False, "remedy": remedy}
+    (folder / "result.json").write_text(json.dumps({"decision": decision}))
+    _, tables, _ = resume(folder)
+    places = [p.degrees for p in plan_file.task(tables, "s").about.positions]
+    assert places[number:] == [(45.0, -5.0), (-45.0, 5.0)]
+
+
 def test_what_verified_a_no_go_is_taken_anew_behind_what_its_remedy_adds(
     tmp_path: Path,
 ) -> None:
@@ -251,3 +273,20 @@ def test_behind_a_no_go_stands_what_was_left_out(
     show_decision(found, tmp_path / "s")
     said = " ".join(capsys.readouterr().out.split())
     assert "first: take position 2, left out so far: fieldcal run --resume" in said
+
+
+def test_without_a_name_the_last_run_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("sessions").mkdir()
+    parser = CommandParser("")
+    run.add_arguments(parser)
+    with pytest.raises(SessionError, match="sessions: is no session"):
+        make_task(parser.parse_args(["--resume"]))
+    for age, name in ((50, "z-by-hand"), (10, "2026-03-01"), (90, "2026-04-01")):
+        recorded(Path("sessions") / name)
+        before = time() - age
+        os.utime(Path("sessions") / name / "marks.jsonl", (before, before))
+    _, folder = make_task(parser.parse_args(["--resume"]))
+    assert folder == Path("sessions/2026-03-01")

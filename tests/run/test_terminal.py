@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -268,6 +270,23 @@ def test_on_any_screen_instruction_reason_and_keys_are_seen(
     assert keys and keys[-1] >= len(lines) - 2
 
 
+def test_on_a_small_screen_the_present_reason_outlives_what_was_said() -> None:
+    operator = sized(40, 15)
+    operator.tell("no samples came between 536.28 s and 545.73 s: check the cable" * 2)
+    operator.tell("disturbed 12.3 s into the window on ay: a 0.1 s push of 0.13 m/s²")
+    wrong = WaitReason(
+        WaitState.MISPLACED,
+        "both angles are turned the wrong way: the device is at α = -22.3°, β = -5.1°,"
+        " asked for is α = 22.5°, β = 5°; press Enter once more to take it like this,"
+        " and the result is NO-GO",
+    )
+    operator.show(view("turning", reason=wrong))
+    lines = screen(operator, 40, 15).splitlines()
+    text = " ".join(" ".join(lines).split())
+    assert "the result is NO-GO" in text and "now 2" in text and "q stop" in lines[-1]
+    assert "536.28" not in text
+
+
 def test_the_scale_is_always_the_same() -> None:
     """35 degrees off is drawn farther than 22, and a tick is where its label says."""
     places = []
@@ -286,6 +305,12 @@ def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
     health = Health(samples=1234, clock=ClockLine(-20.2, sigma, 0.0, 1e-3))
     text = link(view("averaging", health=health)).plain
     assert text.endswith(f"clock -20 ± {shown} ppm")
+
+
+def test_a_clock_of_which_nothing_is_known_is_not_shown() -> None:
+    """After the computer was asleep."""
+    health = Health(samples=1234, clock=ClockLine(-93958.0, 20272.0, 0.0, 5.0))
+    assert "clock" not in link(view("averaging", health=health)).plain
 
 
 def test_leaving_out_is_asked_back() -> None:
@@ -362,9 +387,46 @@ def test_pictures_of_three_joints_stand_side_by_side_or_below_or_not_at_all() ->
     assert [line[24:].strip() for line in wide[:4]] == [x.strip() for x in arrow]
 
 
-def test_a_terminal_without_the_letters_gets_no_drawing() -> None:
-    out = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
-    console = Console(file=out, width=80, height=24, force_terminal=True)
+@pytest.mark.parametrize("size", [(80, 24), (110, 40), (60, 20), (40, 15)])
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_a_terminal_of_few_letters_gets_others_in_their_place_and_no_drawing(
+    size: tuple[int, int], encoding: str
+) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    console = Console(
+        file=out, width=size[0], height=size[1], force_terminal=True, color_system=None
+    )
     made = ConsoleOperator("t", FIVE, ManualMover(), console)
     made.place(HOLD)
-    assert "facing N" not in screen(made)
+    made.show(view("turning"))
+    console.print(made.screen())  # strictly: a letter that is not there is an error
+    out.flush()
+    lines = out.buffer.getvalue().decode(encoding).replace("\a", "").splitlines()
+    drawn = lines[-size[1] :]
+    assert max(map(len, lines)) <= size[0] and "facing N" not in "".join(lines)
+    assert "a = 22.5" in "".join(drawn)
+    if size[0] >= 80:
+        assert all(len(line) == size[0] and line[-1] in "|+" for line in drawn[1:-1])
+
+
+def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    termios = pytest.importorskip("termios")
+    hand, terminal_file = os.openpty()
+    before = termios.tcgetattr(terminal_file)
+    with os.fdopen(terminal_file) as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        with Keyboard() as keyboard:
+            os.write(hand, b"\x1a\x13r")  # Ctrl-Z, Ctrl-S: passed on, not carried out
+            assert keyboard.pressed() == "repeat"
+            os.write(hand, b"q\n")
+            assert keyboard.pressed() == "stop"
+            os.write(hand, b"\x1bOP\x1bOQ\x1bOR\x1bOS\x1b[15~\x1b[1;2S\x1b[A\x1bq\x1b")
+            assert keyboard.pressed() is None  # F1 to F5, Shift-F4, an arrow, Alt-q
+            os.write(hand, b"\x1b[Br\x1bOQ")
+            assert keyboard.pressed() == "repeat"
+            os.write(hand, b"rs")
+            assert keyboard.pressed() == "skip" and keyboard.pressed() is None
+        assert termios.tcgetattr(terminal_file) == before
+    os.close(hand)

@@ -221,6 +221,11 @@ def test_a_wrong_place_is_taken_only_if_insisted_on_and_then_it_is_no_go(
     console.turn(15.0, 0.0)
     console.wait("turn it by +7.")
     console.child.send("\r")
+    assert console.wait("press Enter once more").count("turn it by") == 1
+    console.turn(16.5, 0.0)  # not the place that was asked about
+    console.wait("turn it by +6.")
+    assert "press Enter" not in console.look()
+    console.child.send("\r")
     console.wait("press Enter once more")
     console.child.send("\r")
     console.averaging()

@@ -45,3 +45,36 @@ def turning_to(alpha_deg: float, sways: bool) -> float:
 def test_no_window_begins_in_a_turn(sways: bool) -> None:
     """Of 2.5 degrees in three seconds, slower than what sways may be."""
     assert turning_to(2.5, sways) > (SWUNG - TURN_S if sways else SETTLE - 0.5)
+
+
+@pytest.mark.parametrize(("creeps", "calls"), [(0.0, [20.0]), (4.0, [8.0])])
+def test_a_gust_is_no_turn_and_calls_nobody_anew(
+    creeps: float, calls: list[float]
+) -> None:
+    """Gusts of a second every seven; the first may leave it elsewhere, still wrong."""
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 60.0, 1 / RATE)
+    gust = (t % 7.0 > 5.0) & (t % 7.0 < 6.0)
+    alpha = np.deg2rad(creeps) * (t > 6.0)
+    acc = -G * np.column_stack([np.sin(alpha), np.cos(alpha), np.zeros_like(t)])
+    acc += 5e-3 * rng.standard_normal(acc.shape)
+    acc += gust[:, None] * 0.5 * rng.standard_normal(acc.shape)
+    gyr = 1e-3 * rng.standard_normal(acc.shape) * (1 + 50 * gust[:, None])
+    block = Block.of(t, acc, gyr)
+    about = description.parse(
+        {
+            "format": 1,
+            "site": {"gravity": G},
+            "position": [{"alpha_deg": 45.0, "beta_deg": 0.0}],
+        }
+    )
+    waiting, called = (
+        PositionWait(Hold(0, Position.deg(45.0, 0.0), 10.0), about, None),
+        [],
+    )
+    for first in range(0, len(t), 10):
+        waiting.add(block[first : first + 10], float(t[first]))
+        if waiting.alarm() is not None:
+            called.append(float(t[first]))
+    assert len(called) == len(calls)
+    assert all(0.0 <= c - w < 8.0 for c, w in zip(called, calls, strict=True))

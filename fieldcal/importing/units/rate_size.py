@@ -20,8 +20,9 @@ from fieldcal.importing.units.gravity_size import Gravity
 from fieldcal.importing.units.scales import FEWEST
 from fieldcal.importing.units.turn_closure import closing_scale
 
-_TURNED = 0.5
-"""Turn of gravity that all of a recording must have for (1), rad."""
+TURNED = 0.5
+"""Turn of gravity that all of a recording must have for (1), rad: root of the sum of
+the squares of what it turns by in each half second. 45° within 1.2 s are as much."""
 
 _AGREES = 0.9
 """Correlation of both sides of (1) from which on it is believed."""
@@ -51,7 +52,9 @@ _LAG = 0.5
 """Time over which (1) is integrated, s: jerks of a hand are shorter."""
 
 
-def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
+def rate_in(
+    t: Array, acc: Array, gyr: Array, gravity: Gravity, turned: float = TURNED
+) -> float | None:
     """What 1 rad/s reads in numbers (n, 3) of a file, by (1); None if nothing turns.
 
     Parameters
@@ -59,10 +62,11 @@ def rate_in(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> float | None:
     t : (n,) s
     acc, gyr : (n, 3) in numbers of the file
     gravity : what the accelerometers read at rest
+    turned : least turn of gravity, as of `TURNED`, rad
 
     """
     sides = _Sides.of(t, acc, gyr, gravity)
-    if sides is None or sides.moved < _TURNED**2 * sides.lag:
+    if sides is None or sides.moved < turned**2 * sides.lag:
         return None
     left, right = sides.left.ravel(), sides.right.ravel()
     power = float(right @ right)

@@ -7,8 +7,17 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.interruptions import RepeatPosition
 from fieldcal.run.link_marks import MarkedRecorder
 from fieldcal.run.operator.protocol import Operator, Wish
-from fieldcal.run.wait_reason import WaitReason
+from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.run.waiting import PositionWait
+
+
+def question(waiting: PositionWait) -> WaitReason:
+    """Whether a wrong place is to be taken; asked while the device rests there."""
+    return WaitReason(
+        WaitState.MISPLACED,
+        f"{waiting.problem}; press Enter once more to take it like this, and the result"
+        " is NO-GO",
+    )
 
 
 class OperatorDesk:
@@ -35,12 +44,13 @@ class OperatorDesk:
         self._operator.alarm(reason)
 
     def ask_back(self, waiting: PositionWait) -> bool:
-        """Answer an operator who wants to go on at a wrong place."""
+        """Answer an operator who wants to go on at a wrong place.
+
+        Returns whether they were asked; the question stands as long as `question` is
+        the reason that is shown.
+        """
         if waiting.usable and waiting.problem:
-            self.tell(
-                f"{waiting.problem}; press Enter once more to take it like this, and"
-                " the result is NO-GO"
-            )
+            self.alarm(question(waiting))
             return True
         self.tell(f"not yet: {waiting.problem or waiting.reason.text}")
         return False

@@ -3,7 +3,8 @@
     Enter, space   confirm      r   repeat      s   skip      q   stop
 
 While it is open the terminal passes keys on at once and does not show them; Ctrl-C
-stays what it is. What is no terminal has no keys.
+stays what it is. Ctrl-Z and Ctrl-S do nothing: they would halt a run that nobody could
+see halted, and its samples would be lost. What is no terminal has no keys.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import re
 import select
 import sys
 from typing import Any, Protocol, Self
@@ -28,8 +30,15 @@ KEYS: dict[str, Wish] = {
 
 HELP = "keys: Enter confirm · r repeat · s skip · q stop"
 
+OTHER_KEYS = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
+"""What arrows, function keys and letters with Alt send: F2 ends in a Q, F4 in an S."""
+
 SHORT_HELP = "Enter ok · r again · s skip · q stop"
 """The same for a screen of 40 characters."""
+
+
+FUNCTION = ("\x00", "\xe0")
+"""What Windows sends before the code of a key without a letter: Q is Page Down."""
 
 
 class Keyboard:
@@ -58,14 +67,18 @@ class Keyboard:
             self._keys.close()
 
     def pressed(self) -> Wish | None:
-        """What was asked for by the keys pressed since the last call: the last one."""
-        wish: Wish | None = None
+        """What was asked for by the keys pressed since the last call.
+
+        It is the last of them, but whoever wants to stop is not asked twice.
+        """
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
-        for character in (text or "").lower():
-            wish = KEYS.get(character, wish)
-        return wish
+        letters = OTHER_KEYS.sub("", text or "").lower()
+        wishes = [KEYS[key] for key in letters if key in KEYS]
+        if "stop" in wishes:
+            return "stop"
+        return wishes[-1] if wishes else None
 
     def forget(self) -> None:
         """Forget keys pressed by now: they were meant for what is over."""
@@ -99,6 +112,11 @@ class PosixKeys:
 
         self._before = termios.tcgetattr(self._file)
         tty.setcbreak(self._file)
+        mode = termios.tcgetattr(self._file)
+        mode[tty.IFLAG] &= ~termios.IXON
+        no_key = os.fpathconf(self._file, "PC_VDISABLE")
+        mode[tty.CC][termios.VSUSP] = bytes([no_key])
+        termios.tcsetattr(self._file, termios.TCSADRAIN, mode)
 
     def close(self) -> None:
         """Set the terminal back."""
@@ -119,7 +137,7 @@ class PosixKeys:
 
 
 class WindowsKeys:
-    """Keys of the console that the process has."""
+    """Letters of the console that the process has; its other keys are left out."""
 
     def __init__(self) -> None:
         self._console = importlib.import_module("msvcrt")
@@ -134,5 +152,9 @@ class WindowsKeys:
         """What was pressed by now."""
         text = ""
         while self._console.kbhit():
-            text += self._console.getwch()
+            key = self._console.getwch()
+            if key in FUNCTION:
+                self._console.getwch()
+            else:
+                text += key
         return text

@@ -19,6 +19,7 @@ from fieldcal.run.operator.box import pictures
 from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.instruction import TURN
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
+from fieldcal.run.operator.letters import OneForOne
 
 TALL = 32
 """Lines from which there is room for letters three lines tall."""
@@ -59,7 +60,19 @@ class Screen:
         """Draw it; as high as the terminal, so that nothing jumps."""
         columns, rows = SMALL
         if self._console.width < columns or self._console.height < rows:
-            return self._small()
+            return self._lettered(self._small())
+        return self._lettered(self._whole())
+
+    def _lettered(self, drawn: RenderableType) -> RenderableType:
+        """In letters that the terminal has."""
+        return drawn if self._has_all_letters else OneForOne(drawn)
+
+    @property
+    def _has_all_letters(self) -> bool:
+        return self._console.encoding.lower().startswith("utf")
+
+    def _whole(self) -> RenderableType:
+        """All there is, in a frame."""
         view = self._shown.view
         above: list[RenderableType] = [*self._instruction(), Text()]
         if view and self._shown.hold is view.hold:
@@ -102,20 +115,25 @@ class Screen:
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short(view)]
-        lines += self._sentences()
         number_of = len(self._shown.positions)
-        taken = widgets.progress(self._shown.taken, self._shown.now, number_of)
-        lines.append(Text(taken))
+        taken = Text(widgets.progress(self._shown.taken, self._shown.now, number_of))
+        room = self._console.height - 1 - len(self._console.render_lines(
+            Group(*lines, taken)))  # fmt: skip
+        lines += [*self._sentences(room), taken]
         parts = Layout()
         parts.split_column(
             Layout(Group(*lines), ratio=1), Layout(Text(SHORT_HELP), size=1)
         )
         return parts
 
-    def _sentences(self) -> list[RenderableType]:
-        """What must not be missed, and why it waits."""
-        said = self._shown.sentences
-        return [Text(f"! {text}", style="bold yellow") for text in said]
+    def _sentences(self, room: float = np.inf) -> list[RenderableType]:
+        """What must not be missed, and why it waits: the last, in so many lines."""
+        said = [
+            Text(f"! {text}", style="bold yellow") for text in self._shown.sentences
+        ]
+        while len(said) > 1 and len(self._console.render_lines(Group(*said))) > room:
+            said.pop(0)
+        return [*said]
 
     def _listing(self, rows: int) -> RenderableType:
         """The positions around the present one, with what was reached in each."""
@@ -131,8 +149,8 @@ class Screen:
 
     def _drawing(self, listing: RenderableType, rows: int) -> list[str]:
         """The box as it should stand, where there are letters and room for it."""
-        known, hold = self._console.encoding.lower().startswith("utf"), self._shown.hold
-        if not known or hold is None:
+        hold = self._shown.hold
+        if not self._has_all_letters or hold is None:
             return []
         options = self._console.options
         taken = Measurement.get(self._console, options, listing).maximum
@@ -150,7 +168,7 @@ class Screen:
         turn = hold.position if what.words == TURN and hold else None
         style = f"bold reverse {what.colour}".strip()
         width = self._console.width - 4
-        if self._console.height >= TALL:
+        if self._console.height >= TALL and self._has_all_letters:
             angles = _angles(turn, width - 4)
             lines = ["", *large(what.words), *angles, "", what.detail, ""]
         else:

@@ -32,6 +32,10 @@ RULER = "  -45  -5  0   5  45  "
 UNSEEN = "by its mark, gravity does not show it"
 """Of a third angle: accelerometers at rest show two."""
 
+CRYSTAL = 1000.0
+"""± of a clock that says nothing, ppm: any crystal is better. So it is for a while once
+the computer was asleep, for samples that waited meanwhile came late."""
+
 NEAR = 1.0
 """Off by less than this, deg, an angle is not asked to be turned."""
 
@@ -187,8 +191,9 @@ def link(view: OperatorView) -> Text:
         parts.append(f"{view.temperature:.1f} °C")
     if health.restarts:
         parts.append(f"restarts: {health.restarts}")
-    if health.clock and health.clock.real_time:
-        fast, sigma = health.clock.fast_ppm, np.ceil(health.clock.sigma_ppm)
+    clock = health.clock
+    if clock and clock.real_time and clock.sigma_ppm < CRYSTAL:
+        fast, sigma = clock.fast_ppm, np.ceil(clock.sigma_ppm)
         parts.append(f"clock {fast:+.0f} ± {sigma:.0f} ppm")
     lost = health.missing or health.bad or health.restarts
     return Text("link: " + " · ".join(parts), style="yellow" if lost else "")

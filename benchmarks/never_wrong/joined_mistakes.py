@@ -11,14 +11,16 @@ from benchmarks.never_wrong.recording import recorded
 from benchmarks.never_wrong.written import After, Rng, Written, log_uniform
 
 
-def _begun_with(other: Bench, written: Written, bench: Bench, rng: Rng) -> Written:
-    """The first positions of a session are those of another one.
+def _begun_with(
+    other: Bench, written: Written, bench: Bench, rng: Rng, least: int = 1
+) -> Written:
+    """The first positions of a session are those of another one, the `least` last not.
 
     The way between the two is missing. Times have a gap there, or go on as if nothing
     was missing.
     """
     first, s = recorded(other, rng), written.samples
-    way = int(rng.integers(1, len(bench.windows)))
+    way = int(rng.integers(1, len(bench.windows) - least + 1))
     end, start = bench.windows[way - 1, 1] + 0.5, bench.windows[way, 0] - 0.5
     missing = float(start - end) if rng.integers(2) else 0.0
     a, b = first.t <= end, s.t >= start
@@ -52,14 +54,14 @@ def two_days(written: Written, bench: Bench, rng: Rng) -> Written:
 
 
 def two_devices(written: Written, bench: Bench, rng: Rng) -> Written:
-    """The first positions are those of another device."""
+    """Some of the first positions, half of all at most, are those of another device."""
     other = drawn(rng)
     names = (
         "acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "device", "acc_noise",
         "gyr_noise", "grain",
     )  # fmt: skip
     before = replace(bench, **{name: getattr(other, name) for name in names})
-    return _begun_with(before, written, bench, rng)
+    return _begun_with(before, written, bench, rng, -(-len(bench.windows) // 2))
 
 
 def remounted(written: Written, bench: Bench, rng: Rng) -> Written:

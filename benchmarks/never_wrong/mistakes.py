@@ -178,13 +178,14 @@ def acc_high_passed(written: Written, bench: Bench, rng: Rng) -> Written:
 
 def gyr_zeroed(written: Written, bench: Bench, rng: Rng) -> Written:
     """At each stop the device takes the mean of 1 to 3 s for its bias till the next."""
-    s, gyr = written.samples, written.samples.gyr.copy()
-    long = float(rng.uniform(1, 3))
-    for start, _ in bench.windows:
-        bias = s.gyr[s.within(start - 0.5, start - 0.5 + long)]
-        if len(bias):
-            after = s.t > start - 0.5 + long
-            gyr[after] = s.gyr[after] - bias.mean(axis=0)
+    s, long = written.samples, float(rng.uniform(1, 3))
+    bias = s.gyr[s.within(0.0, long)].mean(axis=0)  # as it was found before, at rest
+    gyr = s.gyr - bias
+    for start in bench.windows[1:, 0] - 0.5:
+        found = s.gyr[s.within(start, start + long)]
+        if len(found):
+            after = s.t > start + long
+            gyr[after] = s.gyr[after] - found.mean(axis=0)
     return replace(written, samples=replace(s, gyr=gyr))
 
 

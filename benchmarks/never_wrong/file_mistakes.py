@@ -123,9 +123,9 @@ def sampled_and_held(written: Written, bench: Bench, rng: Rng) -> Written:
 
 
 def two_clocks(written: Written, bench: Bench, rng: Rng) -> Written:
-    """Rates have a clock of their own: 0.05 to 5 s off, and 10 to 3000 ppm fast."""
+    """Rates have a clock of their own: 0.05 to 5 s off, and 10 to 100 ppm fast."""
     s, (early, slow) = written.samples, rng.choice([-1, 1], 2)
-    t = s.t * (1 + slow * log_uniform(rng, 1e-5, 3e-3))
+    t = s.t * (1 + slow * log_uniform(rng, 1e-5, 1e-4))
     t += early * log_uniform(rng, 0.05, 5)
     at = np.clip(np.searchsorted(s.t, t), 0, len(s.t) - 1)
     return replace(written, samples=replace(s, gyr=s.gyr[at]))

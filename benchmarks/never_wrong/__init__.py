@@ -90,6 +90,27 @@ GROUPED = {
     "cut toward zero, clipped, wrapped around": (
         "cut toward zero", "clipped", "wrapped around",
     ),
+    "joints not square, with play, bent, settling; a position held twice": (
+        "joints not square", "play of the joints", "fixture bends", "fixture settles",
+        "not turned",
+    ),
+    "an engine or a hand in some positions, the sun": (
+        "engine at times", "held by hand", "sun",
+    ),
+    "another plan, a sign forgotten, gon, mil or mrad": (
+        "plan of another session", "a sign forgotten", "angles in gon, mil or mrad",
+    ),
+    "samples held, out of order, of two clocks; a clock set; significant digits": (
+        "sampled and held", "packets out of order", "sensors on two clocks",
+        "clock set", "few significant digits",
+    ),
+    "two days, two devices or two mountings in one": (
+        "two days joined", "device exchanged", "device remounted",
+    ),
+    "high-passed, zeroed at stops, a dead band, sent on change, clipped in turns": (
+        "acc high-passed", "gyr zeroed at each stop", "dead band", "sent on change",
+        "gyr clipped in turns",
+    ),
 }  # fmt: skip
 """Rows of the table: what it is about, and its mistakes."""
 

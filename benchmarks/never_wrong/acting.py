@@ -11,7 +11,8 @@ Written apart from everything that estimates. Device axes, m/s^2 and rad/s:
     U += c e^(-t/T), W += d e^(-t/T)           a device that warms up
 
 Sway turns the base about its level axis by a sine, a kick by an angle that stays, and
-soft ground gives way by an angle that ends in e^(-t/T).
+soft ground gives way by an angle that ends in e^(-t/T). Vibration and sway may act in
+some spans of time alone.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 KICK_S = 0.3
-"""How long a kick takes, s."""
+"""How long a kick takes, and what begins or ends to act, s."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Acting:
     arm : m, along each axis of the device
     shaken, hum_hz : amplitude, m/s^2, and frequency of a vibration
     swaying, sway_hz : amplitude, rad, and frequency of the base
+    spans : start and end, s, of when these two act; always, where there is none
     filtered, delayed : s
     stays : m/s^2, what the last turn leaves
     acc_walk, gyr_walk : what biases wander by in 100 s
@@ -50,6 +52,7 @@ class Acting:
     hum_hz: float = 0.0
     swaying: float = 0.0
     sway_hz: float = 0.0
+    spans: tuple[tuple[float, float], ...] = ()
     filtered: float = 0.0
     delayed: float = 0.0
     stays: float = 0.0
@@ -66,21 +69,32 @@ class Acting:
     def tilted(self, t: Floats) -> tuple[Floats, Floats]:
         """Tilt of a base that sways, is kicked or sinks, rad; its rate, rad/s, (n,)."""
         phase = 2 * np.pi * self.sway_hz * t
+        here, coming = self._acts(t)
+        sway = self.swaying * np.sin(phase)
         rate = 2 * np.pi * self.sway_hz * self.swaying * np.cos(phase)
-        part = np.clip((t - self.kick_s) / KICK_S, 0.0, 1.0)
-        turned = self.kicked * (part - np.sin(2 * np.pi * part) / (2 * np.pi))
-        kick = self.kicked * (1 - np.cos(2 * np.pi * part)) / KICK_S
+        kick, kicking = _step(t, self.kick_s)
         left = np.exp(-t / self.sinks_s)
-        turned += self.sinking * (1 - left)
-        rate += self.sinking / self.sinks_s * left
-        return self.swaying * np.sin(phase) + turned, rate + kick
+        turned = here * sway + self.kicked * kick + self.sinking * (1 - left)
+        rate = here * rate + coming * sway + self.kicked * kicking
+        return turned, rate + self.sinking / self.sinks_s * left
+
+    def _acts(self, t: Floats) -> tuple[Floats, Floats]:
+        """How much vibration and sway act, 0 to 1, and its rate, 1/s, (n,) each."""
+        if not self.spans:
+            return np.ones_like(t), np.zeros_like(t)
+        here, coming = np.zeros((2, len(t)))
+        for ends in self.spans:
+            for sign, at in zip((1, -1), ends, strict=True):
+                value, rate = _step(t, at)
+                here, coming = here + sign * value, coming + sign * rate
+        return here, coming
 
     def felt(self, t: Floats, f: Floats, w: Floats) -> Floats:
         """The force where the accelerometers are, (n, 3)."""
         arm = np.array(self.arm)
         out: Floats = f + np.cross(np.gradient(w, t, axis=0), arm)
         out += np.cross(w, np.cross(w, arm))
-        hum = self.shaken * np.sin(2 * np.pi * self.hum_hz * t)
+        hum = self.shaken * np.sin(2 * np.pi * self.hum_hz * t) * self._acts(t)[0]
         out += hum[:, None] * np.array([0.6, 0.0, 0.8])
         return out
 
@@ -115,6 +129,13 @@ class Acting:
                 left = now
             last = here
         return acc, gyr
+
+
+def _step(t: Floats, at: float) -> tuple[Floats, Floats]:
+    """From 0 to 1 within `KICK_S` of an instant, s, and its rate, 1/s, (n,) each."""
+    part = np.clip((t - at) / KICK_S, 0.0, 1.0)
+    value = part - np.sin(2 * np.pi * part) / (2 * np.pi)
+    return value, (1 - np.cos(2 * np.pi * part)) / KICK_S
 
 
 def _filtered(values: Floats, t: Floats, constant: float) -> Floats:

@@ -1,12 +1,4 @@
-"""A bench, a device and an operator, drawn at random; what the device then puts out.
-
-Written apart from everything that estimates: base axes are east, down and north, the
-device is turned by alpha about z and then by beta about the turned x, and
-
-    U = b + K (A f_0),   f_0 = (0, -g, 0);   W = c + L (A w_0 + turning)
-
-in procedure axes, put into the device's by its mounting, with what `Device` adds.
-"""
+"""A bench, a device and an operator, drawn at random."""
 
 from __future__ import annotations
 
@@ -78,6 +70,9 @@ class Bench:
     imported : whether angles are unknown, and the session is no recalibration
     acting : what else acts
     grade : what the device is said to be
+    skew : rad by which the axes of the two joints are not square
+    creep, creeps_s : rad by which a joint goes too far in a turn, and T, s, of its way
+        back
 
     """
 
@@ -105,6 +100,9 @@ class Bench:
     imported: bool
     acting: Acting = Acting()
     grade: str = "tactical"
+    skew: float = 0.0
+    creep: float = 0.0
+    creeps_s: float = 1.0
 
     @property
     def angles(self) -> Floats:
@@ -193,87 +191,6 @@ def drawn(rng: np.random.Generator) -> Bench:
         grain=float(rng.choice([0.0, 0.0, 1e-3, 9.80665 / 4096])),
         imported=imported,
     )
-
-
-def turned(alpha: Floats, beta: Floats, vector: Floats) -> Floats:
-    """A vector of base axes in procedure axes, (n, 3)."""
-    x, y, z = np.moveaxis(np.broadcast_to(vector, (len(alpha), 3)), 1, 0)
-    east = np.cos(alpha) * x + np.sin(alpha) * y
-    down = np.cos(alpha) * y - np.sin(alpha) * x
-    return np.column_stack(
-        [
-            east,
-            np.cos(beta) * down + np.sin(beta) * z,
-            np.cos(beta) * z - np.sin(beta) * down,
-        ]
-    )
-
-
-def to_device(mounting: tuple[str, str, str], values: Floats) -> Floats:
-    """Components along procedure axes as components along the device's, (n, 3)."""
-    out = np.zeros_like(values)
-    for procedure, name in enumerate(mounting):
-        out[:, "xyz".index(name[1])] = values[:, procedure] * (
-            -1 if name[0] == "-" else 1
-        )
-    return out
-
-
-def recorded(bench: Bench, rng: np.random.Generator) -> Samples:
-    """What the device puts out."""
-    held = np.deg2rad(bench.angles) + bench.off
-    windows = bench.windows
-    t = np.arange(0.0, windows[-1, 1] + 2.0, 1 / bench.rate)
-    joints = np.empty((len(t), 2))
-    speed = np.zeros((len(t), 2))
-    joints[:] = held[0]
-    for i in range(1, len(held)):
-        # 0.7 s of rest on both sides, a raised cosine of speed between
-        a, b = windows[i - 1, 1] + 0.7, windows[i, 0] - 0.7
-        s = np.clip((t - a) / (b - a), 0, 1)
-        moved = held[i] - held[i - 1]
-        way = s - np.sin(2 * np.pi * s) / (2 * np.pi)
-        joints = np.where((s > 0)[:, None], held[i - 1] + way[:, None] * moved, joints)
-        rate = (1 - np.cos(2 * np.pi * s)) / (b - a) * ((s > 0) & (s < 1))
-        speed += rate[:, None] * moved
-    alpha, beta = joints.T
-    if bench.joints:
-        alpha, beta = alpha + bench.tilt[0], beta + bench.tilt[1]
-    sway, swing = bench.acting.tilted(t)
-    down = np.column_stack([np.zeros_like(t), np.cos(sway), np.sin(sway)])
-    f = turned(alpha, beta, _on_base(bench, -bench.gravity * down))
-    latitude, heading = np.deg2rad(bench.latitude), rng.uniform(0, 2 * np.pi)
-    north = EARTH * np.cos(latitude)
-    rates = np.tile([north * np.sin(heading), -EARTH * np.sin(latitude),
-                     north * np.cos(heading)], (len(t), 1))  # fmt: skip
-    rates[:, 0] += swing
-    w = turned(alpha, beta, _on_base(bench, rates))
-    w[:, 0] += speed[:, 1]
-    about_z = np.column_stack([np.zeros_like(beta), np.sin(beta), np.cos(beta)])
-    w += about_z * speed[:, :1]
-    f, w = to_device(bench.mounting, f), to_device(bench.mounting, w)
-    f = bench.acting.felt(t, f, w)
-    acc, gyr = bench.device.adds(t, f, w)
-    acc += bench.acc_bias + bench.acc_scale * f
-    gyr += bench.gyr_bias + bench.gyr_scale * w
-    for out, more in zip(
-        (acc, gyr), bench.acting.wanders(t, f, windows, rng), strict=True
-    ):
-        out += more
-    acc, gyr = bench.acting.passed(t, acc, gyr)
-    acc += rng.normal(0, bench.acc_noise, f.shape)
-    gyr += rng.normal(0, bench.gyr_noise, w.shape)
-    if bench.grain:
-        acc = np.round(acc / bench.grain) * bench.grain
-    return Samples(t, acc, gyr)
-
-
-def _on_base(bench: Bench, vectors: Floats) -> Floats:
-    """Vectors of level axes in those of the base, (n, 3)."""
-    if bench.joints:
-        return vectors
-    about_z, about_x = (np.full(len(vectors), angle) for angle in bench.tilt)
-    return turned(about_z, about_x, vectors)
 
 
 def wrongly_set(bench: Bench, off: Floats) -> Bench:

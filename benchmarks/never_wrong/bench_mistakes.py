@@ -5,17 +5,14 @@ Each takes a bench on which nothing was recorded yet, and spoils one thing of it
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from benchmarks.never_wrong.bench import Bench, wrongly_set
 from benchmarks.never_wrong.device import Device
-
-Rng = np.random.Generator
-Before = Callable[[Bench, Rng], Bench]
+from benchmarks.never_wrong.fixture_mistakes import OF_FIXTURE
+from benchmarks.never_wrong.written import Before, Rng, acting, log_uniform
 
 
 def _one(bench: Bench, rng: Rng) -> int:
@@ -86,72 +83,71 @@ def low_cost(bench: Bench, rng: Rng) -> Bench:
     )
 
 
-def _acting(bench: Bench, **sizes: Any) -> Bench:
-    return replace(bench, acting=replace(bench.acting, **sizes))
-
-
-def _size(rng: Rng, least: float, most: float) -> float:
-    """Any order of magnitude between two is as likely."""
-    return float(np.exp(rng.uniform(np.log(least), np.log(most))))
-
-
 def shaken(bench: Bench, rng: Rng) -> Bench:
     """The bench vibrates."""
-    return _acting(bench, shaken=_size(rng, 0.01, 1.0), hum_hz=_size(rng, 3, 80))
+    return acting(
+        bench, shaken=log_uniform(rng, 0.01, 1.0), hum_hz=log_uniform(rng, 3, 80)
+    )
 
 
 def swaying(bench: Bench, rng: Rng) -> Bench:
     """The bench sways, or a hand trembles."""
-    sway = float(np.deg2rad(_size(rng, 0.003, 0.3)))
-    return _acting(bench, swaying=sway, sway_hz=_size(rng, 0.2, 5))
+    sway = float(np.deg2rad(log_uniform(rng, 0.003, 0.3)))
+    return acting(bench, swaying=sway, sway_hz=log_uniform(rng, 0.2, 5))
 
 
 def filtered(bench: Bench, rng: Rng) -> Bench:
     """The outputs are behind a filter."""
-    return _acting(bench, filtered=_size(rng, 3e-3, 0.1))
+    return acting(bench, filtered=log_uniform(rng, 3e-3, 0.1))
 
 
 def delayed(bench: Bench, rng: Rng) -> Bench:
     """The gyroscopes are late."""
-    return _acting(bench, delayed=_size(rng, 2e-3, 0.05))
+    return acting(bench, delayed=log_uniform(rng, 2e-3, 0.05))
 
 
 def on_an_arm(bench: Bench, rng: Rng) -> Bench:
     """The device is not in the axes of the fixture."""
-    return _acting(bench, arm=tuple(rng.normal(0, 0.15, 3).tolist()))
+    return acting(bench, arm=tuple(rng.normal(0, 0.15, 3).tolist()))
 
 
 def stays(bench: Bench, rng: Rng) -> Bench:
     """Biases keep something of the last turn, 0.03 to 0.2 mg."""
-    return _acting(bench, stays=_size(rng, 3e-4, 2e-3))
+    return acting(bench, stays=log_uniform(rng, 3e-4, 2e-3))
 
 
 def wandering(bench: Bench, rng: Rng) -> Bench:
     """Biases wander by 0.01 to 0.2 mg and 0.2 to 10 deg/h in 100 s."""
-    walk = {"acc_walk": _size(rng, 1e-4, 2e-3), "gyr_walk": _size(rng, 1e-6, 5e-5)}
-    return _acting(bench, **walk)
+    walk = {
+        "acc_walk": log_uniform(rng, 1e-4, 2e-3),
+        "gyr_walk": log_uniform(rng, 1e-6, 5e-5),
+    }
+    return acting(bench, **walk)
 
 
 def warming(bench: Bench, rng: Rng) -> Bench:
     """The device was switched on just before; biases come to rest in 30 to 600 s."""
-    cold = {"acc_cold": _size(rng, 1e-3, 0.1), "gyr_cold": _size(rng, 1e-5, 2e-3)}
-    return _acting(bench, warming=_size(rng, 30, 600), **cold)
+    cold = {
+        "acc_cold": log_uniform(rng, 1e-3, 0.1),
+        "gyr_cold": log_uniform(rng, 1e-5, 2e-3),
+    }
+    return acting(bench, warming=log_uniform(rng, 30, 600), **cold)
 
 
 def kicked(bench: Bench, rng: Rng) -> Bench:
     """Somebody kicks the table in a position: it stands 0.02 to 1 degrees otherwise."""
     start, end = bench.windows[_one(bench, rng)]
-    size = float(np.deg2rad(_size(rng, 0.02, 1.0))) * float(rng.choice([-1, 1]))
-    return _acting(bench, kicked=size, kick_s=float(rng.uniform(start, end)))
+    size = float(np.deg2rad(log_uniform(rng, 0.02, 1.0))) * float(rng.choice([-1, 1]))
+    return acting(bench, kicked=size, kick_s=float(rng.uniform(start, end)))
 
 
 def sinking(bench: Bench, rng: Rng) -> Bench:
     """Soft ground gives way by 0.02 to 0.5 degrees, in 50 to 500 s."""
-    size = float(np.deg2rad(_size(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
-    return _acting(bench, sinking=size, sinks_s=_size(rng, 50, 500))
+    size = float(np.deg2rad(log_uniform(rng, 0.02, 0.5))) * float(rng.choice([-1, 1]))
+    return acting(bench, sinking=size, sinks_s=log_uniform(rng, 50, 500))
 
 
-BEFORE: dict[str, Before] = {
+BEFORE: dict[str, Before] = OF_FIXTURE | {
     "a repeated angle off": repeated_angle,
     "gauge long": gauge_long,
     "a position off": position_off,

@@ -55,6 +55,7 @@ class Device:
     felt : (3, 3) g-sensitivity of the gyroscopes
     warm : (3, 3) acc bias, acc scale, gyr bias, each by axis and K
     warming : K from the start to long after
+    heated, heated_s : K that the sun or a heater adds at last, and from when, s
 
     """
 
@@ -65,6 +66,8 @@ class Device:
     felt: Floats = field(repr=False)
     warm: Floats = field(repr=False)
     warming: float
+    heated: float = 0.0
+    heated_s: float = 0.0
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Device:
@@ -99,7 +102,8 @@ class Device:
     def warmth(self, t: Floats) -> Floats:
         """K by which it is warmer than at the start, (n,)."""
         out: Floats = self.warming * (1 - np.exp(-t / LAG))
-        return out
+        since = np.maximum(t - self.heated_s, 0.0)
+        return out + self.heated * (1 - np.exp(-since / LAG))
 
     def adds(self, t: Floats, f: Floats, w: Floats) -> tuple[Floats, Floats]:
         """What it puts out beside bias and scale factor, (n, 3) each."""

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.never_wrong.bench import Bench, Floats, Samples
-from benchmarks.never_wrong.written import After, Rng, Written, interrupted
+from benchmarks.never_wrong.written import (
+    After,
+    Rng,
+    Written,
+    interrupted,
+    log_uniform,
+)
 
 
 def samples_lost(written: Written, bench: Bench, rng: Rng) -> Written:
@@ -89,6 +95,63 @@ def coarse_time(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, t=t))
 
 
+def few_significant(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Values are written with three or four significant digits, or in 16 bits."""
+    s, digits = written.samples, int(rng.integers(2, 5))
+
+    def short(values: Floats) -> Floats:
+        if digits == 2:
+            return values.astype(np.float16).astype(float)
+        size = np.floor(np.log10(np.maximum(np.abs(values), 1e-12)))
+        grain = 10.0 ** (size - digits + 1)
+        return np.round(values / grain) * grain
+
+    return replace(written, samples=Samples(s.t, short(s.acc), short(s.gyr)))
+
+
+# -- of clocks and order
+
+
+def sampled_and_held(written: Written, bench: Bench, rng: Rng) -> Written:
+    """A triad, or both, are slower than the program, which writes the newest again."""
+    s, share = written.samples, float(rng.uniform(0.1, 0.95))
+    newest = np.floor(np.arange(len(s.t)) * share + 1e-9) / share
+    at, slow = np.ceil(newest - 1e-9).astype(int), int(rng.integers(3))
+    acc = s.acc[at] if slow != 1 else s.acc
+    gyr = s.gyr[at] if slow != 2 else s.gyr
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def two_clocks(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Rates have a clock of their own: 0.05 to 5 s off, and 10 to 100 ppm fast."""
+    s, (early, slow) = written.samples, rng.choice([-1, 1], 2)
+    t = s.t * (1 + slow * log_uniform(rng, 1e-5, 1e-4))
+    t += early * log_uniform(rng, 0.05, 5)
+    at = np.clip(np.searchsorted(s.t, t), 0, len(s.t) - 1)
+    return replace(written, samples=replace(s, gyr=s.gyr[at]))
+
+
+def out_of_order(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Packets of two to 50 samples come after the next, with their times or without."""
+    s, long = written.samples, int(rng.integers(2, 51))
+    order = np.arange(len(s.t))
+    count = (len(order) - 2 * long) // (2 * long)
+    late = np.flatnonzero(rng.random(count) < log_uniform(rng, 1e-3, 0.1))
+    for start in 2 * long * late:
+        some = slice(int(start), int(start) + 2 * long)
+        order[some] = np.roll(order[some], long)
+    t = s.t[order] if rng.integers(2) else s.t
+    return replace(written, samples=Samples(t, s.acc[order], s.gyr[order]))
+
+
+def clock_set(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The computer's clock is set forward or back by 0.02 to 20 s, or by an hour."""
+    s, after = written.samples, float(rng.uniform(*written.samples.t[[0, -1]]))
+    size = log_uniform(rng, 0.02, 20) if rng.random() < 0.8 else 3600.0
+    late = (s.t > after) * size * rng.choice([-1, 1])
+    return replace(written, samples=replace(s, t=s.t + late))
+
+
 OF_FILE: dict[str, After] = {
     "samples lost, time counted": samples_lost,
     "a gap between positions": link_failed,
@@ -98,4 +161,9 @@ OF_FILE: dict[str, After] = {
     "resampled": resampled,
     "rates with few digits": few_digits,
     "coarse times": coarse_time,
+    "few significant digits": few_significant,
+    "sampled and held": sampled_and_held,
+    "sensors on two clocks": two_clocks,
+    "packets out of order": out_of_order,
+    "clock set": clock_set,
 }

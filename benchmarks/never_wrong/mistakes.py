@@ -9,11 +9,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
-from benchmarks.never_wrong.bench import EARTH, Bench, Samples, recorded
+from benchmarks.never_wrong.bench import EARTH, Bench, Samples
 from benchmarks.never_wrong.file_mistakes import OF_FILE
+from benchmarks.never_wrong.joined_mistakes import OF_TWO
+from benchmarks.never_wrong.recording import recorded
 from benchmarks.never_wrong.said_mistakes import SAID
-from benchmarks.never_wrong.written import After, Rng, Written, interrupted, tables
+from benchmarks.never_wrong.written import (
+    After,
+    Rng,
+    Written,
+    interrupted,
+    log_uniform,
+    tables,
+)
 
 # -- of units, wiring and order
 
@@ -159,9 +169,63 @@ def clipped(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=replace(s, acc=np.clip(s.acc, -most, most)))
 
 
+def acc_high_passed(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The device takes what lasts 0.5 to 3000 s out of its accelerations."""
+    s, keep = written.samples, np.exp(-1 / bench.rate / log_uniform(rng, 0.5, 3000))
+    acc = lfilter([keep, -keep], [1.0, -keep], s.acc, axis=0)
+    return replace(written, samples=replace(s, acc=acc))
+
+
+def gyr_zeroed(written: Written, bench: Bench, rng: Rng) -> Written:
+    """At each stop the device takes the mean of 1 to 3 s for its bias till the next."""
+    s, long = written.samples, float(rng.uniform(1, 3))
+    bias = s.gyr[s.within(0.0, long)].mean(axis=0)  # as it was found before, at rest
+    gyr = s.gyr - bias
+    for start in bench.windows[1:, 0] - 0.5:
+        found = s.gyr[s.within(start, start + long)]
+        if len(found):
+            after = s.t > start + long
+            gyr[after] = s.gyr[after] - found.mean(axis=0)
+    return replace(written, samples=replace(s, gyr=gyr))
+
+
+def dead_band(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Small outputs of a triad are 0: below 1 mm/s^2 to 1 m/s^2, 2 deg/h to 3 deg/s."""
+    s = written.samples
+    if rng.integers(2):
+        some = np.abs(s.acc) < log_uniform(rng, 1e-3, 1.0)
+        return replace(written, samples=replace(s, acc=np.where(some, 0.0, s.acc)))
+    some = np.abs(s.gyr) < log_uniform(rng, 1e-5, 5e-2)
+    return replace(written, samples=replace(s, gyr=np.where(some, 0.0, s.gyr)))
+
+
+def sent_on_change(written: Written, bench: Bench, rng: Rng) -> Written:
+    """An output is sent when it changed by 0.5 to 20 times its noise, else repeated."""
+    s, bar = written.samples, log_uniform(rng, 0.5, 20)
+    six = np.hstack([s.acc / bench.acc_noise, s.gyr / bench.gyr_noise])
+    at = np.zeros(six.shape, int)
+    for c, column in enumerate(six.T):
+        last = 0
+        for i, value in enumerate(column):
+            if abs(value - column[last]) > bar:
+                last = i
+            at[i, c] = last
+    acc = np.take_along_axis(s.acc, at[:, :3], 0)
+    gyr = np.take_along_axis(s.gyr, at[:, 3:], 0)
+    return replace(written, samples=Samples(s.t, acc, gyr))
+
+
+def gyr_clipped(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The full scale of the gyroscopes is 0.3 to 1 of the fastest turn."""
+    s = written.samples
+    most = np.abs(s.gyr).max() * rng.uniform(0.3, 1)
+    return replace(written, samples=replace(s, gyr=np.clip(s.gyr, -most, most)))
+
+
 AFTER: dict[str, After] = (
     SAID
     | OF_FILE
+    | OF_TWO
     | {
         "g labelled m/s²": acc_in_g,
         "deg/s labelled rad/s": gyr_in_deg,
@@ -180,6 +244,11 @@ AFTER: dict[str, After] = (
         "device restarted": restarted,
         "an output stuck": stuck,
         "wrapped around": wrapped,
+        "acc high-passed": acc_high_passed,
+        "gyr zeroed at each stop": gyr_zeroed,
+        "dead band": dead_band,
+        "sent on change": sent_on_change,
+        "gyr clipped in turns": gyr_clipped,
     }
 )
 

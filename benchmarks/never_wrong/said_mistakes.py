@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.never_wrong.bench import Bench
+from benchmarks.never_wrong.bench import SETS, Bench
 from benchmarks.never_wrong.written import After, Rng, Written
 
 ANGLES = ("alpha_deg", "beta_deg")
@@ -113,6 +113,41 @@ def angles_in_radians(written: Written, bench: Bench, rng: Rng) -> Written:
     return _saying(written, rows)
 
 
+def angles_in_other_units(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Angles are written in gon, in mil (6400 to a turn) or in mrad."""
+    rows = _rows(written)
+    turn = float(rng.choice([400.0, 6400.0, 2e3 * np.pi]))
+    for row in rows[: bench.stated]:
+        row |= {key: row[key] * turn / 360 for key in ANGLES}
+    return _saying(written, rows)
+
+
+def sign_forgotten(written: Written, bench: Bench, rng: Rng) -> Written:
+    """An angle of one position is written with the other sign."""
+    rows = _rows(written)
+    places = [(row, k) for row in rows[: bench.stated] for k in ANGLES if row[k]]
+    if places:
+        row, key = places[int(rng.integers(len(places)))]
+        row[key] *= -1.0
+    return _saying(written, rows)
+
+
+def other_plan(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The plan is another one: from the last to the first, from the second, or other.
+
+    Its positions are as many.
+    """
+    rows, count = _rows(written), bench.stated
+    plans = [name for name, held in SETS.items() if len(held) >= max(count, 1)]
+    other = np.array(SETS[str(rng.choice(plans))], float)[:count]
+    held = bench.angles[:count]
+    kind = int(rng.integers(3))
+    angles = (held[::-1], np.roll(held, -1, axis=0), other)[kind]
+    for row, pair in zip(rows, angles, strict=False):
+        row |= dict(zip(ANGLES, pair.tolist(), strict=True))
+    return _saying(written, rows)
+
+
 def one_forgotten(written: Written, bench: Bench, rng: Rng) -> Written:
     """A position of the plan was not taken: windows have the angles before theirs."""
     rows = _rows(written)
@@ -148,6 +183,9 @@ SAID: dict[str, After] = {
     "angles exchanged": angles_exchanged,
     "an angle counted the other way": angle_reversed,
     "angles in radians": angles_in_radians,
+    "angles in gon, mil or mrad": angles_in_other_units,
+    "a sign forgotten": sign_forgotten,
+    "plan of another session": other_plan,
     "a position forgotten": one_forgotten,
     "windows begun early": begun_early,
     "windows ended late": ended_late,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,21 @@ class Written:
     ending: str = "parquet"
 
 
+Before = Callable[[Bench, Rng], Bench]
+"""A mistake that is made before anything is recorded."""
+
 After = Callable[[Written, Bench, Rng], Written]
 """A mistake that is made once something was recorded."""
+
+
+def log_uniform(rng: Rng, least: float, most: float) -> float:
+    """Any order of magnitude between two is as likely."""
+    return float(np.exp(rng.uniform(np.log(least), np.log(most))))
+
+
+def acting(bench: Bench, **sizes: Any) -> Bench:
+    """A bench on which something else acts."""
+    return replace(bench, acting=replace(bench.acting, **sizes))
 
 
 def interrupted(s: Samples, bench: Bench, rng: Rng) -> tuple[Samples, float]:

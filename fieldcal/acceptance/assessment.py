@@ -17,6 +17,7 @@ import numpy as np
 
 from fieldcal.acceptance.centred import biases_taken_out
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
+from fieldcal.acceptance.jump import jumps_too_far
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.temperature import since_last
 from fieldcal.acceptance.verification import Verification, planned, verify
@@ -97,6 +98,7 @@ def unassessed(
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
     wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
+    wrong += [jumps_too_far(found, limits)]
     wrong += _taken_out(found, session, still, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))

@@ -20,6 +20,7 @@ from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.acceptance.growth import TIMES, Growth, growth
 from fieldcal.acceptance.harmless import harmless
+from fieldcal.acceptance.jump import jumps_too_far
 from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
@@ -101,6 +102,7 @@ def decide(
         *_odd_positions(found, verification.ok is True),
         *_gyroscopes(found, limits),
         *_turns(found, limits),
+        *_jump(found, limits),
         *_angles(found, about, limits, circumstances),
         *relies_on_factory(found, about, limits),
         *check_uncertainty(found, about, limits, circumstances.windows),
@@ -231,6 +233,12 @@ def _turns(found: Calibration, limits: GradeLimits) -> list[Check]:
     """Whether the gyroscopes were turned as the positions say."""
     apart = turns_disagree(found, limits)
     return [Check("turns", False, apart)] if apart else []
+
+
+def _jump(found: Calibration, limits: GradeLimits) -> list[Check]:
+    """Whether it is one device all the time."""
+    far = jumps_too_far(found, limits)
+    return [Check("jump", False, far)] if far else []
 
 
 def _angles(

@@ -1,4 +1,4 @@
-"""How a device rounds, where nobody knows: to the nearest, toward zero, or down.
+"""How a device rounds, where nobody knows, and what it sets to zero.
 
 Values on a grid of steps q are right on average where they are rounded to the nearest;
 cut toward zero, as a conversion to integers does, they are q / 2 too small in size;
@@ -12,6 +12,9 @@ zero for n0 samples and on its neighbours for n1 in the mean, and
 over all passes of all outputs, where S is how unsteadily a turn passes. The device has
 one firmware, so it is one mode for all.
 
+A dead band sets what is smaller than d to zero, d > q: the output is zero often, and
+has no other value below d. A mean of less than 2 d is off by d / sqrt(3) or less.
+
 What values that were rounded down are too small by is added to the biases' variance;
 what values cut toward zero are hangs on the signs of the means, and is in the model
 (`solve.given`).
@@ -20,7 +23,7 @@ what values cut toward zero are hangs on the signs of the means, and is in the m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +44,7 @@ EVEN = 2.0
 comes to rest beside zero, or on it, does not pass it."""
 
 PASSED = 2
-"""Samples of each neighbour from which a pass counts."""
+"""Samples of each neighbour from which a pass counts, and zeros of a dead band."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +55,13 @@ class RoundingMode:
     ----------
     step : (3,) m/s^2; 0 where there is none, or somebody knows how it is rounded
     cut : probability that values were cut toward zero
+    dead : (3,) m/s^2 below which values are zero; 0 where there is no such band
 
     """
 
     step: Array
     cut: float
+    dead: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def toward_zero(self) -> Array:
@@ -72,9 +77,10 @@ class RoundingMode:
         return out
 
     def around_zero(self, mean: Array) -> Array:
-        """Variance of a mean that is zero because values were cut, (n, 3)."""
-        there = np.abs(np.nan_to_num(mean)) < self.step / 2
-        out: Array = np.where(there, self.cut * self.step**2 / 3, 0.0)
+        """Variance of a mean of which values were cut or set to zero, (n, 3)."""
+        size = np.abs(np.nan_to_num(mean))
+        cut = np.where(size < self.step / 2, self.cut * self.step**2 / 3, 0.0)
+        out: Array = cut + np.where(size < 2 * self.dead, self.dead**2 / 3, 0.0)
         return out
 
 
@@ -89,7 +95,22 @@ def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
         if q > 0
         for ratio in passes(np.rint(values[np.isfinite(values)] / q).astype(np.intp))
     ]
-    return RoundingMode(step, cut_toward_zero(shown))
+    least = np.maximum(seen, grain.step[:3])
+    return RoundingMode(step, cut_toward_zero(shown), dead_bands(acc, least))
+
+
+def dead_bands(acc: Array, step: Array) -> Array:
+    """What is the smallest value but zero of outputs with a dead band, else 0, (3,).
+
+    Zero on all axes is no output: such samples were lost.
+    """
+    some = np.isfinite(acc).all(axis=1) & (acc != 0).any(axis=1)
+    size = np.abs(acc[some])
+    zeros = np.count_nonzero(size == 0, axis=0)
+    least = np.where(size > 0, size, np.inf).min(axis=0, initial=np.inf)
+    there = (zeros >= PASSED) & np.isfinite(least) & (least > 1.5 * step)
+    out: Array = np.where(there, least, 0.0)
+    return out
 
 
 def with_rounding(found: Calibration, mode: RoundingMode) -> Calibration:

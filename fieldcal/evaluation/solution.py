@@ -21,6 +21,7 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
     angles_set,
@@ -238,7 +239,8 @@ def solved_as(
         return found
     if others:
         found = replace(found, warnings=(OTHER_ANGLES, *found.warnings), good=False)
-    return misread(shown.prepared, with_not_carried(found, uncarried(shown, found)))
+    found = with_not_carried(with_jump(found, shown), uncarried(shown, found))
+    return misread(shown.prepared, found)
 
 
 def _as_shown(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,8 +13,8 @@ from fieldcal.acceptance.centred import (
     biases_taken_out,
     centred,
     centred_and_rounded,
-    tracked,
 )
+from fieldcal.acceptance.tracked import tracked
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
@@ -81,6 +82,45 @@ def test_a_bias_that_is_tracked_leaves_nothing() -> None:
         chance, what = tracked(windows, block, REPEAT, LEAST)
         assert chance < LEAST and "18 means" in what
     assert tracked(windows[:1], block, REPEAT, LEAST) == (1.0, "")
+
+
+def zeroed_at_rest(
+    rng: np.random.Generator, bias: float, seconds: float
+) -> tuple[list[Average], Block]:
+    """The same where a device takes out the mean of its first seconds in each window.
+
+    Before, it takes out what it found in the window before.
+    """
+    windows, block = at_rest(rng, bias, earth=EARTH)
+    count, before = round(seconds * RATE), np.full(3, bias)
+    for k in range(6):
+        one = block.gyr[k * COUNT : (k + 1) * COUNT]
+        found = one[:count].mean(axis=0)
+        one[:count] -= before
+        one[count:] -= found
+        before = found
+    return windows, block
+
+
+@pytest.mark.parametrize("seconds", [0.8, 1.3, 3.0])
+def test_a_bias_that_is_taken_out_at_each_stop_leaves_noise(seconds: float) -> None:
+    """Its means scatter by more than those of white noise, and are about zero."""
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        windows, block = zeroed_at_rest(rng, -7e-3, seconds)
+        chance, what = tracked(windows, block, REPEAT, LEAST)
+        assert chance < LEAST and "18 means" in what
+
+
+def test_windows_too_short_or_too_coarse_show_no_stop() -> None:
+    """Of 0.2 s, or of samples so rare that the first mean is of more than a second."""
+    rng = np.random.default_rng(6)
+    windows, block = at_rest(rng, -7e-3, 1.0)
+    short = [replace(w, end=w.start + 0.2) for w in windows]
+    slow = Block.of(block.t * 50, block.acc, block.gyr)
+    long = [replace(w, start=50 * w.start, end=50 * w.end) for w in windows]
+    for some, recorded in ((short, block), (long, slow)):
+        assert 0 <= tracked(some, recorded, REPEAT, LEAST)[0] <= 1
 
 
 def test_a_recording_without_its_mean() -> None:

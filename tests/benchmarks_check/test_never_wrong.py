@@ -66,12 +66,49 @@ def test_after_a_restart_what_no_position_shows_again_is_uncertain(
 
 
 @pytest.mark.thorough
+def test_a_jump_that_only_the_other_triad_shows_is_uncertain(tmp_path: Path) -> None:
+    """31.7 standard uncertainties: a face without angles is all that follows."""
+    found = of(tmp_path / "five", 98_170_003, "two days joined")
+    assert not found.go and found.off < WRONG
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("seed", "mistake", "caught"),
+    [
+        (98_180_007, "device exchanged", "jump"),  # 28.8 of a scale factor
+        (98_210_007, "gyr zeroed at each stop", "the run"),  # 739 of a bias
+    ],
+)
+def test_what_a_device_became_or_took_out_is_no_go(
+    tmp_path: Path, seed: int, mistake: str, caught: str
+) -> None:
+    found = of(tmp_path / "s", seed, mistake)
+    assert not found.go and found.caught == caught
+
+
+@pytest.mark.parametrize(
+    ("seed", "mistake"),
+    [
+        (98_220_001, "dead band"),
+        pytest.param(98_230_000, "sent on change", marks=pytest.mark.thorough),
+    ],
+)
+def test_faces_of_which_no_output_tells_anything_are_no_fault(
+    tmp_path: Path, seed: int, mistake: str
+) -> None:
+    """`solve` broke on such a session: nothing in it determines how a face lay."""
+    assert of(tmp_path / "two", seed, mistake).caught != "exit 70"
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "mistake", "was"),
     [
         (90_000_018, (), 3.5),  # a warm-up that g-sensitivity took in
         (90_000_036, (), 4.3),  # a kink at zero beside a K2 that is determined
         (92_004_008, ("sway",), 3.6),  # attitudes at the ends of turns
+        (98_220_007, ("dead band",), 6.0),  # means of values that were set to zero
     ],
 )
 def test_what_is_off_is_in_the_uncertainties(

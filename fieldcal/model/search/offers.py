@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Cause
-from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.dictionary import AlikeGroups, Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
 from fieldcal.model.evidence.sets import Set, Sets, chances
 from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member, Sizes
@@ -47,7 +47,7 @@ WIDE = 30
 """Columns of a group from which its eigenvalues cost more than to look them up."""
 
 LEAST = 0.5
-"""Gain of ln L below which an offer is none."""
+"""Gain of ln L below which an offer is none, unless it is likelier than not anyway."""
 
 NEAR = 12.0
 """How far an offer may be behind to be followed, ln: what is further no pair makes up
@@ -155,7 +155,7 @@ class Offers(Sets):
             profile = gain + DENSITY
             size = profile.argmax(axis=2)
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
-            level, number = np.nonzero(taken >= LEAST)
+            level, number = np.nonzero(taken >= LEAST - _likelier(alike, apart))
             evidence = np.logaddexp.reduce(profile[level, number], axis=1)
             evidence += share[at[number]]
             for i, shares in apart.items():
@@ -302,6 +302,19 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
+
+
+def _likelier(alike: AlikeGroups, apart: dict[int, Array]) -> Array:
+    """Odds of what is likelier there than not before the rows are seen, ln, (m,).
+
+    What begins in one triad where the device was off does so in the other one, whether
+    or not rows show it; 0 of everything else.
+    """
+    out = np.zeros(len(alike.cause))
+    for i, shares in apart.items():
+        some = alike.cause == i
+        out[some] = np.maximum(shares[alike.variant[some]], 0.0)
+    return out
 
 
 def _offered(there: Set, score: float, less: Less, best: Best) -> list[Offer]:

@@ -94,11 +94,12 @@ class Fitted:
 def whole(state: Eliminated, dictionary: Dictionary) -> Array:
     """Estimates of a set as values of every column of the dictionary, (k,).
 
-    Turns of positions whose orientation nobody knows are those that fit each best.
+    Turns of positions whose orientation nobody knows are those that fit each best; none
+    where no output there says anything of them.
     """
     out = np.zeros(dictionary.width)
     np.add.at(out, state.columns, state.estimate)
-    if dictionary.free.any():
+    if dictionary.free.any() and state.rows.root.size:
         at = state.rows.gram.index[state.columns]
         left = state.rows.off - state.rows.white[:, at] @ state.estimate
         left = left.reshape(-1, 6)

@@ -134,6 +134,24 @@ def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> 
     assert ACC.expecting([]) is ACC
 
 
+@pytest.mark.parametrize("off", [True, False], ids=["off", "on"])
+def test_what_no_row_shows_of_a_restart_is_offered_all_the_same(off: bool) -> None:
+    """Rows without anything: the likelihood gains nothing, and the odds are 20."""
+    session = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr"))
+    d = session.dictionary
+    d.shown = np.ones(d.width, dtype=bool)
+    d.expected_within([(100.0, 160.0)] if off else [])
+    acc, gyr = d.causes
+    search = session.search(np.zeros((len(d.x), 6)))
+    there = search.evaluated(((gyr, gyr.variants[-1]),))
+    found = {o.member[0].key: o for o in search.offers(there)}
+    assert bool(acc.expected) == off == (acc.key in found)
+    if off:
+        offer = found[acc.key]
+        assert offer.member[1] in acc.expected
+        assert 0 < offer.score - there.score < np.log(priors.BOTH_RESTART)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -> None:
     rng, x = np.random.default_rng(seed), JUMPS.dictionary.x

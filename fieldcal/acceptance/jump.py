@@ -1,0 +1,41 @@
+"""Whether biases jump within a session by more than those of one device do.
+
+A device that was switched off in between has the biases of another run. Those of two
+runs differ, with a standard deviation s_r from run to run and an uncertainty s, by
+
+    chi2 = sum over biases of jump^2 / (2 s_r^2 + s^2),   P(chi2 or more)          (1)
+
+and more than that is another device, or one that was damaged: its scale factors are
+others as well, which positions before and after the jump share in the fit.
+"""
+
+from __future__ import annotations
+
+from fieldcal.calibration import Calibration
+from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import group_of
+from fieldcal.core.chances import chi2_tail
+
+
+def jumps_too_far(found: Calibration, limits: GradeLimits) -> str:
+    """Sentence if biases jump by more than from run to run; else empty."""
+    jump = found.info.get("jump")
+    if not jump:
+        return ""
+    far = {}
+    for name, (value, sigma) in jump["bias"].items():
+        repeat = limits.repeat(group_of(name))
+        if repeat is not None:
+            far[name] = value**2 / (2.0 * repeat**2 + sigma**2)  # (1)
+    chi2 = sum(far.values())
+    if not far or chi2_tail(chi2, len(far)) >= limits.fit_chance:
+        return ""
+    name = max(far, key=lambda n: far[n])
+    value, sigma = jump["bias"][name]
+    unit = "m/s²" if name.startswith("acc") else "rad/s"
+    return (
+        f"at {jump['at_s']:.0f} s of device time the biases jump by more than those of"
+        f" one device do from run to run ({name} by {value:+.2g} ± {sigma:.1g} {unit},"
+        f" χ² = {chi2:.0f} of {len(far)} biases): another device was put in its place,"
+        " or it was damaged; record all positions of one device"
+    )

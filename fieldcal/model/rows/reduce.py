@@ -119,9 +119,7 @@ class RowSource:
         return rate_of(self.block)
 
 
-def reduce(
-    source: RowSource, whole: bool = False, level: Array | None = None
-) -> Rows:
+def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -> Rows:
     """Cut the windows into blocks and average them.
 
     Parameters

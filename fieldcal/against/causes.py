@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.against.joint import Relation, apart, as_large, both, likeliest, weighed
+from fieldcal.against.joint import (
+    Relation,
+    apart,
+    as_large,
+    both,
+    likeliest,
+    proportional,
+    weighed,
+)
 from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import Side
@@ -60,14 +68,17 @@ def _relation(pairing: Pairing, key: str) -> tuple[Relation, float]:
     real, sim = pairing.asked
     one, two = real.told(key), sim.told(key)
     member = real.member(key) or sim.member(key)
-    alike: float | None = None
-    if one and two and member and member[0].kind in ("random", "unknown"):
-        alike = as_large(one, two)
+    alike = scaled = None
+    if one and two and member:
+        if member[0].kind in ("random", "unknown"):
+            alike = as_large(one, two)
+        else:
+            scaled = proportional(one, two)
     if pairs := pairing.with_shape_of(key):
         told = [(a.told(key), b.told(key)) for a, b in pairs]
         alike = max(both(a, b) for a, b in told if a is not None and b is not None)
     chance = member[0].chance if member is not None else CHANCE
-    found = weighed(one, two, chance, alike)
+    found = weighed(one, two, chance, alike, scaled)
     differ = apart(found)
     if differ < thresholds.NAMED:
         none: list[Relation] = ["same", "neither"]

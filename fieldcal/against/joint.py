@@ -10,7 +10,14 @@ effect u = v T z with p(v),
     another in each   the sum of (1) and (2)                                        (4)
     in neither        0                                                             (5)
 
-Of what is random, u is another in each anyway, and the same is v: then (3) is
+In (4) the two may have nothing to do with each other, or the simulator has the same
+but too weak or too strong: u_s = c u_r. u is then known of the one that shows more, and
+the other tells c alone,
+
+    ln int p(v) exp gain(v; d' M_s d, d' q_s) dv,    d along (1 + M_r)^-1 q_r       (7)
+
+Both are as likely. Of what is random, u is another in each anyway, and the same is v:
+then (3) is
 
     ln int p(v) exp [gain(v; M_r, q_r) + gain(v; M_s, q_s)] dv                      (6)
 
@@ -63,10 +70,14 @@ class EffectTold:
     @property
     def gain(self) -> Array:
         """Ln of the evidence over sizes v, brought to what it is in all."""
-        found = gains(self.inner, self.pull, self.own)
+        return gains(self.inner, self.pull, self.own) + self.shift
+
+    @property
+    def shift(self) -> float:
+        """What is to be added to evidence by (1) to have that which is known better."""
         if self.evidence is None:
-            return found
-        return found + (self.evidence - _over_sizes(found))
+            return 0.0
+        return self.evidence - _over_sizes(gains(self.inner, self.pull, self.own))
 
     @property
     def shows(self) -> bool:
@@ -79,7 +90,11 @@ def _over_sizes(gain: Array) -> float:
 
 
 def weighed(
-    real: EffectTold | None, sim: EffectTold | None, chance: float, alike: float | None
+    real: EffectTold | None,
+    sim: EffectTold | None,
+    chance: float,
+    alike: float | None,
+    scaled: float | None = None,
 ) -> dict[Relation, float]:
     """Probability of each relation between two sessions as to one effect.
 
@@ -88,6 +103,7 @@ def weighed(
     real, sim : what each says; None where it cannot have it
     chance : that a device has the effect
     alike : ln evidence of the same in both (3), if it is not that of `real` and `sim`
+    scaled : that of one of them times a number (7), if it has a course
 
     """
     one, two = ((None if t is None else t.gain) for t in (real, sim))
@@ -99,7 +115,10 @@ def weighed(
     if two is not None:
         score["simulator"] = alone + _over_sizes(two)
     if one is not None and two is not None and real and sim:
-        score["other"] = half + _over_sizes(one) + _over_sizes(two)
+        other = _over_sizes(one) + _over_sizes(two)  # (4)
+        if scaled is not None:
+            other = float(np.logaddexp(other, scaled) - np.log(2))
+        score["other"] = half + other
         score["same"] = half + (both(real, sim) if alike is None else alike)
     total = np.logaddexp.reduce(np.array(list(score.values())))
     return {name: float(np.exp(s - total)) for name, s in score.items()}
@@ -110,12 +129,22 @@ def both(real: EffectTold, sim: EffectTold) -> float:
     if real.inner.shape != sim.inner.shape:
         return -np.inf
     there = gains(real.inner + sim.inner, real.pull + sim.pull, real.own + sim.own)
-    shift = sum(
-        0.0 if t.evidence is None
-        else t.evidence - _over_sizes(gains(t.inner, t.pull, t.own))
-        for t in (real, sim)
-    )  # fmt: skip
-    return _over_sizes(there) + shift
+    return _over_sizes(there) + real.shift + sim.shift
+
+
+def proportional(real: EffectTold, sim: EffectTold) -> float | None:
+    """Ln evidence of an effect in one, and of some times as much in the other (7)."""
+    if real.inner.shape != sim.inner.shape:
+        return None
+    known, other = sorted((real, sim), key=lambda t: -_over_sizes(t.gain))
+    course = np.linalg.solve(known.inner + np.eye(len(known.pull)), known.pull)
+    size = float(np.linalg.norm(course))
+    if size == 0:
+        return None
+    along = course / size
+    inner, pull = along @ other.inner @ along, along @ other.pull
+    times = gains(np.array([[inner]]), np.array([pull]), other.own)
+    return _over_sizes(known.gain) + _over_sizes(times) + other.shift
 
 
 def as_large(real: EffectTold, sim: EffectTold) -> float:

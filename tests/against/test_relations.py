@@ -10,6 +10,7 @@ from fieldcal.against.joint import (
     both,
     differs,
     likeliest,
+    proportional,
     weighed,
 )
 from fieldcal.against.prediction import unsure_squares
@@ -77,6 +78,36 @@ def test_who_has_it(
     found = weighed(one, two, 0.01, None)
     assert sum(found.values()) == pytest.approx(1.0)
     assert apart(found) > 0.99 and likeliest(found) == expected
+
+
+def test_the_same_too_weak_is_one_number_along_what_the_other_shows() -> None:
+    course = np.linalg.solve(
+        np.eye(2) + REAL[0].T @ REAL[0] / SIGMA**2, REAL[0].T @ REAL[1] / SIGMA**2
+    )
+    column = (SIM[0] @ course / np.linalg.norm(course))[:, None]
+    sizes = priors.SIZES
+    expected = over_sizes([density(*REAL, v) for v in sizes]) + over_sizes(
+        [density(column, SIM[1], v) for v in sizes]
+    )
+    for pair in ((told(*REAL), told(*SIM)), (told(*SIM), told(*REAL))):
+        assert proportional(*pair) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_simulator_that_has_some_of_it_is_told_from_one_without() -> None:
+    """Of twelve parameters, each by itself would show nothing."""
+    rng, value = np.random.default_rng(11), 0.02 * np.ones(12)
+    counts = {}
+    for share in (0.0, 0.3):
+        found: list[list[str]] = [[], []]
+        for seed in range(20):
+            design = rng.normal(0, 0.3, (30, 12))
+            y = share * design @ value + SIGMA * rng.standard_normal(30)
+            one, two = told(*rows(value, seed)), told(design, y)
+            for out, scaled in zip(found, (None, proportional(one, two)), strict=True):
+                out.append(likeliest(weighed(one, two, 0.01, None, scaled)))
+        counts[share] = [out.count("other") for out in found]
+    assert counts[0.0][1] <= 2, "chance"
+    assert counts[0.3][1] >= 14 and counts[0.3][1] >= counts[0.3][0] + 8
 
 
 def test_what_a_simulator_does_not_know_is_no_misfit() -> None:

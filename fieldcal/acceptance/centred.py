@@ -25,7 +25,7 @@ from math import erf
 
 import numpy as np
 
-from fieldcal.acceptance.tracked import chance_near_zero, chi2_about_zero, tracked
+from fieldcal.acceptance.tracked import chance_near_zero, chi2_about_zero, tracked, tracks
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average
@@ -51,7 +51,7 @@ def biases_taken_out(
     """
     said = []
     chance, what = tracked(windows, block, repeat[1], least)
-    if chance < least:
+    if tracks(chance):
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
             f" bias nor the Earth's rate in them {what}: the device removes its bias"

@@ -49,6 +49,10 @@ from fieldcal.windows import Average
 LEAST = 2
 """Fewest windows for (1)."""
 
+TRACKING, SURE = 0.01, 0.9
+"""Share of devices that subtract their bias at rest, as is common in low-cost ones, and
+the probability from which one is taken to do so."""
+
 LAGS = np.geomspace(0.25, 16.0, 49)
 """Time constants of (3), and times of (4), that are tried, s."""
 
@@ -57,6 +61,15 @@ CELLS = 256
 
 SPECTRUM = 16
 """Fewest samples for a periodogram."""
+
+
+def tracks(chance: float) -> bool:
+    """Whether a device subtracts its bias, by the chance that another looks like it.
+
+    >>> tracks(1e-3), tracks(2e-3)
+    (True, False)
+    """
+    return TRACKING / (TRACKING + chance) > SURE
 
 
 def tracked(

@@ -25,7 +25,12 @@ from math import erf
 
 import numpy as np
 
-from fieldcal.acceptance.tracked import chance_near_zero, chi2_about_zero, tracked, tracks
+from fieldcal.acceptance.tracked import (
+    chance_near_zero,
+    chi2_about_zero,
+    tracked,
+    tracks,
+)
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average

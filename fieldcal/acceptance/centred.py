@@ -29,7 +29,6 @@ from fieldcal.acceptance.tracked import (
     chance_near_zero,
     chi2_about_zero,
     tracked,
-    tracks,
 )
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.physics.recording import grids_of
@@ -55,8 +54,8 @@ def biases_taken_out(
 
     """
     said = []
-    chance, what = tracked(windows, block, repeat[1], least)
-    if tracks(chance):
+    removes, what = tracked(windows, block, repeat[1], least)
+    if removes > 0.5:  # likelier than not
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
             f" bias nor the Earth's rate in them {what}: the device removes its bias"

@@ -10,9 +10,8 @@ so close to zero, with an error s of each axis over all windows, with a chance o
 
     P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
 
-If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant, and
-the product of (1) and (2) is the probability that this is chance. What a turn put out
-is removed again in some seconds, so the means are c of
+If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant.
+What a turn put out is removed again in some seconds, so the means are c of
 
     W(t) = c + d exp(-t / tau)                                                     (3)
 
@@ -24,14 +23,18 @@ and before what it took out the last time. The means are c of
 
     W(t) = c + d (t < T'),   sigma^2 = sigma_c^2 + noise^2 / (T rate)              (4)
 
-with the T' that has the least residual, and the T that the means are likeliest with.
-This counts if it is likelier than a bias b that stays, the mean of c, and 1 / P times
-as likely, with the P that excludes chance, as one beside the Earth's rate w in an
-unknown direction. m = |c - b| then has the density
+with the T' that has the least residual, and any T. Either is so many times as likely as
+gyroscopes that keep a bias, that of the spread s_b, and feel by how they lie, e:
 
-    p(m) ~ sigma_c^-3 exp(-(m^2 + w^2) / 2 sigma_c^2) sinh(x) / x,  x = m w / sigma_c^2
-                                                                                   (5)
-Device axes, rad/s.
+    B = prod N(c; 0, sigma^2) / prod N(c; 0, sigma_c^2 + e^2 + s_b^2 everywhere)   (5)
+
+over windows and axes. Gyroscopes whose bias is known have the Earth's rate w alone, in
+an unknown direction, and (5) with m = |c| in place of the second
+
+    p(c) = N(c; 0, sigma_c^2) exp(-w^2 / 2 sigma_c^2) sinh(x) / x,  x = m w / sigma_c^2
+                                                                                   (6)
+Of gyroscopes with a bias one in x has a B above x at most, and of all devices TRACKING
+remove it. Device axes, rad/s. Source: Markov's inequality for a likelihood ratio.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.frames import EARTH_RATE
@@ -49,9 +53,13 @@ from fieldcal.windows import Average
 LEAST = 2
 """Fewest windows for (1)."""
 
-TRACKING, SURE = 0.01, 0.9
-"""Share of devices that subtract their bias at rest, as is common in low-cost ones, and
-the probability from which one is taken to do so."""
+TRACKING = 0.01
+"""Share of devices that subtract their bias at rest, as is common in low-cost ones."""
+
+LEANING = (0.0, 0.01, 0.03, 0.1)
+"""How much gyroscopes feel by how they lie, by their g-sensitivity above all, in the
+spread of their biases, one as likely as another; the Earth's rate comes on top of it,
+but for the first, as in a simulation."""
 
 LAGS = np.geomspace(0.25, 16.0, 49)
 """Time constants of (3), and times of (4), that are tried, s."""
@@ -63,44 +71,75 @@ SPECTRUM = 16
 """Fewest samples for a periodogram."""
 
 
-def tracks(chance: float) -> bool:
-    """Whether a device subtracts its bias, by the chance that another looks like it.
-
-    >>> tracks(1e-3), tracks(2e-3)
-    (True, False)
-    """
-    return TRACKING / (TRACKING + chance) > SURE
-
-
 def tracked(
     windows: Sequence[Average], block: Block, repeat: float, least: float
 ) -> tuple[float, str]:
-    """Probability of gyroscopes' means so close to zero, (1) (2), and chi2 in words.
+    """Probability of a device that subtracts its bias at rest, (5), and chi2 in words.
 
-    1 if they are significantly different from zero, or too few were measured.
+    0 if the means are significantly different from zero, or too few were measured.
     """
     held = [block.between(w.start, w.end) for w in windows]
     cells = [_Cells.of(one) for one in held if len(one) >= SPECTRUM]
     if not cells:
-        return 1.0, ""
-    ways = [_settled_means(cells), *_zeroed_means(cells, least)]
-    return min(_so_near_zero(*way, repeat, least) for way in ways)
+        return 0.0, ""
+    settled, own = _settled_means(cells)
+    found = [_so_near_zero(settled, own, [own], repeat, least)]
+    found += [
+        _so_near_zero(means, own, every, repeat, least)
+        for means, own, every in _zeroed_means(cells)
+    ]
+    return max(found)
 
 
 def _so_near_zero(
-    means: Array, sigma: Array, repeat: float, least: float
+    means: Array, own: Array, every: Sequence[Array], repeat: float, least: float
 ) -> tuple[float, str]:
-    """Probability of means so close to zero, (1) (2), and their chi2 in words."""
-    seen = np.isfinite(means) & (sigma > 0)
+    """Probability (5) of means about zero, with an error that is one of `every`."""
+    seen = np.isfinite(means) & (own > 0)
     if (count := int(seen.sum())) < 3 * LEAST or not seen.any(axis=0).all():
-        return 1.0, ""
+        return 0.0, ""
+    sigma = min(every, key=lambda one: _unlikely(means[seen], one[seen]))
     chi2, larger = chi2_about_zero(means[seen], sigma[seen])
     if larger < least:
-        return 1.0, ""
-    info = np.where(seen, 1.0 / np.where(seen, sigma, 1.0) ** 2, 0.0).sum(axis=0)
-    felt = float(np.hypot(repeat, EARTH_RATE / np.sqrt(3.0)))
-    chance = (1.0 - larger) * chance_near_zero(1 / np.sqrt(info), felt)
+        return 0.0, ""
+    likely = [-0.5 * _unlikely(means[seen], one[seen]) for one in every]
+    zero = float(np.logaddexp.reduce(likely) - np.log(len(likely)))
+    ways = [_beside_bias(means, own, seen, repeat, leaning) for leaning in LEANING]
+    if seen.all():
+        ways.append(_earth_alone(means, own))
+    stays = float(np.logaddexp.reduce(ways) - np.log(len(ways)))
+    odds = zero - stays + np.log(TRACKING)  # (5)
+    chance = float(1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0))))
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
+
+
+def _unlikely(means: Array, sigma: Array) -> float:
+    """Minus twice the log likelihood of means about zero, but for a constant."""
+    return float(np.sum((means / sigma) ** 2 + 2 * np.log(sigma)))
+
+
+def _beside_bias(
+    means: Array, own: Array, seen: NDArray[np.bool_], repeat: float, leaning: float
+) -> float:
+    """Log likelihood of means about biases that stay, but for a constant."""
+    felt = (leaning * repeat) ** 2 + (EARTH_RATE**2 / 3 if leaning else 0.0)
+    info = np.where(seen, 1 / np.where(seen, own**2 + felt, 1.0), 0.0)
+    value = np.where(seen, means, 0.0)
+    total, pull = info.sum(axis=0), (info * value).sum(axis=0)
+    square = (info * value**2).sum(axis=0) - repeat**2 * pull**2 / (
+        1 + repeat**2 * total
+    )
+    wide = np.log1p(repeat**2 * total).sum() - np.log(info[seen]).sum()
+    return -0.5 * float(square.sum() + wide)
+
+
+def _earth_alone(means: Array, own: Array) -> float:
+    """Log likelihood of the Earth's rate in unknown directions, but for a constant."""
+    var = own**2
+    one = var.mean(axis=1)
+    x = np.linalg.norm(means, axis=1) * EARTH_RATE / one
+    sphere = np.log(-np.expm1(-2 * x) / (2 * x)) + x - EARTH_RATE**2 / (2 * one)  # (6)
+    return -0.5 * _unlikely(means, own) + float(np.sum(sphere))
 
 
 def chi2_about_zero(means: Array, sigma: Array) -> tuple[float, float]:
@@ -120,41 +159,16 @@ def _settled_means(cells: Sequence[_Cells]) -> tuple[Array, Array]:
 
 
 def _zeroed_means(
-    cells: Sequence[_Cells], least: float
-) -> Iterator[tuple[Array, Array]]:
-    """Means c of (4), and their error, if a mean was taken out."""
+    cells: Sequence[_Cells],
+) -> Iterator[tuple[Array, Array, Sequence[Array]]]:
+    """Means c of (4), their own error, and that with the noise of any T."""
     first, last = max(c.t[0] for c in cells), min(c.t[-1] for c in cells) / 2
     times = LAGS[(first < LAGS) & (last > LAGS)]
     if not len(times):
         return
     means, own = _fitted(cells, times, lambda t, end: 1.0 * (t < end))
     of_second = np.array([one.noise * np.sqrt(one.t[1] - one.t[0]) for one in cells])
-    every = [np.hypot(own, of_second / np.sqrt(seconds)) for seconds in LAGS]
-    sigma = min(every, key=lambda one: _unlikely(means, one))
-    bias = means.mean(axis=0)
-    earth = min(_unlikely(means - b, own, EARTH_RATE) for b in (0.0, bias))
-    stays = min(earth + 2 * np.log(least), _unlikely(means - bias, own))
-    if _unlikely(means, sigma) < stays:
-        yield means, sigma
-
-
-def _unlikely(means: Array, sigma: Array, rate: float = 0.0) -> float:
-    """Minus twice the log likelihood of means about zero, or about a sphere, (5)."""
-    some = (sigma > 0).all(axis=1) & np.isfinite(means).all(axis=1)
-    var = sigma[some] ** 2
-    out = float(np.sum((means[some] ** 2) / var + np.log(var)))
-    if rate:
-        one = var.mean(axis=1)
-        x = np.linalg.norm(means[some], axis=1) * rate / one
-        out += float(np.sum(rate**2 / one - 2 * _log_sinhc(x)))
-    return out
-
-
-def _log_sinhc(x: Array) -> Array:
-    """Get ln(sinh(x) / x)."""
-    x = np.maximum(x, 1e-9)
-    out: Array = x + np.log(-np.expm1(-2 * x) / (2 * x))
-    return out
+    yield means, own, [np.hypot(own, of_second / np.sqrt(s)) for s in LAGS]
 
 
 def _fitted(

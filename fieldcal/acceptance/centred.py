@@ -26,6 +26,7 @@ from math import erf
 import numpy as np
 
 from fieldcal.acceptance.tracked import (
+    DOUBT,
     chance_near_zero,
     chi2_about_zero,
     tracked,
@@ -55,7 +56,7 @@ def biases_taken_out(
     """
     said = []
     removes, what = tracked(windows, block, repeat[1], least)
-    if removes > 0.5:  # likelier than not
+    if removes > DOUBT:
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
             f" bias nor the Earth's rate in them {what}: the device removes its bias"

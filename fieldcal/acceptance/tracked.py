@@ -56,6 +56,9 @@ LEAST = 2
 TRACKING = 0.01
 """Share of devices that subtract their bias at rest, as is common in low-cost ones."""
 
+DOUBT = 0.1
+"""Probability of such a device with which there is no GO any more."""
+
 LEANING = (0.0, 0.01, 0.03, 0.1)
 """How much gyroscopes feel by how they lie, by their g-sensitivity above all, in the
 spread of their biases, one as likely as another; the Earth's rate comes on top of it,

@@ -41,6 +41,7 @@ from fieldcal.core.samples import GYR, Array
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.hand_drift import TREMBLES, drift, turning
+from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce
 from fieldcal.windows.noise import quickest, to_and_fro
@@ -77,7 +78,7 @@ def rows_of(source: RowSource) -> Rows:
         return rows
     still = rows.without(np.isin(rows.x.position, held[some]))
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
-    one = reduce(source, whole=True, level=np.nanmedian(level, axis=0))
+    one = reduce(source, whole=True, level=median_sigma(level))
     return _unsteady(source, replace(one, noise=rows.noise), 0.0)
 
 
@@ -99,13 +100,17 @@ def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
         pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]
         turns.append(turning(force, lasts))
     sd, length = rows.sd.copy(), rows.length[:, None]
-    k = drift(turns, ((turned / length) ** 2).mean(axis=1))
+    # of an axis that nothing is told of, the others tell
+    known = np.isfinite(turned)
+    square = np.where(known, turned, 0.0) ** 2
+    trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    k = drift(turns, trembles / rows.length**2)
     slow = np.sqrt(TREMBLES * angle**2 + k * turned**2) / length  # (1)
     sd[:, 3:] = np.hypot(sd[:, 3:], slow)
     fast = np.sqrt(TREMBLES) * pushed[:, None] / length * unit  # (1)
     sd[:, :3] = np.hypot(sd[:, :3], fast)
     # between its angle at the end of a rest and the mean there
-    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * (turned**2).mean(axis=1)))
+    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * trembles))
     return replace(rows, sd=sd, wander=most * source.about.gravity * float(unit.mean()))
 
 
@@ -117,18 +122,29 @@ def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
     if rows.x.oriented.any() or len(pieces) < FEWEST:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_unrest(piece[:, GYR], rate) for piece in pieces])
-    sensors = np.quantile(shown, QUIET, axis=0)
-    apart: NDArray[np.bool_] = (shown / sensors).mean(axis=1) > STILL
+    told = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
+    if not told.any():
+        return np.zeros(len(pieces), dtype=bool)
+    sensors = np.quantile(shown[:, told], QUIET, axis=0)
+    apart: NDArray[np.bool_] = (shown[:, told] / sensors).mean(axis=1) > STILL
     return apart
 
 
 def _unrest(rates: Array, rate: float) -> Array:
-    """Variance (2) over a second in that of the quickest noise alone, (3,)."""
+    """Variance (2) over a second in that of the quickest noise alone, (3,).
+
+    nan of an axis without noise, or with nothing that tells it.
+    """
+    unrest = np.full(3, np.nan)
+    some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    if not some.any():
+        return unrest
     many = min(len(rates), max(round(rate), 8))
-    parts = np.array_split(rates, len(rates) // many)
-    nothing, noise = np.zeros(3), quickest([rates]) ** 2 / rate * (many / rate) / 15
+    noise = quickest([rates[:, some]]) ** 2 / rate * (many / rate) / 15
+    parts = np.array_split(rates[:, some], len(rates) // many)
+    nothing = np.zeros(len(noise))
     turned = [_tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
-    unrest: Array = np.mean(turned, axis=0) / noise
+    unrest[some] = np.mean(turned, axis=0) / np.where(noise > 0, noise, np.nan)
     return unrest
 
 

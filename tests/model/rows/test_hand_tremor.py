@@ -217,3 +217,18 @@ def test_a_table_that_shakes_in_some_windows_is_no_hand() -> None:
         shaken = source.block.gyr + 1e-3 * at[:, None] * rng.normal(size=(len(at), 3))
         found = rows_in_a_hand(replace(source, block=replace(source.block, gyr=shaken)))
         assert len(found.x) == 120 and not found.wander.any()
+
+
+def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
+    """Missing in a window, or without noise; of none nobody can tell."""
+    angles = np.zeros((12, 3))
+    angles[7] = 3e-3
+    source = recording(angles, 5, QUICKLY)
+    gyr, at = source.block.gyr.copy(), source.block.t // 15 == 2
+    gyr[at, 0], gyr[:, 1] = np.nan, 0.0
+    block = replace(source.block, gyr=gyr)
+    usable = np.hstack([source.usable[:, :3], np.isfinite(gyr)])
+    found = rows_in_a_hand(replace(source, block=block, usable=usable))
+    assert found.x.position.tolist() == list(range(12)) and found.wander[7] > 0.0
+    block = replace(source.block, gyr=np.zeros_like(gyr))
+    assert len(rows_in_a_hand(replace(source, block=block)).x) == 120

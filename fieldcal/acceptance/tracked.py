@@ -140,7 +140,7 @@ def _earth_alone(means: Array, own: Array) -> float:
     """Log likelihood of the Earth's rate in unknown directions, but for a constant."""
     var = own**2
     one = var.mean(axis=1)
-    x = np.linalg.norm(means, axis=1) * EARTH_RATE / one
+    x = np.maximum(np.linalg.norm(means, axis=1) * EARTH_RATE / one, 1e-9)
     sphere = np.log(-np.expm1(-2 * x) / (2 * x)) + x - EARTH_RATE**2 / (2 * one)  # (6)
     return -0.5 * _unlikely(means, own) + float(np.sum(sphere))
 

@@ -333,3 +333,9 @@ def test_few_digits_of_what_was_on_the_same_grid_move_all_alike(
         found = centred_and_rounded(windows, block, 0.05, LEAST)
         assert (found < LEAST) == shows
     assert 0.3 * step < np.median(left) < 0.5 * step
+
+
+def test_means_of_exactly_zero_are_no_fault_of_the_check() -> None:
+    windows, block = at_rest(np.random.default_rng(13), 0.0)
+    block.gyr[:] = 5e-4 * np.where(np.arange(len(block)) % 2, 1.0, -1.0)[:, None]
+    assert 0.0 <= tracked(windows, block, REPEAT, LEAST)[0] <= 1.0

@@ -36,7 +36,7 @@ STEPS = 30
 """Until k stays to a thousandth."""
 
 
-class Turning(NamedTuple):
+class ForceTurn(NamedTuple):
     """How the force turns in a window, about each of the two axes across it.
 
     Attributes
@@ -50,7 +50,7 @@ class Turning(NamedTuple):
     noise: float
 
 
-def turning(acc: Array, length: float) -> Turning:
+def turning(acc: Array, length: float) -> ForceTurn:
     """How the force turns in a window.
 
     Parameters
@@ -62,7 +62,7 @@ def turning(acc: Array, length: float) -> Turning:
     known = np.isfinite(acc).all(axis=1)
     t = (np.linspace(-0.5, 0.5, len(acc)) * length)[known]
     if len(t) < FEWEST:
-        return Turning(0.0, np.inf)
+        return ForceTurn(0.0, np.inf)
     t -= t.mean()
     some = acc[known]
     mean = some.mean(axis=0)
@@ -71,12 +71,12 @@ def turning(acc: Array, length: float) -> Turning:
     spread = ((off - np.outer(t, slope)) ** 2).sum(axis=0) / (len(t) - 2) / (t @ t)
     across = 1 - (mean / size) ** 2
     slope -= mean * (slope @ mean) / size**2
-    return Turning(
+    return ForceTurn(
         float(slope @ slope) / (2 * size**2), float(spread @ across) / (2 * size**2)
     )
 
 
-def drift(windows: list[Turning], trembles: Array) -> float:
+def drift(windows: list[ForceTurn], trembles: Array) -> float:
     """Tell k of (1), TREMBLES at least, from some windows, (2).
 
     Parameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.hand_drift import TREMBLES, WALKS, Turning, drift, turning
+from fieldcal.model.rows.hand_drift import TREMBLES, WALKS, ForceTurn, drift, turning
 
 RATE, SECONDS, G = 100.0, 6.0, 9.81
 T = np.arange(0.0, SECONDS, 1 / RATE)
@@ -41,10 +41,10 @@ def test_samples_that_are_missing_change_nothing_else() -> None:
     acc[50:150, 1] = np.nan
     assert turning(acc, SECONDS).square == pytest.approx(whole.square, rel=0.02)
     acc[5:] = np.nan
-    assert turning(acc, SECONDS) == Turning(0.0, np.inf)
+    assert turning(acc, SECONDS) == ForceTurn(0.0, np.inf)
 
 
-def hands(kind: str, seed: int) -> tuple[list[Turning], Array]:
+def hands(kind: str, seed: int) -> tuple[list[ForceTurn], Array]:
     """Forty windows of a hand, and a^2 / T^2 of each, from the angle itself."""
     rng, seen, trembles = np.random.default_rng(seed), [], []
     line = np.linalg.qr(np.column_stack([np.ones_like(T), T]))[0]
@@ -71,7 +71,7 @@ def test_one_that_trembles_is_told_from_one_that_walks() -> None:
 
 
 def test_if_nothing_tells_it_is_taken_to_walk() -> None:
-    blind = [Turning(0.0, np.inf)] * 3
+    blind = [ForceTurn(0.0, np.inf)] * 3
     assert drift(blind, np.full(3, 1e-8)) == pytest.approx(WALKS)
     assert drift(blind, np.zeros(3)) == WALKS
-    assert drift([Turning(1e-9, 1e-9)] * 500, np.full(500, 1e-6)) == TREMBLES
+    assert drift([ForceTurn(1e-9, 1e-9)] * 500, np.full(500, 1e-6)) == TREMBLES

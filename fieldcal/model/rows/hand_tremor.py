@@ -24,10 +24,10 @@ hand also accelerates the device. Along gravity the integral of this is a speed 
 returns to zero as the angle does, so (1), with k of 2, and (2) hold with the speed for
 the mean force along gravity.
 
-Somebody may hold the device in some windows only, and lean it against something or put
-it down in the others. The noise of the sensors is the same in all of them: over a
-second, (2) without a hand varies by a few tenths, and a hand makes it some ten times as
-large.
+Somebody may hold the device in some windows only, and lean it against something, put it
+down or into a fixture in the others. The noise of the sensors is the same in all of
+them: over a second, (2) without a hand varies by a few tenths, and a hand makes it some
+ten times as large. Angles that are known are then off by what the hand turns.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import GYR, Array
+from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model.rows.block_means import masked
 from fieldcal.model.rows.bounds import spans
 from fieldcal.model.rows.hand_drift import TREMBLES, drift, turning
@@ -79,7 +79,8 @@ def rows_of(source: RowSource) -> Rows:
     still = rows.without(np.isin(rows.x.position, held[some]))
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
     one = reduce(source, whole=True, level=median_sigma(level))
-    return _unsteady(source, replace(one, noise=rows.noise), 0.0)
+    unsteady = _unsteady(source, replace(one, noise=rows.noise), 0.0)
+    return _askew(source, unsteady, held[some])
 
 
 def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
@@ -110,8 +111,30 @@ def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
     fast = np.sqrt(TREMBLES) * pushed[:, None] / length * unit  # (1)
     sd[:, :3] = np.hypot(sd[:, :3], fast)
     # between its angle at the end of a rest and the mean there
-    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * trembles))
-    return replace(rows, sd=sd, wander=most * source.about.gravity * float(unit.mean()))
+    some = np.where(known, square, trembles[:, None])
+    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * some))
+    return replace(rows, sd=sd, wander=most)
+
+
+def _askew(source: RowSource, rows: Rows, shaky: Index) -> Rows:
+    """Rows of which known angles are off by what a hand turns, in those positions."""
+    x, sd, wander = rows.x, rows.sd.copy(), rows.wander.copy()
+    held = np.isin(x.position, shaky)
+    wander[x.oriented & ~held] = 0.0
+    for i in np.flatnonzero(x.oriented & held):
+        off = np.sqrt(np.diag(turned_force(x.f[i], wander[i])))
+        sd[i, :3] = np.hypot(sd[i, :3], off * np.abs(source.about.nominal["acc_scale"]))
+    return replace(rows, sd=sd, wander=wander)
+
+
+def turned_force(force: Array, angle: Array) -> Array:
+    """Covariance of a force (3,) that is turned at random about three axes, (3, 3).
+
+    `angle` is the standard deviation about each, (3,) rad.
+    """
+    across = np.cross(np.eye(3), force) * angle[:, None]
+    out: Array = across.T @ across
+    return out
 
 
 def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
@@ -119,7 +142,7 @@ def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
 
     `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
     """
-    if rows.x.oriented.any() or len(pieces) < FEWEST:
+    if len(pieces) < FEWEST:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_unrest(piece[:, GYR], rate) for piece in pieces])
     told = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
@@ -144,7 +167,9 @@ def _unrest(rates: Array, rate: float) -> Array:
     parts = np.array_split(rates[:, some], len(rates) // many)
     nothing = np.zeros(len(noise))
     turned = [_tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
-    unrest[some] = np.mean(turned, axis=0) / np.where(noise > 0, noise, np.nan)
+    # a hand does so all the time, and a bump in a second or two
+    usual = np.median(turned, axis=0)
+    unrest[some] = usual / np.where(noise > 0, noise, np.nan)
     return unrest
 
 

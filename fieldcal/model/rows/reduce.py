@@ -46,8 +46,8 @@ class Rows:
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
-    wander : (n,) rms of what a hand adds to the force across it within the window of
-        each, m/s^2
+    wander : (n, 3) rms angle by which a hand turns the device about each of its axes
+        within the window, rad
     alike : (6,) standard deviation of an error that all windows share
 
     """
@@ -198,7 +198,7 @@ def averaged(
     sd[~x.force_known, :3] = np.nan
     scale = source.about.nominal["gyr_scale"]
     _without_round(x, y[:, 3:], sd[:, 3:], length, scale)
-    still = np.zeros(len(y))
+    still = np.zeros((len(y), 3))
     return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
 
 

@@ -22,6 +22,7 @@ from fieldcal.model.causes.cause import triads_of
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import Linear
@@ -88,7 +89,9 @@ class Turns:
     def __init__(self, turning: Turning, dictionary: Dictionary, way: bool) -> None:
         self.turning, self.dictionary = turning, dictionary
         self.rows = turning.rows
-        self.wander = dict(zip(self.rows.x.position, self.rows.wander, strict=True))
+        # of each window
+        self.first = np.unique(self.rows.x.position, return_index=True)[1]
+        self.wander = self.rows.wander[self.first]
         self.way = way and not dictionary.free.any()
 
     def linearised(
@@ -141,7 +144,7 @@ class Turns:
         ends: Array = np.zeros((3, 3))
         for p, bent in loose.items():
             close = close - bent @ self.means[p][:, index]
-            ends += (bent * (self.spread[p] + self.wander[p] ** 2)) @ bent.T
+            ends += bent @ self._unsure(p) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
@@ -160,6 +163,13 @@ class Turns:
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 
+    def _unsure(self, p: int) -> Array:
+        """Covariance of the accelerometers of a window at the end of a turn, (3, 3)."""
+        moved = turned_force(self.rows.x.f[self.first[p]], self.wander[p])
+        scale = self.scale[:3]
+        out: Array = np.diag(self.spread[p]) + np.outer(scale, scale) * moved
+        return out
+
     def _closure_variance(self, turn: Turn, view: RowView) -> float:
         """Variance of a closure about every axis: noise, time steps and filters, rad^2.
 
@@ -172,7 +182,14 @@ class Turns:
         built_up = priors.BUILT_UP * length * float(np.abs(fading).max())
         earth = EARTH_RATE / 3**0.5 * length if self.dictionary.free.any() else 0.0
         walked = float((white**2).mean()) * length
-        return walked + turn.blur**2 + built_up**2 + earth**2
+        return walked + turn.blur**2 + built_up**2 + earth**2 + self._swung(turn)
+
+    def _swung(self, turn: Turn) -> float:
+        """Variance of what a hand turns at both ends, whose angles are known, rad^2."""
+        if self.dictionary.free.any():
+            return 0.0
+        ends = np.searchsorted(self.dictionary.held, turn.positions)
+        return float((self.wander[ends] ** 2).mean(axis=1).sum())
 
     def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
         """How the closure moves with what is added to the accelerometers at its ends.

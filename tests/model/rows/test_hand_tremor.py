@@ -11,7 +11,7 @@ from small_sessions import LADDER, SD, ladder, rows_of
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.hand_tremor import rows_of as rows_in_a_hand
-from fieldcal.model.rows.hand_tremor import wander
+from fieldcal.model.rows.hand_tremor import turned_force, wander
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import parse
@@ -125,7 +125,8 @@ def test_in_a_hand_each_window_is_one_row() -> None:
         np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0))
     np.testing.assert_allclose(found.sd[:, :3], np.tile(found.noise[:3], (5, 1))
                                / 500**0.5, rtol=1e-9)  # fmt: skip
-    assert found.wander == pytest.approx(2.0 * G * angle, rel=0.3)
+    assert found.wander.shape == (5, 3)
+    assert np.sqrt((found.wander**2).mean(axis=1)) == pytest.approx(angle, rel=0.3)
     assert found.common.shape == (5, 6) and (found.common[:, 3:] > 4e-5).all()
 
 
@@ -168,7 +169,7 @@ def test_a_quick_hand_is_no_noise_of_the_sensors() -> None:
     for seed in range(6):
         angles = np.full((5, 3), 1e-3)
         found = rows_in_a_hand(recording(angles, seed, QUICKLY))
-        assert len(found.x) == 5 and 0.5e-3 < found.wander.mean() / (2.0 * G) < 1.5e-3
+        assert len(found.x) == 5 and 0.5e-3 < found.wander.mean() < 1.5e-3
         assert (found.noise < 30 * NOISE).all()
         loud = rows_of_seed(seed).noise
         assert (found.noise[3:] < 0.3 * loud[3:]).all(), "what trembles is no noise"
@@ -209,6 +210,29 @@ def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
     assert 0.8 < np.sqrt(np.mean(np.square(others))) < 1.1
 
 
+def test_in_a_fixture_a_hand_turns_known_angles_about_its_own_axis() -> None:
+    """Means of the force are off by that across it, and no others are."""
+    angles = np.zeros((12, 3))
+    angles[7, 0] = 3e-3  # the force lies along y there
+    for seed in range(6):
+        source = recording(angles, seed, QUICKLY, alpha_deg=0.0, beta_deg=0.0)
+        found = rows_in_a_hand(source)
+        held = found.x.position == 7
+        assert found.wander[held, 0] == pytest.approx(3e-3, rel=0.5)
+        assert (found.wander[held, 1:] < 2e-4).all() and not found.wander[~held].any()
+        white = found.noise[:3] / np.sqrt(500.0)
+        off = np.abs(np.cross([found.wander[held][0, 0], 0.0, 0.0], found.x.f[held][0]))
+        assert found.sd[held][0, 2] == pytest.approx(2.0 * off[2], rel=0.05)
+        np.testing.assert_allclose(found.sd[~held, :3], np.tile(white, (11, 1)), 0.3)
+
+
+def test_of_a_force_that_is_turned_the_covariance_is_that_of_many() -> None:
+    force, angle = np.array([1.0, -9.0, 3.0]), np.array([1e-3, 2e-3, 4e-3])
+    some = angle * np.random.default_rng(1).normal(size=(200_000, 3))
+    seen = np.cov(np.cross(some, force).T)
+    np.testing.assert_allclose(turned_force(force, angle), seen, atol=1e-6)
+
+
 def test_a_table_that_shakes_in_some_windows_is_no_hand() -> None:
     """White noise of one window is larger, as of an engine far above the rate."""
     for seed in range(6):
@@ -217,6 +241,17 @@ def test_a_table_that_shakes_in_some_windows_is_no_hand() -> None:
         shaken = source.block.gyr + 1e-3 * at[:, None] * rng.normal(size=(len(at), 3))
         found = rows_in_a_hand(replace(source, block=replace(source.block, gyr=shaken)))
         assert len(found.x) == 120 and not found.wander.any()
+
+
+def test_a_bump_in_one_window_is_no_hand() -> None:
+    source = recording(np.zeros((12, 3)), 7)
+    at = (source.block.t > 63.0) & (source.block.t < 65.0)
+    rng = np.random.default_rng(7)
+    gyr = source.block.gyr + 1e-2 * at[:, None] * rng.normal(size=(len(at), 3))
+    swung = np.sin(2 * np.pi * 1.5 * source.block.t)[:, None] * [3e-2, 1e-2, 0.0]
+    gyr += swung * at[:, None]
+    found = rows_in_a_hand(replace(source, block=replace(source.block, gyr=gyr)))
+    assert len(found.x) == 120 and not found.wander.any()
 
 
 def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
@@ -229,6 +264,6 @@ def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
     block = replace(source.block, gyr=gyr)
     usable = np.hstack([source.usable[:, :3], np.isfinite(gyr)])
     found = rows_in_a_hand(replace(source, block=block, usable=usable))
-    assert found.x.position.tolist() == list(range(12)) and found.wander[7] > 0.0
+    assert found.x.position.tolist() == list(range(12)) and found.wander[7].any()
     block = replace(source.block, gyr=np.zeros_like(gyr))
     assert len(rows_in_a_hand(replace(source, block=block)).x) == 120

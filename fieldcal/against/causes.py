@@ -27,7 +27,7 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.selection import Search
-from fieldcal.physics.effect import CHANCE, Scatter
+from fieldcal.physics.effect import CHANCE, Motion, Scatter, Sensor
 
 DIRECTION: dict[Relation, Direction] = {
     "real": "left_out", "simulator": "added", "other": "resized",
@@ -147,13 +147,38 @@ def _difference(
 def _pairs(
     one: Member | None, two: Member | None, found: Decided
 ) -> dict[str, RealAndSimulated]:
-    """Parameters of a cause in both sessions, as far as one determines them."""
+    """Parameters of a cause in both sessions, as far as one determines them.
+
+    Of what is in both to another size, one may show too little to tell a size by
+    itself: its numbers, which would be too small, are told with that of the other.
+    """
     real = quantities(found.real, one) if one else {}
     sim = quantities(found.sim, two) if two else {}
+    if one and two:
+        ours, theirs = _size_of(found.real, one), _size_of(found.sim, two)
+        if ours < theirs:
+            real |= _of_size(found.real, one, theirs)
+        elif theirs < ours:
+            sim |= _of_size(found.sim, two, ours)
     return {
         name: RealAndSimulated.of(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
         if (one is None or name in real) and (two is None or name in sim)
+    }
+
+
+def _of_size(there: Widened, member: Member, size: float) -> dict[str, Quantity]:
+    """Numbers of a cause with an equation that is of a known size, in typical ones."""
+    group, told = member[1], there.told(member[0].key)
+    if told is None or not isinstance(group.effect, Motion | Sensor):
+        return {}
+    known = np.linalg.inv(told.inner + np.eye(len(told.pull)) / size**2)
+    values, sigma = known @ told.pull, np.sqrt(np.diag(known))
+    params = [group.effect.params[j] for j in group.params]
+    return {
+        p.name: Quantity(float(v * t), float(s * t), p.unit)
+        for p, v, s, t in zip(params, values, sigma, group.typical, strict=True)
+        if s**2 < thresholds.DETERMINED * size**2
     }
 
 

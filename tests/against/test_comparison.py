@@ -137,6 +137,24 @@ def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:
     assert any("next to no noise" in warning for warning in found.warnings)
 
 
+def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
+    real: Side,
+) -> None:
+    """By itself it shows none of it: its size is the device's."""
+    weak = {"acc": [[1.004, 0, 0], [2e-4, 0.997, 0], [0, 0, 1.001]]}
+    found = against(real, {**DEVICE, "matrix": weak}, 3)
+    (one,) = found.differences
+    assert (one.id, one.direction) == ("cross_coupling", "resized")
+    assert set(one.parameters) == {"k12", "k13", "k21", "k23", "k31", "k32"}
+    for name, number in one.parameters.items():
+        assert number.simulator and number.simulator.sigma
+        true = 2e-4 * (name == "k21")
+        off = abs(number.simulator.value - true)
+        assert off < 2.6 * number.simulator.sigma < 3e-4
+    off, sigma = value(found, "cross_coupling", "k21")
+    assert abs(off - 1.8e-3) < 4 * sigma < 1e-3
+
+
 def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
     real: Side,
 ) -> None:

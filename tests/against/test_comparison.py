@@ -149,7 +149,7 @@ def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
     for name, number in one.parameters.items():
         assert number.simulator and number.simulator.sigma
         true = 2e-4 * (name == "k21")
-        off = abs(number.simulator.value - true)
+        off = abs(float(number.simulator.value) - true)
         assert off < 2.6 * number.simulator.sigma < 3e-4
     off, sigma = value(found, "cross_coupling", "k21")
     assert abs(off - 1.8e-3) < 4 * sigma < 1e-3

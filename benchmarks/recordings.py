@@ -124,31 +124,45 @@ def row(one: Published, found: Verdict) -> str:
 
 def of(one: Published, screen: bool = False) -> Verdict:
     """Import a recording and diagnose it, on a screen as well if wanted."""
+    began = process_time()
+    with tempfile.TemporaryDirectory() as name:
+        asked, folder = imported(one, Path(name) / "session")
+        if folder is None:
+            return Verdict(asked, 0, "not imported", (), process_time() - began)
+        found = diagnosed(folder)
+        found = found._replace(options=asked, seconds=process_time() - began)
+        return found._replace(screen=shown(folder)) if screen else found
+
+
+def imported(one: Published, out: Path) -> tuple[int, Path | None]:
+    """Import a recording: options that it took, and its session, if there is one."""
     paths = [str(REAL / one.folder / name) for name in one.files]
     call = ["import", *paths, *(["--join"] if len(paths) > 1 else [])]
-    began, asked = process_time(), 0
-    with tempfile.TemporaryDirectory() as name:
-        out = Path(name) / "session"
-        given: list[str] = []
-        code = ran([*call, "-o", str(out)]).code
-        for answer in one.options:
-            if code == 0:
-                break
-            given += answer.split()
-            asked += 1
-            code = ran([*call, *given, "-o", str(out)]).code
-        if code:
-            return Verdict(asked, 0, "not imported", (), process_time() - began)
-        folder = out / one.stream if one.stream and (out / one.stream).exists() else out
-        code, text, _ = ran(["diagnose", str(folder), "--json"])
-        seconds = process_time() - began
-        marks = (folder / "session.toml").read_text().count("[[position]]")
-        if code not in (0, 1):
-            return Verdict(asked, marks, f"exit code {code}", (), seconds)
-        said = json.loads(text)
-        effects = tuple(effect["id"] for effect in said["effects"])
-        seen = shown(folder) if screen else ""
-        return Verdict(asked, marks, said["verdict"], effects, seconds, seen)
+    given: list[str] = []
+    code, asked = ran([*call, "-o", str(out)]).code, 0
+    for answer in one.options:
+        if code == 0:
+            break
+        given += answer.split()
+        asked += 1
+        code = ran([*call, *given, "-o", str(out)]).code
+    if code:
+        return asked, None
+    stream = out / one.stream
+    return asked, stream if one.stream and stream.exists() else out
+
+
+def diagnosed(folder: Path) -> Verdict:
+    """What is said of a session."""
+    began = process_time()
+    code, text, _ = ran(["diagnose", str(folder), "--json"])
+    seconds = process_time() - began
+    marks = (folder / "session.toml").read_text().count("[[position]]")
+    if code not in (0, 1):
+        return Verdict(0, marks, f"exit code {code}", (), seconds)
+    said = json.loads(text)
+    effects = tuple(effect["id"] for effect in said["effects"])
+    return Verdict(0, marks, said["verdict"], effects, seconds)
 
 
 def shown(folder: Path) -> str:

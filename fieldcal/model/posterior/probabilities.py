@@ -93,11 +93,14 @@ class Posterior:
         own, near = self.evidence(self.best), 0
         offers = self.search.offers(less, self.best.sizes.instability)
         # what is predicted beside what is left is less than the whole: alike for all
-        predicted = max((self._bare(less, o) for o in offers
-                        if o.member[0].name == name), default=own)  # fmt: skip
+        itself = [o for o in offers if o.member[0].name == name]
+        predicted = max((self._bare(less, o) for o in itself), default=own)
+        likely = max((o.score for o in itself), default=np.inf)
         for offer in offers:
             cause = offer.member[0]
-            if cause.name == name or self._bare(less, offer) < predicted - OTHERWISE:
+            behind = predicted - self._bare(less, offer)
+            # by its evidence it is an alias, by its chance as well it counts
+            if cause.name == name or min(behind, likely - offer.score) > OTHERWISE:
                 continue
             if (near := near + 1) > LOOKED_AT:
                 break

@@ -62,6 +62,26 @@ def test_what_stands_in_a_cause_s_place_stands_on_both_triads() -> None:
     assert posterior._kind("settling") == "effect"
 
 
+def test_what_its_chance_brings_near_counts_though_its_evidence_is_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A course that no effect has shows a little more than a walk, and is rarer."""
+    session = Session.of(ladder(), ("time:acc", "random_walk:acc"))
+    off, x = session.noise(np.random.default_rng(3)), session.dictionary.x
+    part = (x.t - x.t.min()) / np.ptp(x.t)
+    bent = part + 0.76 * part * (1 - part)
+    off[:, :3] += 3e-3 * bent[:, None] * [1.0, -0.5, 0.7]
+    free = next(c for c in session.dictionary.causes if c.name == "time")
+    for patience, counts in ((1.0, True), (-3.0, False)):
+        search = session.search(off)
+        best = max((search.evaluated(((free, v),)) for v in free.variants),
+                   key=lambda s: s.score)  # fmt: skip
+        monkeypatch.setattr(probabilities, "OTHERWISE", patience)
+        walks = {s.keys: w for s, w in Posterior(search, best).weights}
+        assert (frozenset({"random_walk:acc"}) in walks) == counts
+        assert not counts or walks[frozenset({"random_walk:acc"})] > 0.5
+
+
 def test_the_weights_are_of_the_sets_and_of_what_was_refined() -> None:
     search, best = drifting()
     posterior = Posterior(search, best)

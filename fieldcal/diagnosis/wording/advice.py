@@ -37,7 +37,7 @@ def advice(
             " (axes, signs, units, angles), and diagnose again: until then no other"
             " effect can be found."
         )
-    yield from _about_mismatches(unknown)
+    yield from about_mismatches(unknown)
     if explanation.undecided:
         yield (
             "Record again with more positions, or longer ones: the simulation leaves"
@@ -110,7 +110,7 @@ def _none_in_reach(explanation: Explanation) -> str:
     return f"No position {extent(positions)} decides; what does: "
 
 
-def _about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
+def about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
     """What to do about mismatches without an effect, channels alike in one sentence."""
     alike: dict[tuple[str, str], list[str]] = {}
     for mystery in unknown:
@@ -123,6 +123,34 @@ def _about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
             follow="follow" if several else "follows",
             be="are" if several else "is",
         )
+
+
+WAYS = {
+    "time": (
+        "Hold one position for longer, and record the temperature",
+        "the time, as biases do that follow a temperature",
+    ),
+    "temperature": (
+        "Heat and cool the device in one position, each at half the pace",
+        "the temperature",
+    ),
+    "since turn": (
+        "Turn away from a position and back, and hold it for longer",
+        "the time since the turn",
+    ),
+    "force": (
+        "Hold positions in which each axis feels other parts of gravity",
+        "the specific force",
+    ),
+    "force and time": (
+        "Hold the first positions once more at the end",
+        "a specific force whose effect changes with time",
+    ),
+    "alpha": ("Hold more angles α at one angle β", "the angle α"),
+    "beta": ("Hold more angles β at one angle α", "the angle β"),
+    "joints": ("Hold each angle α with each angle β", "both angles together"),
+}
+"""What to do about a function that no effect makes, and what it is a function of."""
 
 
 def _remedy(unknown: Unknown) -> tuple[str, str]:
@@ -139,14 +167,15 @@ def _remedy(unknown: Unknown) -> tuple[str, str]:
             f"Set {places} again and repeat it",
             f": {off_by(unknown.turned)} there.",
         )
-    if not np.isfinite(unknown.mismatch.correlation):
+    what, follows = WAYS.get(unknown.cause, ("", ""))
+    if not what or not np.isfinite(unknown.mismatch.correlation):
         return (
             f"Repeat {places}, and look for what was different there",
             ": {channels} {be} off only there.",
         )
     return (
-        f"Vary {unknown.cause} on purpose and keep the rest constant",
-        ": {channels} {follow} it, and no effect in the catalogue does.",
+        what,
+        f": {{channels}} {{follow}} {follows}, and no effect in the catalogue does.",
     )
 
 

@@ -1,0 +1,48 @@
+"""What to do about a mismatch that no effect makes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_sessions import dictionary, ladder
+
+from fieldcal.diagnosis.findings.unknown_mismatch import Unknown
+from fieldcal.diagnosis.result import Mismatch
+from fieldcal.diagnosis.wording.advice import WAYS, about_mismatches
+
+
+def unknown(cause: str, channel: str = "ay", correlation: float = 0.9) -> Unknown:
+    """A mismatch of a cause without physics, in two positions."""
+    return Unknown(
+        cause,
+        Mismatch(
+            channel=channel, kind="time", covariate=cause, positions=(0, 1),
+            from_s=0.0, to_s=1.0, rms=1e-3, sigma=9.0, correlation=correlation,
+            share=0.9,
+        ),
+    )  # fmt: skip
+
+
+def test_each_function_that_no_effect_makes_has_a_way_to_find_its_physics() -> None:
+    causes = {c.name for c in dictionary(ladder()).causes if c.kind == "unknown"}
+    assert causes - set(WAYS) == {"window", "position"}
+    for cause in WAYS:
+        (said,) = about_mismatches([unknown(cause)])
+        assert ": ay follows " in said and " on purpose" not in said
+
+
+def test_what_follows_the_time_may_follow_a_temperature() -> None:
+    (said,) = about_mismatches([unknown("time"), unknown("time", "az")])
+    assert said == (
+        "Hold one position for longer, and record the temperature: ay and az follow the"
+        " time, as biases do that follow a temperature, and no effect in the catalogue"
+        " does."
+    )
+
+
+@pytest.mark.parametrize(
+    ("cause", "correlation"), [("window", np.nan), ("time", np.nan), ("position", 0.5)]
+)
+def test_single_positions_are_repeated(cause: str, correlation: float) -> None:
+    (said,) = about_mismatches([unknown(cause, "gz", correlation)])
+    assert said.startswith("Repeat ") and "gz is off only there" in said

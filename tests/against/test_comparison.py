@@ -137,6 +137,7 @@ def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:
     assert any("next to no noise" in warning for warning in found.warnings)
 
 
+@pytest.mark.thorough
 def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
     real: Side,
 ) -> None:

@@ -5,6 +5,7 @@ import doctest
 import re
 import sys
 import tomllib
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -34,26 +35,30 @@ def bench_7(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     five_positions(tmp_path / "bench-7")
 
 
+def with_examples(paths: Iterable[Path]) -> list[Path]:
+    """Files in which doctest finds something; it takes its time also where not."""
+    return sorted(p for p in paths if ">>>" in p.read_text(encoding="utf-8"))
+
+
 @pytest.mark.usefixtures("bench_7")
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("page", with_examples(DOCS.glob("*.md")), ids=lambda p: p.stem)
 def test_examples_of_the_documentation(page: Path) -> None:
     failed, tried = doctest.testfile(str(page), module_relative=False)
-    assert failed == 0
-    assert tried or ">>>" not in page.read_text()
+    assert tried and failed == 0
 
 
 def test_examples_of_every_module() -> None:
     folders = ("fieldcal", "drivers", "procedures", "sim_device")
     paths = [p for f in folders for p in (DOCS.parent / f).rglob("*.py")]
-    names = {str(p.relative_to(DOCS.parent).with_suffix("")) for p in paths}
+    some = with_examples(paths)
+    names = {str(p.relative_to(DOCS.parent).with_suffix("")) for p in some}
     failed: dict[str, doctest.TestResults] = {}
     for name in sorted(names):
         dotted = name.replace("/", ".").removesuffix(".__init__")
         if not dotted.startswith("fieldcal"):
             dotted = f"fieldcal.{dotted}"
-        if not dotted.endswith("__main__"):
-            result = doctest.testmod(import_module(dotted))
-            failed |= {dotted: result} if result.failed else {}
+        result = doctest.testmod(import_module(dotted))
+        failed |= {dotted: result} if result.failed else {}
     assert not failed
 
 

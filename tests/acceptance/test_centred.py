@@ -228,8 +228,11 @@ def test_the_odds_of_gyroscopes_at_zero_are_those_of_two_normal_laws(seed: int) 
     assert chance == pytest.approx(expected, rel=0.15, abs=0.02)
 
 
-def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device() -> None:
-    rng, count = np.random.default_rng(12), 300
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.thorough)])
+def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device(
+    count: int,
+) -> None:
+    rng = np.random.default_rng(12)
     taken = 0
     for _ in range(count):
         windows, block = at_rest(rng, 0.0)

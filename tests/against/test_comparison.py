@@ -155,6 +155,7 @@ def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
     assert abs(off - 1.8e-3) < 4 * sigma < 1e-3
 
 
+@pytest.mark.thorough
 def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
     real: Side,
 ) -> None:

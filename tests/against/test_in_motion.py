@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_circle import a_third
 from driven_like import DRIVE, written
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
@@ -30,6 +31,8 @@ from fieldcal.sim_device.vocabulary import effect
 TESTS = Path(__file__).parent.parent
 NAMES = ("recording", "simulator")
 NOISE = {"noise": {"white": WHITE, "markov": WHITE / 2, "tau": 2.0}}
+IN_MOTION = [name for name in catalogue() if kind(name).EXAMPLE.in_motion]
+"""Effects that only a reference shows which follows the motion."""
 CALIBRATION = {"acc_bias", "acc_scale", "gyr_bias", "gyr_scale", "misalignment"}
 
 
@@ -169,6 +172,7 @@ def test_a_butterworth_filter_is_no_delay_and_no_time_constant(true: Block) -> N
     assert 0.85 < found.after.chi2_per_dof < 1.15 < found.before.chi2_per_dof
 
 
+@pytest.mark.thorough
 def test_the_butterworth_filter_of_a_simulator_is_one_below_nothing() -> None:
     slow = block_of(recorded(DRIVE, {"second": (0.03, 0.03)}, 80.0, 25.0))
     found = held(NOISE, slow, seconds=30.0)
@@ -197,25 +201,23 @@ def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     assert not {d.id for d in kept.differences} - CALIBRATION
 
 
-def test_what_only_motion_shows_is_named_of_the_virtual_device() -> None:
+@pytest.mark.parametrize("name", a_third([(name,) for name in IN_MOTION]))
+def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> None:
     angles = ((0, 0), (90, 40), (-60, 0), (30, -70), (0, 80), (-90, -30)) * 2
     windows = [
         HeldWindow(np.deg2rad(a), np.deg2rad(b), 2.0 + 3 * i, 3.0 + 3 * i)
         for i, (a, b) in enumerate(angles)
     ]
     plain = from_tables({"sampling": {"rate_hz": 50.0}, "motion": {"turn_s": 1.0}})
-    names = [name for name in catalogue() if kind(name).EXAMPLE.in_motion]
-    assert names
-    for name in names:
-        given = kind(name).EXAMPLE.given
-        real = simulate(plain.having(effect(name, given)), windows, seed=3)
-        sim = simulate(plain, windows, seed=4, noise=False)
-        found = compared_in_motion((real, ABOUT), sim, NAMES)
-        assert {d.id for d in found.differences} - CALIBRATION == {name}
-        for part in set(given) & set(known()[name].names):
-            value = given[part]
-            told, sigma = number(found, name, part)
-            assert abs(told - value) < 4 * sigma < 0.5 * value
+    given = kind(name).EXAMPLE.given
+    real = simulate(plain.having(effect(name, given)), windows, seed=3)
+    sim = simulate(plain, windows, seed=4, noise=False)
+    found = compared_in_motion((real, ABOUT), sim, NAMES)
+    assert {d.id for d in found.differences} - CALIBRATION == {name}
+    for part in set(given) & set(known()[name].names):
+        value = given[part]
+        told, sigma = number(found, name, part)
+        assert abs(told - value) < 4 * sigma < 0.5 * value
 
 
 def test_nothing_is_said_of_what_is_alike() -> None:
@@ -318,6 +320,7 @@ def test_files_are_compared_by_their_motion(
     assert patch["effects"]["lever_arm"]["x"] == pytest.approx(0.2, abs=0.002)
 
 
+@pytest.mark.thorough
 def test_a_command_is_patched_until_it_moves_as_the_recording(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],

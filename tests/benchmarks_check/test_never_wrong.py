@@ -44,6 +44,7 @@ def test_an_error_beyond_a_limit_counts_beside_the_chance_of_one() -> None:
     assert beyond_limit([one, ("acc_bias.y", 0.0797, 0.01)], truth, limits)[0]
 
 
+@pytest.mark.thorough
 def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
     tmp_path: Path,
 ) -> None:
@@ -51,12 +52,14 @@ def test_turns_are_not_followed_with_a_scale_factor_by_the_earth_alone(
     assert found.go and 0 < found.off < WRONG
 
 
+@pytest.mark.thorough
 def test_a_gauge_as_long_as_the_gyroscopes_are_weak_is_seen(tmp_path: Path) -> None:
     """0.25 % and 0.27 %: turns show neither, and a K2 of 3 mg/g2 was taken for both."""
     found = of(tmp_path / "wide", 99_400_097, "gauge long", drawn_first=True)
     assert found.off < 3.0
 
 
+@pytest.mark.thorough
 def test_after_a_restart_what_no_position_shows_again_is_uncertain(
     tmp_path: Path,
 ) -> None:

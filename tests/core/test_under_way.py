@@ -97,8 +97,7 @@ def session(folder: Path, **said: Any) -> Session:
 
 
 def test_biases_and_scale_factors_under_way(tmp_path: Path) -> None:
-    """Without the velocity gravity, level and the rate of the base would be wrong."""
-    one = session(tmp_path / "said")
+    one = session(tmp_path)
     found = solved(one, rests(one))
     truth = dict.fromkeys((f"acc_scale.{x}" for x in "xyz"), 1.0)
     truth |= dict(
@@ -113,5 +112,10 @@ def test_biases_and_scale_factors_under_way(tmp_path: Path) -> None:
         assert abs(found.values[at] - value) < 4 * sigma[at], name
     carried = found.info.get("carried", {}).get("causes", {})
     assert "not_carried" not in found.info and all(p < 0.5 for p in carried.values())
-    unsaid = session(tmp_path / "unsaid", north_m_s=0, east_m_s=0)
+
+
+@pytest.mark.thorough
+def test_a_velocity_that_nobody_said_is_not_called_nothing(tmp_path: Path) -> None:
+    """Gravity, level and the rate of the base are wrong."""
+    unsaid = session(tmp_path, north_m_s=0, east_m_s=0)
     assert [e.id for e in diagnose(unsaid.block, unsaid.about).effects] != []

@@ -101,7 +101,10 @@ def test_what_shakes_a_device_is_no_wild_value() -> None:
     assert "decode_fault" not in told.ids
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed",
+    [0, 1, *(pytest.param(s, marks=pytest.mark.thorough) for s in range(2, 8))],
+)
 def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
     seed: int,
 ) -> None:

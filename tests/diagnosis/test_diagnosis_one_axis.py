@@ -44,7 +44,7 @@ def coupled(row: int, column: int, size: float) -> Fault:
         pytest.param(1, 145.4, {"ay": 0.03, "ax": -0.02}, marks=pytest.mark.thorough),
         (2, 150.0, {"ay": 0.0135}),
         pytest.param(3, 96.5, {"gz": 0.001}, marks=pytest.mark.thorough),
-        (6, 139.3, {"gz": 0.0005, "ax": 0.002}),
+        pytest.param(6, 139.3, {"gz": 0.0005, "ax": 0.002}, marks=pytest.mark.thorough),
     ],
 )
 def test_a_jump_amid_a_window_is_no_bump_and_has_its_size(

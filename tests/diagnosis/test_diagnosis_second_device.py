@@ -92,6 +92,7 @@ def test_flicker_that_every_device_has_is_nothing_left_out(
     assert said.verdict == "consistent" and said.probability > 0.5
 
 
+@pytest.mark.thorough
 def test_what_is_left_out_is_found_beside_flicker(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, flicker, asymmetry)
     assert named(said) == ["scale_asymmetry"]

@@ -52,6 +52,7 @@ def test_gyroscopes_alone_are_late_as_well(tmp_path: Path) -> None:
     assert abs(value - TAU) < 3 * sigma < 0.4 * TAU
 
 
+@pytest.mark.thorough
 def test_a_butterworth_filter_only_makes_late(tmp_path: Path) -> None:
     """Its impulse response has no variance, so that of first order is not named."""
     found = found_in(tmp_path, "second_order:acc=0.03,gyr=0.03")

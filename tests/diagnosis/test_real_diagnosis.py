@@ -184,6 +184,7 @@ def test_an_autopilot_on_the_bench_warms_up(shared: Path, tmp_path: Path) -> Non
     )
 
 
+@pytest.mark.thorough
 def test_ten_minutes_on_a_table_follow_a_quarter_of_a_kelvin(tmp_path: Path) -> None:
     pytest.importorskip("h5py", reason="h5py reads these recordings")
     said = diagnosed(written(partial(at_rest_for, TEN_MINUTES), tmp_path / "s"))

@@ -15,7 +15,7 @@ from can_wires import (
     sample,
     stream,
 )
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Block
@@ -203,6 +203,7 @@ def test_stamps_put_frames_together_and_unwrap(tmp_path: Path) -> None:
     assert (health.incomplete, health.gaps, health.missing) == (1, 1, 1)
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 2**32), st.lists(st.integers(0, 300), max_size=20))
 @pytest.mark.parametrize("query", [f"map={KEYED}", f"map={TURNS}"])
 def test_frames_of_noise_break_nothing_however_they_are_cut(

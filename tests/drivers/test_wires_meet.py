@@ -41,7 +41,7 @@ def test_the_virtual_device_writes_what_the_drivers_read() -> None:
 @pytest.mark.parametrize("cut", [10_000_000, 4096, 61])
 def test_what_was_measured_arrives_within_the_rounding(name: str, cut: int) -> None:
     rng = np.random.default_rng(11)
-    n = 2000
+    n = 800
     sent = Block.of(
         1000 + np.arange(n) / 200,
         rng.normal(0, 20, (n, 3)),

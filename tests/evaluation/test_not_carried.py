@@ -205,23 +205,28 @@ BY_HAND = [(181.3, 0.8), (88.9, -1.6), (1.1, 91.4), (-92.0, 0.7)]
 """Faces on which the device is laid: about these angles, and nobody knows which."""
 
 
+@pytest.mark.parametrize(
+    ("size", "other"),
+    [pytest.param(44.0, False, marks=pytest.mark.thorough), (231.0, True)],
+)
 def test_angles_that_nobody_sets_so_are_those_of_other_positions(
+    size: float,
+    other: bool,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Their size was refused as an option that nobody had given."""
-    for size, other in ((44.0, False), (231.0, True)):
-        monkeypatch.setattr(solution, "angles_set", lambda _, size=size: size)
-        said = places([WIDE[i] for i in (0, 2, 1, 4, 3, *range(5, len(WIDE)))])
-        folder = tmp_path / str(size)
-        write_session(folder, recorded(CALM, places(WIDE)), said, site=SITE)
-        assert main(["solve", str(folder), "--json"]) == 1
-        out: dict[str, Any] = json.loads(capsys.readouterr().out)
-        assert out["verdict"] == "bad" or not other
-        assert (solution.OTHER_ANGLES in out["warnings"]) == other
+    monkeypatch.setattr(solution, "angles_set", lambda _: size)
+    said = places([FACES[i] for i in (0, 2, 1, 3, 4, 5)])
+    write_session(tmp_path, recorded(CALM, places(FACES)), said, site=SITE)
+    assert main(["solve", str(tmp_path), "--json"]) == 1
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert out["verdict"] == "bad" or not other
+    assert (solution.OTHER_ANGLES in out["warnings"]) == other
 
 
+@pytest.mark.thorough
 def test_faces_laid_by_hand_bear_witness_to_angles_set_badly(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -249,7 +254,7 @@ def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
 ) -> None:
     """A scale factor of all axes alike, which gravity elsewhere would be as well."""
     profile = replace(CALM, truth=replace(CALM.truth, acc_scale=(1.0016,) * 3))
-    held = places(WIDE[:8], 12.0)
+    held = places(FACES, 12.0)
     free = [{k: v for k, v in p.items() if "deg" not in k} for p in held]
     block, verdicts = recorded(profile, held), {}
     for name, site in (("said", SITE), ("unsaid", {})):

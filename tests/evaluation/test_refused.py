@@ -81,7 +81,11 @@ def test_a_device_without_gyroscopes_is_no_copy(
     [
         ({"model": {"effects": ["nonsense"]}}, "no effect in the catalogue"),
         ({"range": {"acceleration": 5.0}}, "beyond [range] acceleration = 5 m/s^2"),
-        ({"range": {"angular_rate": 0.01}}, "beyond [range] angular_rate = 0.01 rad/s"),
+        pytest.param(
+            {"range": {"angular_rate": 0.01}},
+            "beyond [range] angular_rate = 0.01 rad/s",
+            marks=pytest.mark.thorough,
+        ),
         ({"site": {"height_m": 10.0}}, "the site is not stated"),
         ({"range": {"acceleration": 1e3}}, ""),
     ],

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from session_folders import places, recorded, write_session
+from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
@@ -19,7 +19,7 @@ from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
 
 MG, MRAD = 9.80665e-3, 1e-3
 SILENT = NoiseFigures(ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO)
-WHERE = places(seconds=12.0)
+WHERE = places(NINE[:6], seconds=12.0)
 
 
 def coarse(turns: bool = True) -> Block:

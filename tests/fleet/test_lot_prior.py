@@ -84,12 +84,12 @@ def test_what_goes_together_in_a_lot_is_told_from_errors_that_do(lot: float) -> 
 def test_few_units_leave_as_much_open_as_is_said() -> None:
     rng = np.random.default_rng(4)
     off = []
-    for _ in range(15):
+    for _ in range(10):
         found = lot_prior("7", drawn(rng, 7))
         following = MIDDLE + WIDE * rng.standard_normal((3, 4))
         off.append((following - found.mean) / found.sigma)
     inside = np.mean(np.abs(off) < 1.96)
-    assert 0.91 < inside < 0.99, "of 180 intervals"
+    assert 0.91 < inside < 0.99, "of 120 intervals"
 
 
 def test_odd_units_and_the_unit_itself_have_no_say() -> None:

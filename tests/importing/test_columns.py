@@ -31,7 +31,7 @@ def assert_same(session: Session, rows: Array) -> None:
 
 
 @settings(
-    max_examples=12,
+    max_examples=8,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -135,6 +135,7 @@ def test_a_position_that_was_moved_is_named_and_costs_the_others_nothing(
     assert (np.abs(off) < 3 * sigma).all() and sigma.max() < 8e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [30])
 def test_a_position_that_was_moved_hides_no_effect(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]

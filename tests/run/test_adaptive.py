@@ -190,6 +190,7 @@ def test_it_takes_no_more_positions_than_it_may_and_those_of_its_ladder(
     )
 
 
+@pytest.mark.thorough
 def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -> None:
     two = {"procedure": "positions"}
     start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]

@@ -55,7 +55,7 @@ def test_the_length_of_the_earths_rate_gives_the_bias(
     tmp_path: Path, recorded: bool
 ) -> None:
     every = []
-    for seed in range(3 if recorded else 8):
+    for seed in range(2 if recorded else 6):
         session = held(tmp_path / str(seed), seed)
         if recorded:
             found = solved(session, rests(session), "no", dict.fromkeys(FACTORY, 0.0))

@@ -120,6 +120,7 @@ def test_positions_may_be_listed_in_any_order(
         assert [ORDER[p] for p in other["position"]] == one["position"]
 
 
+@pytest.mark.thorough
 def test_a_solution_does_not_hang_on_the_order_of_the_list(
     coupled: Block, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -81,7 +81,7 @@ def test_pulls_and_chi2_with_unequal_windows(cross: bool) -> None:
     u = shown(f, UPPER * cross)
     p = 9 if cross else 6
     pulls, chi2 = [], []
-    for _ in range(60):
+    for _ in range(40):
         seen = observe(by_hand(15), u + size * rng.standard_normal((15, 3)))
         seen.covariance[:, range(3), range(3)] = size**2
         found = solve(seen, cross=cross)
@@ -98,7 +98,7 @@ def test_pulls_and_chi2_with_unequal_windows(cross: bool) -> None:
 def test_scatter_beyond_the_windows_widens_the_intervals(n: int) -> None:
     rng = np.random.default_rng(n)
     inside = []
-    for seed in range(50):
+    for seed in range(30):
         f = spread_over_the_sphere(n, 100 + seed % 7)
         u = shown(f, 0 * UPPER) + 5e-3 * rng.standard_normal((n, 3))
         found = solve(observe(by_hand(n), u, sigma=2e-4))

@@ -82,7 +82,7 @@ def test_the_length_of_a_rate_gives_bias_and_scale_factor(
     tmp_path: Path, rests: int
 ) -> None:
     every = []
-    for seed in range(10):
+    for seed in range(6):
         found = solved(turned(tmp_path / str(seed), seed, rests=rests))
         assert found.vector("gyr_scale")[1].max() < 2e-3
         every.append(pulls(found))
@@ -106,7 +106,7 @@ def test_a_bias_as_large_as_the_rate_bends_nothing(tmp_path: Path) -> None:
 
 def test_what_the_speed_is_off_by_is_in_every_scale_factor(tmp_path: Path) -> None:
     sigma, rng, every = 0.05, np.random.default_rng(5), []
-    for seed in range(12):
+    for seed in range(8):
         off = float(rng.normal(0, sigma / 20.0))
         made = turned(tmp_path / str(seed), seed, off=off, speed_sd_deg_s=sigma)
         found = solved(made)

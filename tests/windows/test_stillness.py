@@ -49,7 +49,9 @@ def watch(block: Block, piece: float = 0.1) -> list[tuple[float, bool, float | N
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("rate", [50.0, 100.0, 1000.0])
+@pytest.mark.parametrize(
+    "rate", [50.0, pytest.param(100.0, marks=pytest.mark.thorough), 1000.0]
+)
 @pytest.mark.parametrize(
     ("legs", "level"),
     [

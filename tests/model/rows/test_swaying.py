@@ -117,6 +117,7 @@ def test_it_calibrates_through_sway(tmp_path: Path) -> None:
     assert needed.unit == "s" and 5 < float(needed.value) < 100
 
 
+@pytest.mark.thorough
 def test_it_calibrates_accelerometers_without_gyroscopes(tmp_path: Path) -> None:
     """Biases as on firm ground; whether it turns or is pushed, in the scale factors."""
     block = played(3, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))

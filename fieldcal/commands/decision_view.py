@@ -23,8 +23,6 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     """
     from fieldcal.commands.console import ShownConsole
     from fieldcal.commands.table import say
-    from fieldcal.run.session_run import positions_left_out
-    from fieldcal.session.folder import Session
 
     decision = found.info.get("decision")
     if not decision:
@@ -42,8 +40,18 @@ def show_decision(found: Calibration, folder: Path | None = None) -> None:
     remedy = decision.get("remedy")
     if remedy:
         say(console, "to GO: ", remedy["says"])
-    if folder is None or decision["go"]:
-        return
+    if folder is not None and not decision["go"]:
+        _how_to_go_on(folder, remedy)
+
+
+def _how_to_go_on(folder: Path, remedy: dict[str, Any] | None) -> None:
+    """Print which command takes the remedy, or positions that were left out."""
+    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.table import say
+    from fieldcal.run.session_run import positions_left_out
+    from fieldcal.session.folder import Session
+
+    console = ShownConsole()
     call = f"fieldcal run --resume {shlex.quote(str(folder))}"
     if remedy:
         say(console, "       ", f"{call} takes it")

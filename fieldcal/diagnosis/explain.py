@@ -40,7 +40,7 @@ from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.model.turns.turn import Turning
+from fieldcal.model.turns.turn import Turn, Turning
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 
@@ -103,6 +103,11 @@ class Explanation:
         if group is None:
             return None
         return remaining(self.best.set, self.inferred.turned, group.columns)
+
+    @cached_property
+    def turns(self) -> list[Turn]:
+        """The turns as what was found follows them."""
+        return self.inferred.inference.turns_by(self.state)
 
     @cached_property
     def turns_held_out(self) -> Array:

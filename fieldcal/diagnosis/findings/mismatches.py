@@ -132,7 +132,8 @@ def shown(explanation: Explanation, standing: Standing) -> dict[str, float]:
     """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
     inference = explanation.inferred.inference
     out: dict[str, float] = {}
-    for course in inference.on_turns(explanation.state, standing.members):
+    state, members = explanation.state, standing.members
+    for course in inference.on_turns(explanation.turns, state, members):
         for c, name in enumerate(CHANNELS):
             size = float(np.sqrt(np.mean(course[:, c] ** 2)))
             out[name] = max(out.get(name, 0.0), size)

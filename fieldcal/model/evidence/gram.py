@@ -266,7 +266,7 @@ class Eliminated:
 
 
 def root_of(scaled: Array) -> Array:
-    """Lower triangular root of I + S G S, none of whose eigenvalues is below 1.
+    """Lower triangular root of I + S G S, (..., k, k), no eigenvalue of it below 1.
 
     By rounding some may be, where what the rows say of columns differs by as much as
     numbers have digits: of windows of hours, which show slow cosines a million times
@@ -279,25 +279,29 @@ def root_of(scaled: Array) -> Array:
         out: Array = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         values, along = np.linalg.eigh(scaled)
-        half = (along * np.sqrt(np.maximum(values, 1.0))).T
-        _, upper = np.linalg.qr(half)
-        out = upper.T * np.sign(np.diag(upper))
+        half = along * np.sqrt(np.maximum(values, 1.0))[..., None, :]
+        upper = np.linalg.qr(np.swapaxes(half, -1, -2))[1]
+        positive = np.sign(np.diagonal(upper, 0, -2, -1))
+        out = np.swapaxes(upper, -1, -2) * positive[..., None, :]
     return out
 
 
 def inverse_of(root: Array) -> Array:
-    """Inverse of a lower triangular matrix, in halves: a general one costs six times.
+    """Inverse of lower triangular matrices, in halves: general ones cost six times.
 
     >>> (inverse_of(np.tri(200)) @ np.tri(200) == np.eye(200)).all()
     np.True_
     """
-    if len(root) <= SMALL:
+    width = root.shape[-1]
+    if width <= SMALL:
         out: Array = np.linalg.inv(root)
         return out
-    k = len(root) // 2
-    first, last = inverse_of(root[:k, :k]), inverse_of(root[k:, k:])
-    corner = -last @ (root[k:, :k] @ first)
-    return np.block([[first, np.zeros((k, len(root) - k))], [corner, last]])
+    k = width // 2
+    out = np.zeros(root.shape)
+    out[..., :k, :k] = first = inverse_of(root[..., :k, :k])
+    out[..., k:, k:] = last = inverse_of(root[..., k:, k:])
+    out[..., k:, :k] = -last @ (root[..., k:, :k] @ first)
+    return out
 
 
 def gains(inner: Array, pull: Array, own: Array | float) -> Array:

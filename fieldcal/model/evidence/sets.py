@@ -91,6 +91,7 @@ class Sets:
         there = np.unique(gram.kind[gram.info > 0])
         self.unstable = dictionary.unstable * np.isin(np.arange(7), there)
         self.visited: dict[tuple[tuple[str, int], ...], Set] = {}
+        self._weighed: dict[tuple[int, ...], Weighed] = {}
 
     @staticmethod
     def key(members: Iterable[Member]) -> tuple[tuple[str, int], ...]:
@@ -119,10 +120,12 @@ class Sets:
             before.append((cause, group))
         return total
 
-    def weighed(self, instability: Iterable[int]) -> Weighed:
+    def weighed(self, instability: tuple[int, ...]) -> Weighed:
         """Rows at some instabilities."""
-        wide = np.array([priors.SIZES[i] for i in instability])
-        return self.gram.weighed(wide * self.unstable)
+        if instability not in self._weighed:
+            tau = priors.SIZES[list(instability)] * self.unstable
+            self._weighed[instability] = self.gram.weighed(tau)
+        return self._weighed[instability]
 
     def alike(self, instability: Sequence[int] | Array) -> Any:
         """How likely instabilities (..., 7) are, ln: a triad's axes are much alike."""

@@ -170,7 +170,8 @@ class Sizing:
         widths = np.cumsum([0, *(len(g.columns) for g in self.groups)]).tolist()
         self.places = [slice(a, b) for a, b in pairwise(widths)]
         self.gram = gram.only(self.every)
-        self._last: tuple[tuple[int, ...], Eliminated] | None = None
+        self._states: dict[tuple[int, ...], Eliminated] = {}
+        self._gained: dict[tuple[int, ...], Array] = {}
 
     def run(self) -> tuple[Sizes, float, Array]:
         """Seek sizes until they stay: sizes, ln Z summed over them, all columns'."""
@@ -199,11 +200,11 @@ class Sizing:
     def eliminated(self) -> Eliminated:
         """The set at the sizes as they are."""
         key = (*self.sizes, *self.instability)
-        if self._last is None or self._last[0] != key:
+        if key not in self._states:
             tau = priors.SIZES[self.instability] * self.unstable
-            state = Eliminated.of(self.gram.weighed(tau), self.every, self._wide())
-            self._last = key, state
-        return self._last[1]
+            rows = self.gram.weighed(tau)
+            self._states[key] = Eliminated.of(rows, self.every, self._wide())
+        return self._states[key]
 
     def _wide(self) -> Array:
         parts = []
@@ -295,6 +296,13 @@ class Sizing:
 
     def _channel(self, c: int) -> Array:
         """Gain over the instabilities of one channel, the others as they are."""
+        key = (c, *self.sizes, *self.instability)
+        if key not in self._gained:
+            self._gained[key] = self._gained_by(c)
+        return self._gained[key]
+
+    def _gained_by(self, c: int) -> Array:
+        """The same, not known yet."""
         inner, pull = self.eliminated().of_means(c, 1.0)
         tau = float(priors.SIZES[self.instability[c]] * self.unstable[c])
         told, axes = np.linalg.eigh(inner)

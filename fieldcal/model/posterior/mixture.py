@@ -23,7 +23,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated, Gram, gains
+from fieldcal.model.evidence.gram import Gram, gains
 from fieldcal.model.evidence.levels import Levels, levels
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import DENSITY, TRIADS, Sizing, alike
@@ -63,6 +63,10 @@ class Hypothesis:
     size: int
     chance: float
     score: float
+
+
+Hypotheses = tuple[Hypothesis, ...]
+"""One of each triad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,23 +129,16 @@ class Mixing:
         """Mix."""
         lists = [self._of_triad(triad) for triad in TRIADS]
         best = sum(max(h.score for h in some) for some in lists)
-        every = [
-            self._exactly(parts)
-            for parts in product(*lists)
-            if sum(h.score for h in parts) > best - KEPT
-        ]
-        score = np.array([s for s, _, _ in every])
+        near = [parts for parts in product(*lists)
+                if sum(h.score for h in parts) > best - KEPT]  # fmt: skip
+        tau = priors.SIZES[[self._sizes_of(parts) for parts in near]] * self.unstable
+        score, means, covariances = self._exactly(near, tau)
         score += alike(self.there.sizes.instability, self.unstable, self.density)
         total = float(np.logaddexp.reduce(score))
         weight = np.exp(score - total)
-        means = np.array([e.estimate[: len(self.columns)] for _, e, _ in every])
         mean: Array = weight @ means
-        k = len(self.columns)
-        covariance = np.einsum(
-            "h,hij->ij", weight, np.array([e.inverse[:k, :k] for _, e, _ in every])
-        )
+        covariance = np.einsum("h,hij->ij", weight, covariances)
         covariance += covariance_of_means(means, weight)
-        tau = np.array([t for _, _, t in every])
         scatter = np.sqrt(weight @ tau**2)
         return Mixture(
             self.columns, mean, covariance, self.wide, self.bad, scatter, total
@@ -166,7 +163,7 @@ class Mixing:
         sizes, known = self._shifted(triad)
         doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
         taus = priors.SIZES[np.array(sizes)] * self.unstable
-        there = levels(self.gram, self.columns, self.wide, triad, taus, doubted)
+        there = levels(self.gram, self.columns, self.wide, taus, doubted)
         alone = there.score + known
         found = [
             Hypothesis(s, -1, 0, k, v)
@@ -194,7 +191,7 @@ class Mixing:
         middle = round(float(np.mean([mode[c] for c in triad])))
         top = len(priors.SIZES) - 1
         moved = [
-            tuple(int(np.clip(m + s, 0, top)) if c in triad else m
+            tuple(min(max(m + s, 0), top) if c in triad else m
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
@@ -222,24 +219,38 @@ class Mixing:
         own = (there.alone * typical**2).max(axis=-1)
         return gains(inner, there.pull * typical, own)
 
-    def _exactly(self, parts: Sequence[Hypothesis]) -> tuple[float, Eliminated, Array]:
-        """Hypotheses of each triad together: their score, estimate, instabilities."""
+    def _sizes_of(self, parts: Hypotheses) -> list[int]:
+        """Instabilities of hypotheses of each triad together, (7,)."""
         sizes = list(self.there.sizes.instability)
         for triad, one in zip(TRIADS, parts, strict=True):
             for c in triad:
                 sizes[c] = one.sizes[c]
-        columns, wide, window = self.columns, self.wide, parts[0].window
-        if window >= 0:
-            at = dict(self.doubted)[window]
-            size = priors.SIZES[parts[0].size] * self._typical(at)
-            columns, wide = np.append(columns, at), np.append(wide, size)
-        state = self._at(sizes, columns, wide)
-        tau = priors.SIZES[sizes] * self.unstable
-        return state.score + sum(h.chance for h in parts), state, tau
+        return sizes
 
-    def _at(self, sizes: Sequence[int], columns: Index, wide: Array) -> Eliminated:
-        tau = priors.SIZES[list(sizes)] * self.unstable
-        return Eliminated.of(self.gram.weighed(tau), columns, wide)
+    def _exactly(
+        self, near: Sequence[Hypotheses], tau: Array
+    ) -> tuple[Array, Array, Array]:
+        """Scores (h,), means (h, k) and covariances (h, k, k) of hypotheses together.
+
+        `near` are those of each triad, `tau` (h, 7) their instabilities.
+        """
+        k = len(self.columns)
+        score = np.array([sum(h.chance for h in parts) for parts in near])
+        mean, covariance = np.empty((len(near), k)), np.empty((len(near), k, k))
+        window = np.array([acc.window for acc, *_ in near])
+        for bad in np.unique(window).tolist():
+            some = np.flatnonzero(window == bad)
+            columns, wide = self.columns, np.tile(self.wide, (len(some), 1))
+            if bad >= 0:
+                at = dict(self.doubted)[bad]
+                off = priors.SIZES[[near[h][0].size for h in some.tolist()]]
+                columns = np.append(columns, at)
+                wide = np.hstack([wide, np.outer(off, self._typical(at))])
+            there = levels(self.gram, columns, wide, tau[some], NONE)
+            score[some] += there.score
+            means, covariances = there.posterior()
+            mean[some], covariance[some] = means[:, :k], covariances[:, :k, :k]
+        return score, mean, covariance
 
     def _typical(self, at: Index) -> Array:
         unit = self.dictionary.unit[:3][[c for c in self.dictionary.observed if c < 3]]

@@ -21,6 +21,7 @@ from fieldcal.model.system.fitted import whole
 from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
+from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.effect import Motion, Sensor
 
 NEWTON = 6
@@ -119,15 +120,21 @@ class GaussNewton:
         groups = [*self.dictionary.always, *(g for _, g in members)]
         return np.concatenate([g.columns for g in groups if g.in_state])
 
-    def on_turns(self, state: State, members: Sequence[Member]) -> Iterator[Array]:
-        """What some causes make of the outputs in each turn, (m + 1, 6)."""
+    def turns_by(self, state: State) -> list[Turn]:
+        """The turns as a state follows them."""
+        return [] if self.turns is None else list(self.turns.turning.turns(state))
+
+    def on_turns(
+        self, turns: Sequence[Turn], state: State, members: Sequence[Member]
+    ) -> Iterator[Array]:
+        """What some causes of a state make of the outputs in turns, (m + 1, 6) each."""
         if self.turns is None:
             return
         terms = tuple(
             t for t in state.terms
             if any(t.effect is g.effect for _, g in members)
         )  # fmt: skip
-        yield from self.turns.courses(state, terms)
+        yield from self.turns.courses(turns, state, terms)
 
     def moved(self, found: Set) -> tuple[State, Array]:
         """The state at a set's estimate, and its columns' values."""

@@ -119,11 +119,13 @@ class Turns:
             [self._rows(*one, values) for one in zip(turns, views, met, strict=True)]
         )
 
-    def courses(self, state: State, terms: Sequence[Term]) -> Iterator[Array]:
-        """Outputs that some terms make in each turn, at its edges, (m + 1, 6)."""
+    def courses(
+        self, turns: Sequence[Turn], state: State, terms: Sequence[Term]
+    ) -> Iterator[Array]:
+        """Outputs that some terms of a state make in turns, at edges, (m + 1, 6)."""
         rest = tuple(t for t in state.terms if t not in terms)
         less = replace(state, terms=rest)
-        for turn in self.turning.turns(state):
+        for turn in turns:
             since = self.turning.after(turn.t, turn.positions[1])
             x = moved(replace(turn.x, f=turn.felt), less)
             yield state.output(turn.x, since) - less.output(x, since)

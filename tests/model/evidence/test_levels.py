@@ -30,11 +30,8 @@ def left(dense: Dense, block: Array) -> tuple[Array, Array, Array]:
 
 @pytest.mark.parametrize("at_once", [1, module.AT_ONCE], ids=["single", "together"])
 @pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
-@pytest.mark.parametrize(
-    ("kinds", "times"), [((0, 1, 2), ACC), ((3, 4, 5), GYRO), ((6,), TURNS)]
-)
+@pytest.mark.parametrize("times", [ACC, GYRO, TURNS], ids=["acc", "gyro", "turns"])
 def test_levels_are_those_of_the_rows_written_out(
-    kinds: tuple[int, ...],
     times: Array,
     free: tuple[int, ...],
     at_once: int,
@@ -42,7 +39,7 @@ def test_levels_are_those_of_the_rows_written_out(
 ) -> None:
     monkeypatch.setattr(module, "AT_ONCE", at_once)
     taus = TAU * times
-    found = levels(case(2, free).gram, SET, WIDE, kinds, taus, FURTHER)
+    found = levels(case(2, free).gram, SET, WIDE, taus, FURTHER)
     for n, tau in enumerate(taus):
         dense = case(2, free, tau).dense
         assert found.score[n] == pytest.approx(dense.evidence(SET, WIDE), rel=1e-9)
@@ -55,7 +52,7 @@ def test_levels_are_those_of_the_rows_written_out(
 
 def test_a_set_that_may_be_given_nothing_has_its_score_all_the_same() -> None:
     none = np.empty((0, 1), dtype=np.intp)
-    found = levels(case(0).gram, SET, WIDE, (0, 1, 2), TAU * ACC, none)
+    found = levels(case(0).gram, SET, WIDE, TAU * ACC, none)
     expected = [case(0, (), tau).dense.evidence(SET, WIDE) for tau in TAU * ACC]
     np.testing.assert_allclose(found.score, expected, rtol=1e-9)
     assert found.inner.shape == (2, 0, 1, 1)

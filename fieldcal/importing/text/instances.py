@@ -64,8 +64,11 @@ def instances_in(lines: Sequence[str], separator: str | None) -> Instances | Non
     rows = [cells(line, parted) for line in lines]
     width = len(rows[-1])
     whole = [row for row in rows if len(row) == width]
-    numbers = [r for r in whole if sum(is_number(c, parted != ",") for c in r) > 1]
-    above = [row for row in whole if row not in numbers]
+    numbers: list[list[str]] = []
+    above: list[list[str]] = []
+    for row in whole:
+        values = sum(is_number(cell, parted != ",") for cell in row)
+        (numbers if values > 1 else above).append(row)
     for i in range(width):
         column = [row[i] for row in numbers]
         named = any(tells_devices(row[i]) for row in above)

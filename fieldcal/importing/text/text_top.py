@@ -70,6 +70,8 @@ def is_number(cell: str, comma: bool) -> bool:
 
 def cells(line: str, separator: str | None) -> list[str]:
     """Cells of a line, without spaces and quotes about them."""
+    if separator is None and '"' not in line:
+        return line.split()
     return [cell.strip().strip('"').strip() for cell in line.split(separator)]
 
 

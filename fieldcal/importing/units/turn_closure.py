@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.rotation import cross_matrix
 from fieldcal.core.samples import Array
 
 GROUP_S, REST_S, TURN_S = 0.1, 0.5, 20.0
@@ -141,7 +142,8 @@ def _missed(turn: Turned, scales: Array) -> Array:
             continue
         axis, by = angle / size, size / scales[:, None]
         along = (u @ axis)[:, None] * axis
+        across = u @ cross_matrix(axis)  # u x axis, rows
         # (1): the force turns against the device
-        u = along + (u - along) * np.cos(by) + np.cross(u, axis) * np.sin(by)
+        u = along + (u - along) * np.cos(by) + across * np.sin(by)
     missed: Array = np.arccos(np.clip(u @ turn.behind, -1, 1))
     return missed

@@ -158,19 +158,31 @@ def _unrest(rates: Array, rate: float) -> Array:
 
     nan of an axis without noise, or with nothing that tells it.
     """
-    unrest = np.full(3, np.nan)
-    some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    noise = _quickest(rates)
+    some, unrest = np.isfinite(noise), np.full(3, np.nan)
     if not some.any():
         return unrest
     many = min(len(rates), max(round(rate), 8))
-    noise = quickest([rates[:, some]]) ** 2 / rate * (many / rate) / 15
+    white = noise[some] ** 2 / rate * (many / rate) / 15
     parts = np.array_split(rates[:, some], len(rates) // many)
-    nothing = np.zeros(len(noise))
+    nothing = np.zeros(len(white))
     turned = [_tremor_rms(part, len(part) / rate, nothing) ** 2 for part in parts]
     # a hand does so all the time, and a bump in a second or two
     usual = np.median(turned, axis=0)
-    unrest[some] = usual / np.where(noise > 0, noise, np.nan)
+    unrest[some] = usual / np.where(white > 0, white, np.nan)
     return unrest
+
+
+def _quickest(rates: Array) -> Array:
+    """Deviation of one sample of a window beside what is slower, (3,).
+
+    nan of an axis of which nothing is known.
+    """
+    out = np.full(3, np.nan)
+    some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
+    if some.any():
+        out[some] = quickest([rates[:, some]])
+    return out
 
 
 def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
@@ -181,7 +193,11 @@ def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | Non
     free = ~rows.x.oriented.any() and len(pieces) >= FEWEST
     if not free or not to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
-    beside: Array = np.maximum(quickest(pieces), least)
+    # where a hand is quick, differences of samples show it as well
+    each = np.ma.masked_invalid([_quickest(piece[:, GYR]) for piece in pieces])
+    loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
+    quiet = np.argsort(loud)[: max(round(QUIET * len(pieces)), 1)]
+    beside: Array = np.fmax(quickest([pieces[i] for i in quiet]), least)
     return beside
 
 

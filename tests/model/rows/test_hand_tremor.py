@@ -180,6 +180,14 @@ def test_a_quick_hand_is_no_noise_of_the_sensors() -> None:
     assert 0.2 < np.sqrt(np.mean(np.square(along))) < 1.3
 
 
+def test_where_it_is_quick_in_some_windows_the_others_tell_the_noise() -> None:
+    """Half of them tremble so quickly that one sample shows it from the next."""
+    angles = np.zeros((12, 3))
+    angles[::2] = 2e-3
+    found = [rows_in_a_hand(recording(angles, s, (8.0, 12.0))).noise for s in range(8)]
+    assert np.mean(found, axis=0)[3:] == pytest.approx(NOISE[3:], rel=0.1)
+
+
 def rows_of_seed(seed: int) -> Rows:
     return reduce(recording(np.full((5, 3), 1e-3), seed, QUICKLY))
 

@@ -65,8 +65,27 @@ WAITING = (
 """Modules whose tests wait for devices in processes of their own: two groups that wait
 about as long, as one alone would wait for longer than all others calculate."""
 
-SPREAD = frozenset(["test_any_recording", "test_diagnosis_contract", "test_twin"])
-"""Long modules whose tests have nothing in common that takes time to make."""
+SPREAD = frozenset(
+    [
+        "test_adaptive",
+        "test_any_recording",
+        "test_diagnosis_contract",
+        "test_diagnosis_odd_one",
+        "test_diagnosis_one_axis",
+        "test_diagnosis_second_device",
+        "test_earth_norm",
+        "test_in_motion",
+        "test_levelled",
+        "test_nested_windows",
+        "test_not_carried",
+        "test_twin",
+    ]
+)
+"""Long modules whose tests have nothing in common that takes time to make.
+
+They come last, one test at a time: no process is left with a long module when the
+others have ended.
+"""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

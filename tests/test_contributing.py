@@ -88,7 +88,7 @@ def test_a_command(tree: Path) -> None:
 
 def test_a_procedure_and_an_exporter(tree: Path, tmp_path: Path) -> None:
     session, out = tmp_path / "session", tmp_path / "out.ini"
-    how = ["--virtual", "--speed", "max", "--seconds", "2", "--headless", "--json"]
+    how = ["--virtual", "--speed", "20", "--seconds", "2", "--headless", "--json"]
     where = ["-o", str(session), "--history", str(tmp_path / "history.db")]
     done = ran(tree, "-m", "fieldcal", "run", "six_faces", *how, *where, "--no-report")
     assert done.returncode in (0, 1) and done.stdout, done.stderr

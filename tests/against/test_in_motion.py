@@ -164,6 +164,7 @@ def test_the_low_pass_of_a_simulator_is_a_time_constant_below_nothing() -> None:
         assert abs(tau + 0.02) < 4 * sigma < 0.008
 
 
+@pytest.mark.thorough
 def test_a_butterworth_filter_is_no_delay_and_no_time_constant(true: Block) -> None:
     found = held({"second": (0.0, 0.03), **NOISE}, true)
     assert {d.id for d in found.differences} - CALIBRATION == {"second_order"}

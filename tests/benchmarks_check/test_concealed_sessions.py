@@ -67,6 +67,7 @@ def test_a_table_of_known_speed_tells_nothing_else() -> None:
     assert not any(p.oriented or p.rate for p in positions)
 
 
+@pytest.mark.thorough
 def test_a_pier_without_gyroscopes_is_named() -> None:
     session = kinds()["pier, no gyroscopes"][0](np.random.default_rng(1))
     block = session.record(1)

@@ -130,14 +130,11 @@ def test_gyroscopes_reversed_beside_positions_exchanged_are_no_go(
     assert not found.go and "the estimate is bad" in found.says
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("mistake", "why"),
     [
-        pytest.param(
-            "outputs exchanged",
-            "gyr_axes = -y-x-z",
-            marks=pytest.mark.thorough,
-        ),
+        ("outputs exchanged", "gyr_axes = -y-x-z"),
         ("rad/s labelled deg/s", "unit = rad/s read as deg/s"),
     ],
 )

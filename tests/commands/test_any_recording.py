@@ -86,10 +86,14 @@ def holed(block: Block) -> Block:
 @pytest.mark.parametrize(
     "made",
     [
-        lambda b: replace(b, temperature=unknown(b.temperature)),
+        pytest.param(
+            lambda b: replace(b, temperature=unknown(b.temperature)), marks=thorough
+        ),
         pytest.param(lambda b: replace(b, gyr=unknown(b.gyr)), marks=thorough),
         pytest.param(lambda b: replace(b, gyr=0 * b.gyr), marks=thorough),
-        lambda b: replace(b, gyr=b.gyr * [1.0, np.nan, 1.0]),
+        pytest.param(
+            lambda b: replace(b, gyr=b.gyr * [1.0, np.nan, 1.0]), marks=thorough
+        ),
         pytest.param(bursty, marks=thorough),
         pytest.param(shaken, marks=thorough),
         holed,
@@ -304,7 +308,8 @@ def test_a_recording_of_windows_alone_has_lost_nothing(
     assert [e["id"] for e in said["effects"]] == ["cross_coupling"]
 
 
-@pytest.mark.parametrize("known", [pytest.param(True, marks=thorough), False])
+@thorough
+@pytest.mark.parametrize("known", [True, False])
 def test_one_long_static_recording(
     known: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -423,9 +428,10 @@ def test_a_sensor_that_says_nothing_does_not_cost_the_other(
     assert main(["report", str(folder)]) == 0
 
 
+@thorough
 @pytest.mark.parametrize(
     ("axes", "columns"),
-    [("+y-x+z", "gy,-gx,gz"), pytest.param("-x-y-z", "", marks=thorough)],
+    [("+y-x+z", "gy,-gx,gz"), ("-x-y-z", "")],
 )
 def test_gyroscopes_along_other_axes_are_named_and_mended(
     axes: str, columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

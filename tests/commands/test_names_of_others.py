@@ -101,7 +101,7 @@ def test_names_in_a_plan_and_on_the_lines_of_a_run(
     tables = {"position": where, "run": {"seconds": 5.0, "give_up_s": 5.0}}
     plan.write_text(tomlkit.dumps(tables))
     report = tmp_path / "run.xml"
-    run = ["run", str(plan), "--plain", "--virtual", "--speed", "max", "--no-report"]
+    run = ["run", str(plan), "--plain", "--virtual", "--speed", "20", "--no-report"]
     both = said(*run, "-o", str(tmp_path / "s"), "--junit", str(report))
     assert "left\\x1b[2J\\x0averdict: good" in both
     names = [case.get("name", "") for case in parse(report).getroot().iter("testcase")]

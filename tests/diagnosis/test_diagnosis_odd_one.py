@@ -72,6 +72,7 @@ def test_one_axis_in_one_position(window: int, tmp_path: Path) -> None:
     assert places(said) == {("a" + "xyz"[axis], (window,))}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("window", "alpha", "beta"),
     [

@@ -57,6 +57,7 @@ def test_of_a_clean_recording_everything_lost_to_chance(tmp_path: Path) -> None:
     assert all("no more than chance" in c.why for c in found.candidates)
 
 
+@pytest.mark.thorough
 def test_scatter_is_not_predicted_by_an_equation(tmp_path: Path) -> None:
     found = found_in(tmp_path, "angle_setting:sigma_deg=0.3", seed=5)
     strongest = found.candidates[0]

@@ -44,6 +44,7 @@ def test_both_triads_behind_one_of_first_order(
         assert abs(late - (gyr - acc)) < 3 * sigma + 0.01 * TAU
 
 
+@pytest.mark.thorough
 def test_gyroscopes_alone_are_late_as_well(tmp_path: Path) -> None:
     found = found_in(tmp_path, f"bandwidth:gyr={TAU}")
     assert {e.id for e in found.effects} == {"bandwidth", "time_delay"}

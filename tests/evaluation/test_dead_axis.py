@@ -34,7 +34,7 @@ def answers(tmp_path: Path, silent: list[int], code: int = 0) -> tuple[Any, Any]
     )
 
 
-@pytest.mark.parametrize("channel", [2, 4])
+@pytest.mark.parametrize("channel", [2, pytest.param(4, marks=pytest.mark.thorough)])
 def test_an_axis_that_never_changes_is_stuck_and_its_sensor_is_not_used(
     tmp_path: Path, channel: int
 ) -> None:

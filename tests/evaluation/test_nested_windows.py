@@ -64,6 +64,7 @@ def test_what_the_fixture_leaves_stays(tmp_path: Path) -> None:
     assert made.wins("acc_bias.y") == ("fixture", 5.0)
 
 
+@pytest.mark.thorough
 def test_flicker_wins_in_its_time(tmp_path: Path) -> None:
     made = found(tmp_path, flicker=2e-3)
     what, seconds = made.wins("acc_bias.x") or ("", 0.0)

@@ -30,7 +30,9 @@ def coarse(turns: bool = True) -> Block:
     return replace(block, acc=acc, gyr=gyr)
 
 
-@pytest.mark.parametrize("turns", [True, False])
+@pytest.mark.parametrize(
+    "turns", [pytest.param(True, marks=pytest.mark.thorough), False]
+)
 def test_it_is_solved_with_the_error_that_rounding_leaves(
     tmp_path: Path, turns: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:

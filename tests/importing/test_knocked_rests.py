@@ -67,6 +67,7 @@ def test_its_mean_is_that_of_the_calm_parts(knocked: Path) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_the_temperature_is_named_across_the_knocks(knocked: Path) -> None:
     assert main(["solve", str(knocked)]) == 0
     assert main(["diagnose", str(knocked)]) == 1

@@ -136,7 +136,10 @@ def installed(url: str) -> Installed:
         return imu.installed
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.thorough)],
+)
 def test_a_run_that_is_told_to_end_gives_the_calibration_back(
     number: signal.Signals, tmp_path: Path
 ) -> None:

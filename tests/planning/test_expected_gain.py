@@ -220,12 +220,10 @@ def test_what_a_part_showed_may_be_contradicted_without_a_search_from_nothing(
     assert quick.best.set.keys == whole.best.set.keys
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name, given", [
-    pytest.param("quadratic", {"x": 1e-3}, marks=pytest.mark.thorough),
-    pytest.param(
-        "settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0},
-        marks=pytest.mark.thorough,
-    ),
+    ("quadratic", {"x": 1e-3}),
+    ("settling", {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0}),
 ])  # fmt: skip
 def test_a_search_that_begins_with_what_was_found_before_finds_the_same(
     name: str, given: dict[str, float]

@@ -212,6 +212,7 @@ def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     assert child.exitstatus == 0
 
 
+@pytest.mark.thorough
 def test_a_wrong_place_is_taken_only_if_insisted_on_and_then_it_is_no_go(
     device: VirtualMover, tmp_path: Path
 ) -> None:

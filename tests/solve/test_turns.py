@@ -256,7 +256,8 @@ def test_without_the_turns_there_is_no_scale_factor(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("turns", "sentence"),
     [(-1, "the mounting (gyr_axes = -x-y-z)"),
-     (1, "in 1 turn the gyroscopes lead to another attitude")],
+     pytest.param(1, "in 1 turn the gyroscopes lead to another attitude",
+                  marks=pytest.mark.thorough)],
 )  # fmt: skip
 def test_gyroscopes_that_turn_the_other_way_are_said_to(
     tmp_path: Path, turns: int, sentence: str

@@ -78,7 +78,10 @@ PUBLISHED = (
 
 
 class Verdict(NamedTuple):
-    """What became of one: options, still stretches, verdict and effects, s of CPU."""
+    """What became of one: options, still stretches, verdict and effects, s of CPU.
+
+    `instead` are the aliases of each effect.
+    """
 
     options: int
     positions: int
@@ -86,6 +89,7 @@ class Verdict(NamedTuple):
     effects: tuple[str, ...]
     seconds: float
     screen: str = ""
+    instead: dict[str, frozenset[str]] = {}
 
 
 def main() -> None:
@@ -162,7 +166,8 @@ def diagnosed(folder: Path) -> Verdict:
         return Verdict(0, marks, f"exit code {code}", (), seconds)
     said = json.loads(text)
     effects = tuple(effect["id"] for effect in said["effects"])
-    return Verdict(0, marks, said["verdict"], effects, seconds)
+    instead = {e["id"]: frozenset(e["aliases"]) for e in said["effects"]}
+    return Verdict(0, marks, said["verdict"], effects, seconds, instead=instead)
 
 
 def shown(folder: Path) -> str:

@@ -6,7 +6,8 @@ Each recording of `recordings` with a known answer is imported, and its samples 
 again as a table without any other word: with its axes turned or mirrored, another
 clock, more noise, some samples lost, a gap, fewer samples, or a part of it alone. What
 is in the device is the same in all of them. Where less is recorded, an effect may no
-longer show; what the whole recording has not is new, and wrong if it is named.
+longer show; what the whole recording has not, under any name that it holds possible,
+is new, and wrong if it is named.
 """
 
 from __future__ import annotations
@@ -156,13 +157,18 @@ def _retell(one: Published, name: str) -> None:
         print(f"| {name} | whole | {whole.positions} | {_words(whole.effects)} | | |")
         for label, telling in TELLINGS.items():
             found = _found(telling(told), Path(place) / label.split()[0])
-            here, there = set(found.effects), set(whole.effects)
-            new = here - there - OF_THE_TELLING.get(label, set())
+            new = _beyond(found, whole) - OF_THE_TELLING.get(label, set())
             print(
                 f"| | {label} | {found.positions} | {found.verdict.replace('_', ' ')}"
-                f" | {_words(there - here)} | {_words(new)} |",
+                f" | {_words(_beyond(whole, found))} | {_words(new)} |",
                 flush=True,
             )
+
+
+def _beyond(one: Verdict, other: Verdict) -> set[str]:
+    """Effects of one verdict for which nothing stands in the other."""
+    there = set(other.effects).union(*other.instead.values())
+    return {e for e, instead in one.instead.items() if not there & {e, *instead}}
 
 
 def _words(effects: set[str] | tuple[str, ...]) -> str:
@@ -172,7 +178,8 @@ def _words(effects: set[str] | tuple[str, ...]) -> str:
 def _found(told: Told, out: Path) -> Verdict:
     """Write a table of samples, import it and diagnose it."""
     path = out.with_suffix(".csv")
-    np.savetxt(path, np.column_stack(told), "%.10g", ",", header=HEAD, comments="")
+    form = ["%.6f", *["%.9g"] * 6]
+    np.savetxt(path, np.column_stack(told), form, ",", header=HEAD, comments="")
     code, _, said = ran(["import", str(path), "-o", str(out)])
     if code:
         return Verdict(0, 0, f"not imported: {said.splitlines()[-1]}", (), 0.0)

@@ -333,7 +333,7 @@ def test_one_long_static_recording(
     [
         (0.6, (1.0030, 1.0033, 0.996), []),
         pytest.param(5.0, (1.0030, 1.0030, 0.996), [], marks=thorough),
-        (5.0, (1.0030, 1.0030, 1.0030), ["gravity_error"]),
+        pytest.param(5.0, (1.0030, 1.0030, 1.0030), ["gravity_error"], marks=thorough),
     ],
     ids=["the third hardly known", "the third another", "all three"],
 )
@@ -398,10 +398,11 @@ def test_what_cannot_be_diagnosed_is_one_sentence(
 @pytest.mark.parametrize(
     ("made", "says", "left"),
     [
-        (
+        pytest.param(
             lambda b: replace(b, gyr=0 * b.gyr),
             "gyroscopes are not used: gx, gy and gz",
             "acc",
+            marks=thorough,
         ),
         pytest.param(
             lambda b: replace(b, gyr=b.gyr * [1, np.nan, 1]),

@@ -181,6 +181,7 @@ def test_ten_short_intervals_have_next_to_no_freedom_and_that_is_said(
         assert "degree" in " ".join(result["warnings"])
 
 
+@pytest.mark.thorough
 def test_diagnose_says_of_crooked_axes_what_solve_finds(
     units: Callable[[int], Unit],
 ) -> None:

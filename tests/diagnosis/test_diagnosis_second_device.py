@@ -99,6 +99,7 @@ def test_what_is_left_out_is_found_beside_flicker(tmp_path: Path) -> None:
     agrees(said, "scale_asymmetry", {"x": 4e-3})
 
 
+@pytest.mark.thorough
 def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> None:
     """Beta is corrected by a fraction of a degree after alpha's large turn."""
     said = diagnosed(tmp_path / "s", TACTICAL, seed=12, setting=0.2)

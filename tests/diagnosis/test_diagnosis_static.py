@@ -34,14 +34,8 @@ def told(folder: Path, at: float, size: float) -> Diagnosis:
     return diagnose(session.block, session.about)
 
 
-@pytest.mark.parametrize(
-    "at",
-    [
-        pytest.param(210.0, marks=pytest.mark.thorough),
-        560.0,
-        pytest.param(760.0, marks=pytest.mark.thorough),
-    ],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("at", [210.0, 560.0, 760.0])
 def test_a_jump_anywhere_in_a_long_rest_is_a_jump(tmp_path: Path, at: float) -> None:
     """Of 20 sigma, which is a fifth of the noise of a sample: no walk, and in place."""
     before, after = 20 * (at - 5), 20 * (905 - at)

@@ -50,12 +50,14 @@ def held(
     return Session.open(folder)
 
 
-@pytest.mark.parametrize("recorded", [False, True])
+@pytest.mark.parametrize(
+    "recorded", [False, pytest.param(True, marks=pytest.mark.thorough)]
+)
 def test_the_length_of_the_earths_rate_gives_the_bias(
     tmp_path: Path, recorded: bool
 ) -> None:
     every = []
-    for seed in range(2 if recorded else 6):
+    for seed in range(3 if recorded else 6):
         session = held(tmp_path / str(seed), seed)
         if recorded:
             found = solved(session, rests(session), "no", dict.fromkeys(FACTORY, 0.0))

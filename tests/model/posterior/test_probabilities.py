@@ -65,18 +65,25 @@ class Draw:
         return Posterior(self.search, self.best)
 
 
-def instabilities(rng: np.random.Generator, search: Search) -> Array:
-    """Typical instabilities by `Search.alike`, (7,)."""
-    n = len(SIZES)
-    three = np.stack(np.unravel_index(np.arange(n**3), (n, n, n)), axis=1)
-    found = np.zeros(7)
+THREE = np.stack(np.unravel_index(np.arange(len(SIZES) ** 3), (len(SIZES),) * 3), 1)
+"""Which sizes the axes of a triad have, all that there are (n, 3)."""
+
+
+def alike(search: Search) -> list[Array]:
+    """Probabilities of the sizes of each triad by `Search.alike`, (n,)."""
+    found = []
     for first in (0, 3):
-        every = np.zeros((n**3, 7))
-        every[:, first : first + 3] = three
+        every = np.zeros((len(THREE), 7))
+        every[:, first : first + 3] = THREE
         log = np.asarray(search.alike(every))
-        share = np.exp(log - np.logaddexp.reduce(log))
-        found[first : first + 3] = SIZES[three[rng.choice(n**3, p=share)]]
-    return found * search.unstable
+        found.append(np.exp(log - np.logaddexp.reduce(log)))
+    return found
+
+
+def instabilities(rng: np.random.Generator, shares: list[Array]) -> Array:
+    """Draw the sizes of typical instabilities, (7,)."""
+    three = [SIZES[THREE[rng.choice(len(THREE), p=share)]] for share in shares]
+    return np.concatenate([*three, [0.0]])
 
 
 @cache
@@ -84,6 +91,7 @@ def draws() -> tuple[Draw, ...]:
     d, design, out = SESSION.dictionary, SESSION.design, []
     rng = np.random.default_rng(17)
     empty = SESSION.search(np.zeros((len(d.x), 6)))
+    shares = alike(empty)
     for _ in range(DRAWS):
         members = tuple(
             (c, c.variants[rng.integers(len(c.variants))])
@@ -97,7 +105,8 @@ def draws() -> tuple[Draw, ...]:
             g.sizes(v if g.fixed is None else g.fixed)
             for g, v in zip(groups, drawn, strict=True)
         ])  # fmt: skip
-        value, tau = wide * rng.standard_normal(len(wide)), instabilities(rng, empty)
+        value = wide * rng.standard_normal(len(wide))
+        tau = instabilities(rng, shares) * empty.unstable
         off = SESSION.noise(rng, tau) + design[:, :, columns] @ value
         search = SESSION.search(off)
         known = Eliminated.of(search.gram.weighed(tau), columns, wide)

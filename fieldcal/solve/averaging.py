@@ -62,18 +62,22 @@ def averaged_over(
         only = _at_the_end(given, likeliest, nominal)
         return Parameters(*only, np.zeros(len(only[0])))
     search = Search(given, gram)
-    found, doubt = [], bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
-    for one in given.explanations:
+    doubt = bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
+    chance: dict[tuple[Member, ...], float] = {}
+    for one in given.explanations:  # of which several may have a variant in common
         for same in variants(search, given.asked, one):
-            there = likeliest
-            if (*given.asked, *same.members) != given.members:
-                there = mixed(given, search, same.members, doubt)
-            chance = one.probability * same.probability
-            found.append((chance, _at_the_end(given, there, nominal)))
-    weight = np.array([p for p, _ in found])
-    means = np.array([value for _, (value, _) in found])
+            p = one.probability * same.probability
+            chance[same.members] = chance.get(same.members, 0.0) + p
+    found = []
+    for members in chance:
+        there = likeliest
+        if (*given.asked, *members) != given.members:
+            there = mixed(given, search, members, doubt)
+        found.append(_at_the_end(given, there, nominal))
+    weight = np.array(list(chance.values()))
+    means = np.array([value for value, _ in found])
     values: Array = weight @ means
-    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, (_, c) in found]))
+    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in found]))
     covariance += covariance_of_means(means, weight)
     plain, own = _at_the_end(given, mixed(given, search, (), doubt), nominal)
     return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))

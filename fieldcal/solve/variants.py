@@ -23,6 +23,10 @@ POINTS = 24
 """Variants of a certain explanation that stand for all of them; of one less likely so
 many fewer."""
 
+HAIR = 1e-6
+"""By which a point lies before its place: where variants mirror one another, half of
+the probability ends between two of them, and rounding would decide which is taken."""
+
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 """Their square roots spread points evenly over the causes beyond the first; where there
 are more causes, over several of them alike."""
@@ -44,7 +48,7 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
     points = spread(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
         picked = [
-            choices[int(np.searchsorted(np.cumsum(weight)[:-1], u))]
+            choices[int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
         members = tuple(m for some in picked for m in some)

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,22 +101,21 @@ class Gram:
 
     def weighed(self, tau: Array) -> Weighed:
         """With instabilities by kind, (7,)."""
-        n, c, k = self.means.shape
+        known = self.info > 0
         if self.loose.any():
             full, log_det = self.whitening(tau)
-            white = (full @ self.means).reshape(n * c, k)
-            off = (full @ self.off[:, :, None]).ravel()
-            weight = np.swapaxes(full, 1, 2) @ full
-            own = np.diagonal(weight, 0, 1, 2)
-            return Weighed(self, white, off, own, full, float(log_det))
+            own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
+            return Weighed(
+                self, (full @ self.means)[known],
+                (full @ self.off[:, :, None])[known, 0], own, full, float(log_det),
+            )  # fmt: skip
         spread = self._spread(tau)
         weight = self.info / (1 + self.info * spread)
         log_det = np.log1p(self.info * spread).sum()
-        root = np.sqrt(weight).reshape(-1, 1)
-        return Weighed(
-            self, (root * self.means.reshape(n * c, k)),
-            root[:, 0] * self.off.ravel(), weight, np.zeros(0), float(log_det),
-        )  # fmt: skip
+        root = np.sqrt(weight[known])
+        white: Array = self.means[known] * root[:, None]
+        off: Array = self.off[known] * root
+        return Weighed(self, white, off, weight, np.zeros(0), float(log_det))
 
     def _spread(self, tau: Array) -> Array:
         """Variance of the means beside white noise, by channel, (..., p, 6)."""
@@ -148,8 +148,8 @@ class Weighed:
     Attributes
     ----------
     gram : what it was made of
-    white : (6 p, k) whitened means of the columns
-    off : (6 p,) of y - h
+    white : (r, k) whitened means of the columns, of those that were measured
+    off : (r,) of y - h
     weight : (p, 6) information on each mean given the rest of its window
     root : (p, 6, 6) whitening of the means, empty where each is for itself
     log_det : ln |R| beyond that of white noise
@@ -165,14 +165,16 @@ class Weighed:
 
     def matrix(self, one: Index, other: Index | None) -> Array:
         """Phi^T R^-1 Phi of some columns, or of some and all."""
-        one = self.gram.index[one]
+        rows = self.gram.index[one]
+        some = self.white[:, rows]
         if other is None:
-            out: Array = self.white[:, one].T @ self.white
-            out += self.gram.within[one]
+            out: Array = some.T @ self.white
+            out += self.gram.within[rows]
             return out
-        other = self.gram.index[other]
-        out = self.gram.within[np.ix_(one, other)]
-        out += self.white[:, one].T @ self.white[:, other]
+        columns = self.gram.index[other]
+        out = self.gram.within[np.ix_(rows, columns)]
+        # of a product with itself, which is symmetric, half is calculated
+        out += some.T @ (some if one is other else self.white[:, columns])
         return out
 
     def pull(self, columns: Index | None) -> Array:
@@ -196,7 +198,7 @@ class Weighed:
         return self.gram.square + float(self.off @ self.off)
 
     def shared(self, kind: int) -> Array:
-        """Whitened columns of each mean of a kind by itself, (6 p, m)."""
+        """Whitened columns of each mean of a kind by itself, (r, m)."""
         gram = self.gram
         size = (gram.kind == kind).astype(float)
         if kind < 6:
@@ -208,10 +210,10 @@ class Weighed:
             out[rows, :, at] = self.root[rows, :, slots] * by[:, None]
         else:
             out[rows, slots, at] = np.sqrt(self.weight[rows, slots]) * by
-        return out.reshape(-1, len(rows))
+        return out[gram.info > 0]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Eliminated:
     """A set of columns with their sizes, eliminated.
 
@@ -221,7 +223,6 @@ class Eliminated:
     columns : (a,) of the Gram matrix; one may stand there twice
     sizes : (a,) standard deviation of each before the rows are seen
     half : (a, a) a root H of the covariance after, H^T H
-    inverse : (a, a) S (I + S G S)^-1 S, the covariance after
     estimate : (a,) mean after
     score : ln Z, (2)
 
@@ -231,7 +232,6 @@ class Eliminated:
     columns: Index
     sizes: Array
     half: Array
-    inverse: Array
     estimate: Array
     score: float
 
@@ -246,13 +246,20 @@ class Eliminated:
         seen = half @ rows.pull(columns)
         score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (2)
-        return cls(rows, columns, sizes, half, half.T @ half, half.T @ seen, score)
+        return cls(rows, columns, sizes, half, half.T @ seen, score)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """S (I + S G S)^-1 S, the covariance after, (a, a)."""
+        out: Array = self.half.T @ self.half
+        return out
 
     def rest(self, columns: Index, typical: Array) -> tuple[Array, Array]:
         """M and T b' of further columns, in units of what is typical."""
         shared = self.rows.matrix(self.columns, columns)
         inner = self.rows.matrix(columns, columns)
-        inner -= shared.T @ self.inverse @ shared
+        taken = self.half @ shared
+        inner -= taken.T @ taken
         pull = self.rows.pull(columns) - shared.T @ self.estimate
         return inner * typical * typical[:, None], pull * typical
 
@@ -261,7 +268,8 @@ class Eliminated:
         white = self.rows.shared(kind) * typical
         ours = self.rows.white[:, self.rows.gram.index[self.columns]]
         shared = ours.T @ white
-        inner = white.T @ white - shared.T @ self.inverse @ shared
+        taken = self.half @ shared
+        inner = white.T @ white - taken.T @ taken
         return inner, white.T @ self.rows.off - shared.T @ self.estimate
 
 

@@ -29,5 +29,5 @@ def reported(search: Search, there: Set) -> Set:
     mixing = Mixing(search.dictionary, search.gram, opened, search.unstable, False)
     found = mixing.run()
     half = np.linalg.cholesky(found.covariance).T
-    state = replace(state, half=half, inverse=found.covariance, estimate=found.mean)
+    state = replace(state, half=half, estimate=found.mean)
     return replace(there, state=state)

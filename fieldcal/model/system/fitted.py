@@ -100,11 +100,11 @@ def whole(state: Eliminated, dictionary: Dictionary) -> Array:
     out = np.zeros(dictionary.width)
     np.add.at(out, state.columns, state.estimate)
     if dictionary.free.any() and state.rows.root.size:
-        at = state.rows.gram.index[state.columns]
-        left = state.rows.off - state.rows.white[:, at] @ state.estimate
-        left = left.reshape(-1, 6)
+        gram, at = state.rows.gram, state.rows.gram.index[state.columns]
+        left = np.zeros(gram.info.shape)
+        left[gram.info > 0] = state.rows.off - state.rows.white[:, at] @ state.estimate
         for j, p in enumerate(dictionary.held):
             if dictionary.free[j]:
-                pull = state.rows.gram.loose[j].T @ state.rows.root[j].T @ left[j]
+                pull = gram.loose[j].T @ state.rows.root[j].T @ left[j]
                 out[dictionary.rotations_of(p)] += priors.SMALL_ROTATION * pull
     return out

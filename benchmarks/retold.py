@@ -34,6 +34,7 @@ HEAD = ",".join(
 )
 
 OF_THE_TELLING = {
+    "askew": {"cross_coupling", "gyro_scale", "gyro_cross_coupling"},
     "some lost": {"dropped"},
     "gap": {"dropped"},
     "more noise": {"noise_level"},
@@ -74,7 +75,7 @@ def _swapped(one: Told) -> Told:
 
 
 def _askew(one: Told) -> Told:
-    """In axes that are none of the device's, so that couplings are others."""
+    """In axes that are none of the device's, in which scale factors are couplings."""
     a, b = 0.7, 0.4
     about_z = [[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]
     about_x = [[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]

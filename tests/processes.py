@@ -109,7 +109,8 @@ def recalibrate(folder: Path) -> Recalibrated:
     """
     session, said = folder / "session", folder / "said.json"
     call = [*RUN, "five_position", "--headless", "--virtual=--base-tilt=1,-1"]
-    call += ["--speed", "20", "--seed", "5", "--json", "-o", str(session)]
+    call += ["--speed", "20", "--seconds", "15", "--seed", "5", "--json"]
+    call += ["-o", str(session)]
     with FileLock(folder.with_suffix(".lock")):
         folder.mkdir(exist_ok=True)
         if not said.exists():

@@ -176,6 +176,7 @@ def test_every_error_of_the_operator_is_said_and_the_result_is_right(
     assert events.count("window") == 6
 
 
+@pytest.mark.thorough
 def test_keys_repeat_skip_and_stop_and_it_is_gone_on_with(
     device: VirtualMover, tmp_path: Path
 ) -> None:

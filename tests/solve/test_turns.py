@@ -247,6 +247,7 @@ def test_the_turns_of_the_paper_s_own_procedure(
     assert (np.abs(pulls_of(found)) < 3.5).all()
 
 
+@pytest.mark.thorough
 def test_without_the_turns_there_is_no_scale_factor(tmp_path: Path) -> None:
     block, windows = record(4, many_ways(6, 6), ANYHOW)
     found = calibrated(tmp_path, block, windows, turns="no")

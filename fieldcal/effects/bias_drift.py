@@ -14,14 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import BEYOND, CHANCE, NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import BEYOND, CHANCE, NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 
 
-class BiasDrift(Sensor):
+class BiasDrift(BiasChange):
     """Linear change of the biases."""
 
     params = six("m/s^2/s", 1e-4, "rad/s/s", 5e-6)
@@ -38,6 +36,6 @@ class BiasDrift(Sensor):
         """Less where a thermometer shows what changes anyway."""
         return BEYOND if x.warms else CHANCE
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Time on every output."""
-        return np.eye(6) * x.since_start[:, None, None]
+        return x.since_start

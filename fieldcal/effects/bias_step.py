@@ -18,12 +18,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 
-class BiasStep(Sensor):
+class BiasStep(BiasChange):
     """Jump of the biases."""
 
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
@@ -37,10 +37,9 @@ class BiasStep(Sensor):
     )
     source = "stress released, a supply switched, a range changed"
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """One from the instant on, on every output."""
         after = x.t - shape["at_s"]
         part = after / np.where(x.lasts > 0, x.lasts, 1.0) + 0.5
-        part = np.where(x.lasts > 0, np.clip(part, 0.0, 1.0), after >= 0)
-        out: Array = np.eye(6) * part[:, None, None]
+        out: Array = np.where(x.lasts > 0, np.clip(part, 0.0, 1.0), after >= 0)
         return out

@@ -18,12 +18,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 
-class Settling(Sensor):
+class Settling(BiasChange):
     """Exponential change of the biases since the last turn."""
 
     params = six("m/s^2", 3e-2, "rad/s", 1e-3)
@@ -34,8 +34,7 @@ class Settling(Sensor):
     cure = "Wait longer after each turn before the window begins."
     source = "relaxation after a change of load; 1e-4 to 1e-2 m/s^2, 1 to 30 s"
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The exponential on every output."""
-        decay = np.exp(-x.since_turn / shape["tau_s"])
-        out: Array = np.eye(6) * decay[:, None, None]
-        return out
+        decay: Array = np.exp(-x.since_turn / shape["tau_s"])
+        return decay

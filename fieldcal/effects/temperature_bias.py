@@ -15,14 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 
 
-class TemperatureBias(Sensor):
+class TemperatureBias(BiasChange):
     """Temperature coefficient of the biases."""
 
     params = six("m/s^2/K", 1.5e-2, "rad/s/K", 5e-4)
@@ -39,6 +37,6 @@ class TemperatureBias(Sensor):
         """Where a thermometer shows a change."""
         return x.warms
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Temperature on every output."""
-        return np.eye(6) * x.warming[:, None, None]
+        return x.warming

@@ -15,14 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import BEYOND, NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import BEYOND, NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 
 
-class ThermalHysteresis(Sensor):
+class ThermalHysteresis(BiasChange):
     """Response of the biases to the rate of the temperature."""
 
     params = six("m/s^2/(K/s)", 1.0, "rad/s/(K/s)", 2e-2)
@@ -43,6 +41,6 @@ class ThermalHysteresis(Sensor):
         """It comes on top of what the temperature itself does."""
         return BEYOND
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """Rate of the temperature on every output."""
-        return np.eye(6) * x.heating[:, None, None]
+        return x.heating

@@ -18,12 +18,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.effect import BEYOND, CHANCE, NO_SHAPE, Sensor, six
+from fieldcal.physics.effect import BEYOND, CHANCE, NO_SHAPE, BiasChange, six
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 
-class WarmUp(Sensor):
+class WarmUp(BiasChange):
     """Exponential change of the biases since the start."""
 
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)
@@ -38,8 +38,7 @@ class WarmUp(Sensor):
         """Less where a thermometer shows what changes anyway."""
         return BEYOND if x.warms else CHANCE
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
         """The exponential on every output."""
-        decay = np.exp(-x.since_start / shape["tau_s"])
-        out: Array = np.eye(6) * decay[:, None, None]
-        return out
+        decay: Array = np.exp(-x.since_start / shape["tau_s"])
+        return decay

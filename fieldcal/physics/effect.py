@@ -162,6 +162,22 @@ class Sensor(Effect):
         """
 
 
+class BiasChange(Sensor):
+    """An effect that adds one course to every output, each by a parameter of its own.
+
+    Parameters are those of `six`.
+    """
+
+    @abstractmethod
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Derivative of each output by its own parameter, (n,)."""
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """The course on every output."""
+        out: Array = np.eye(6) * self.course(x, shape)[:, None, None]
+        return out
+
+
 class Scatter(Effect):
     """A random effect: no equation but a size, which its parameters are.
 

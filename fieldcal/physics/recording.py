@@ -16,9 +16,6 @@ Rows = NDArray[np.intp]
 ENOUGH = 20_000
 """Samples that show the grid that values lie on."""
 
-GLANCE = 64
-"""Gaps that are looked at before all are."""
-
 PARTS, SURE = 12, 9
 """Steps in the least gap, up to which they are sought, and gaps that say so for
 certain: what a device counts and a program writes in decimals has no two neighbours.
@@ -165,13 +162,9 @@ def _step_between(shown: Array) -> float:
 def _grid(gaps: Array, step: float) -> float:
     """Step of which all gaps are multiples, about a first guess; 0 if there is none."""
     for _ in range(3):  # the grid's own step is the mean over many, not one difference
-        near = 0.1 + 0.02 * round(float(gaps.max()) / step) ** 0.5
-        some = gaps[:GLANCE] / step  # of values on no grid these show it already
-        if np.abs(some - np.round(some)).max() > near:
-            return 0.0
         steps = gaps / step
         whole = np.round(steps)
-        if np.abs(steps - whole).max() > near:
+        if np.abs(steps - whole).max() > 0.1 + 0.02 * whole.max() ** 0.5:
             return 0.0
         step = float(gaps.sum() / whole.sum())
     off = np.abs(gaps / step - np.round(gaps / step))

@@ -79,7 +79,7 @@ def test_sets_that_may_all_be_right_have_biases_apart() -> None:
 
     def one(*estimate: float) -> Any:
         state = SimpleNamespace(
-            columns=np.array([2, 3]), estimate=np.array(estimate), inverse=np.eye(2)
+            columns=np.array([2, 3]), estimate=np.array(estimate), half=np.eye(2)
         )
         return SimpleNamespace(state=state, members=())
 

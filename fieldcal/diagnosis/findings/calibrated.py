@@ -51,8 +51,7 @@ def calibrated(
 def averaged(explanation: Explanation) -> dict[str, tuple[float, float, float]]:
     """The same over all sets that count."""
     at = _columns(explanation)
-    left = explanation.dictionary.unfitted
-    return _named(explanation, at, *of_columns(explanation.average.sets, at, left))
+    return _named(explanation, at, *explanation.average.of_columns(at))
 
 
 def _columns(explanation: Explanation) -> Index:

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State, Term, across
-from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
 STEP = 1e-3
@@ -128,7 +128,7 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
 
 
 def of_channels(
-    effect: Sensor, grid: Sequence[tuple[Mapping[str, float], int]]
+    effect: BiasChange, grid: Sequence[tuple[Mapping[str, float], int]]
 ) -> Course:
     """Courses of an effect that does the same to every output, by shape and origin."""
 
@@ -136,7 +136,7 @@ def of_channels(
         courses = []
         for shape, origin in grid:
             seen = view.counting_from(origin)
-            courses.append(effect.design(seen, shape or NO_SHAPE)[:, 0, 0])
+            courses.append(effect.course(seen, shape or NO_SHAPE))
         return np.stack(courses, axis=1)
 
     return Course(effect.id, of, len(grid), True)

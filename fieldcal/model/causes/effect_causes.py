@@ -15,7 +15,7 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.hysteresis import hysteresis
-from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
 NOWHERE: Point = (NO_SHAPE, 0)
@@ -141,7 +141,7 @@ def effect_columns(
 ) -> list[Index]:
     """Append the columns of an effect: those of its parameters, for each point."""
     count = len(effect.params)
-    if isinstance(effect, Sensor) and _of_channels(effect, table.x):
+    if isinstance(effect, BiasChange):
         course = columns.of_channels(effect, grid)
         start = table.add(course, 6 * len(grid))
         channel = np.array([CHANNELS.index(p.name) for p in effect.params])
@@ -195,14 +195,6 @@ def points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
     for shape in effect.shapes:
         for value, origin in shape.grid(table.x, table.since):
             yield {shape.name: value}, origin
-
-
-def _of_channels(effect: Sensor, x: Experience) -> bool:
-    """Whether an effect does the same to every output, each by its own parameter."""
-    if {p.name for p in effect.params} != set(CHANNELS):
-        return False
-    design = effect.design(x, _any(effect))
-    return bool((design == np.eye(6) * design[:, :1, :1]).all())
 
 
 def _any(effect: Effect) -> dict[str, float]:

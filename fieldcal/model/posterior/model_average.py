@@ -22,7 +22,7 @@ tutorial, 1999, (1) to (3); for (2), the inverse of a partitioned matrix.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -40,6 +40,10 @@ Places = Callable[[Set], Sequence[Index]]
 their sum; one without an index is 0."""
 
 
+Estimate = tuple[Array, Array]
+"""Mean (a,) of a set's columns, and a root R of their covariance R R^T, (a, m)."""
+
+
 class ModelAverage:
     """Averages over the sets of a posterior.
 
@@ -53,6 +57,7 @@ class ModelAverage:
 
     def __init__(self, posterior: Posterior, best: Sequence[Set]) -> None:
         self.posterior, self.best = posterior, best
+        self._known: dict[Set, Estimate] = {}
 
     @cached_property
     def sets(self) -> list[tuple[Set, float]]:
@@ -91,7 +96,18 @@ class ModelAverage:
             wanted = [at.get(p, -1) for p in group.params or group.columns]
             return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
 
-        return averaged(there, places, self.posterior.search.dictionary.unfitted)
+        return averaged(there, places, self._estimate)
+
+    def of_columns(self, columns: Index) -> tuple[Array, Array]:
+        """Mean (k,) and covariance (k, k) of columns."""
+        return averaged(self.sets, _places_of(columns), self._estimate)
+
+    def _estimate(self, one: Set) -> Estimate:
+        """Of a set, with what it leaves out."""
+        if one not in self._known:
+            left = self.posterior.search.dictionary.unfitted
+            self._known[one] = estimate_of(one, left)
+        return self._known[one]
 
 
 def _group_in(one: Set, member: Member) -> Group:
@@ -104,43 +120,53 @@ def of_columns(
     sets: Sequence[tuple[Set, float]], columns: Index, unfitted: Sequence[Group] = ()
 ) -> tuple[Array, Array]:
     """Mean (k,) and covariance (k, k) of columns over weighed sets."""
+    return averaged(sets, _places_of(columns), partial(estimate_of, unfitted=unfitted))
 
-    def places(one: Set) -> list[Index]:
-        return [np.flatnonzero(one.state.columns == c) for c in columns]
 
-    return averaged(sets, places, unfitted)
+def _places_of(columns: Index) -> Places:
+    """Of columns of the dictionary."""
+    return lambda one: [np.flatnonzero(one.state.columns == c) for c in columns]
 
 
 def averaged(
-    sets: Sequence[tuple[Set, float]], places: Places, unfitted: Sequence[Group] = ()
+    sets: Sequence[tuple[Set, float]],
+    places: Places,
+    estimate: Callable[[Set], Estimate] | None = None,
 ) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1), (2)."""
+    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1).
+
+    `estimate` of each set, that of its state if not given.
+    """
     means, covs = [], []
     for one, _ in sets:
         at = places(one)
         pick = np.zeros((len(at), len(one.state.columns)))
         for row, some in zip(pick, at, strict=True):
             row[some] = 1.0
-        names = {cause.name for cause, _ in one.members}
-        left = [group for group in unfitted if group.part not in names]
-        shift, wider = _left_out(one, pick, left) if left else (0.0, 0.0)
-        means.append(pick @ one.state.estimate + shift)
-        covs.append(pick @ one.state.inverse @ pick.T + wider)
+        mean, root = (estimate or estimate_of)(one)
+        picked = pick @ root
+        means.append(pick @ mean)
+        covs.append(picked @ picked.T)
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
-    mean: Array = weight @ np.array(means)
+    mean = weight @ np.array(means)
     cov = np.einsum("s,sij->ij", weight, np.array(covs))
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
-def _left_out(one: Set, pick: Array, left: Sequence[Group]) -> tuple[Array, Array]:
-    """By how much a mean shifts and a covariance grows with what a set leaves out."""
+def estimate_of(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
+    """What a set says of its columns, with those of `unfitted` that it leaves out."""
+    names = {cause.name for cause, _ in one.members}
+    left = [group for group in unfitted if group.part not in names]
+    told = one.state
+    if not left:
+        return told.estimate, told.half.T
     columns = np.concatenate([group.columns for group in left])
     typical = np.concatenate([group.typical for group in left])
-    state = Eliminated.of(one.state.rows, one.state.columns, one.state.sizes)
+    state = Eliminated.of(told.rows, told.columns, told.sizes)
     inner, pull = state.rest(columns, typical)
     inner.flat[:: len(columns) + 1] += 1.0
     half = inverse_of(root_of(inner))
     shared = state.rows.matrix(state.columns, columns) * typical
-    moved = pick @ state.inverse @ shared @ half.T
-    return -moved @ (half @ pull), moved @ moved.T  # (2)
+    moved = state.inverse @ shared @ half.T
+    return told.estimate - moved @ (half @ pull), np.hstack([told.half.T, moved])  # (2)

@@ -69,7 +69,8 @@ def rows_of(source: RowSource) -> Rows:
     held = np.unique(rows.x.position)
     bound = spans(source.block, source.about)[held]
     block = masked(source.block, source.usable)
-    pieces = [block.six[a:b] for a, b in bound]
+    six = block.six
+    pieces = [six[a:b] for a, b in bound]
     angle, noise = wander(rows), _beside_tremor(rows, pieces, grain_of(block, bound))
     if angle or noise is not None:
         return _unsteady(source, reduce(source, whole=True, level=noise), angle)

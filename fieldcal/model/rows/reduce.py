@@ -27,7 +27,7 @@ from fieldcal.model.rows.orientation import (
 )
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.rows.turntable import going_round
-from fieldcal.model.rows.vibration import shaking
+from fieldcal.model.rows.vibration import Shaking, shaking
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import Description
 from fieldcal.session.site_gravity import gravity_sigma
@@ -118,6 +118,14 @@ class RowSource:
         """Samples a second."""
         return rate_of(self.block)
 
+    @cached_property
+    def shaken(self) -> Shaking:
+        """How noisy the windows are that have samples."""
+        block = masked(self.block, self.usable)
+        windows = spans(block, self.about)
+        held = np.diff(windows, axis=1)[:, 0] > 1
+        return shaking(block, windows[held], self.rate)
+
 
 def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -> Rows:
     """Cut the windows into blocks and average them.
@@ -132,7 +140,7 @@ def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -
     block, rate = masked(source.block, source.usable), source.rate
     windows = spans(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    shaken = shaking(block, windows[held], rate)
+    shaken = source.shaken
     noise, levels = shaken.noise, shaken.levels
     if source.white is not None:
         noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)

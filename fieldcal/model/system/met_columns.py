@@ -66,7 +66,7 @@ class _Meeting:
 
     def general_form(self, index: Index, table: Array, bent: Array) -> None:
         """Columns (m + 1, 6, k) of any form, and what they bend at the ends, (3, k)."""
-        turned = np.einsum("ijc,jck->ik", self.weights, table[:, 3:])
+        turned = np.tensordot(self.weights, table[:, 3:], 2)
         self.index.append(index)
         self.closing.append(turned - bent)
 

@@ -8,7 +8,7 @@ from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.evidence.gram import Eliminated, gains, root_of
+from fieldcal.model.evidence.gram import Eliminated, gains, inverse_of, root_of
 from fieldcal.model.priors import SIZES
 
 FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
@@ -181,3 +181,15 @@ def test_a_root_is_one_where_numbers_have_too_few_digits(seed: int) -> None:
     size = np.sqrt(np.diag(whole))
     again = root @ root.T / np.outer(size, size)
     np.testing.assert_allclose(again, whole / np.outer(size, size), atol=1e-6)
+
+
+def test_roots_of_several_matrices_are_those_of_each() -> None:
+    """Where rounding leaves one of them without a root, too."""
+    some = np.random.default_rng(3).standard_normal((2, 90, 80))
+    many = np.eye(80) + np.swapaxes(some, 1, 2) @ some
+    worst = np.array([many[0], np.full((80, 80), 1e20)])
+    roots = root_of(worst)
+    np.testing.assert_allclose(roots[0] @ roots[0].T, many[0], rtol=1e-8, atol=1e-8)
+    assert np.diag(roots[1]).min() >= 1 - 1e-9 and not np.triu(roots[1], 1).any()
+    for one, both in zip(root_of(many), inverse_of(root_of(many)), strict=True):
+        np.testing.assert_allclose(both @ one, np.eye(80), atol=1e-9)

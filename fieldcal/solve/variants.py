@@ -48,12 +48,21 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
     points = spread(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
         picked = [
-            choices[int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))]
+            choices[reached(weight, u)]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
         members = tuple(m for some in picked for m in some)
         share[members] = share.get(members, 0.0) + 1 / len(points)
     return [Shown(members, p) for members, p in share.items()]
+
+
+def reached(weight: Array, u: float) -> int:
+    """Which of some choices of probability (k,) a point of the unit line lies in.
+
+    >>> reached(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
+    1
+    """
+    return int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))
 
 
 def spread(count: int, points: int = POINTS) -> Array:

@@ -20,10 +20,12 @@ from fieldcal.against.pairing import Pairing
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened, on_all_axes
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.reported import reported
 from fieldcal.model.search.selection import Search
@@ -168,39 +170,46 @@ def _pairs(
 
 
 def _of_size(there: Widened, member: Member, size: float) -> dict[str, Quantity]:
-    """Numbers of a cause with an equation that is of a known size, in typical ones."""
+    """Numbers of a cause with an equation, `size` times as large as is typical."""
     group, told = member[1], there.told(member[0].key)
     if told is None or not isinstance(group.effect, Motion | Sensor):
         return {}
+    before = size * group.typical
     known = np.linalg.inv(told.inner + np.eye(len(told.pull)) / size**2)
-    values, sigma = known @ told.pull, np.sqrt(np.diag(known))
-    params = [group.effect.params[j] for j in group.params]
-    return {
-        p.name: Quantity(float(v * t), float(s * t), p.unit)
-        for p, v, s, t in zip(params, values, sigma, group.typical, strict=True)
-        if s**2 < thresholds.DETERMINED * size**2
+    covariance = known * np.outer(group.typical, group.typical)
+    return _determined(there, group, group.typical * (known @ told.pull), covariance,
+                       before)  # fmt: skip
+
+
+def _determined(
+    there: Widened, group: Group, values: Array, covariance: Array, before: Array
+) -> dict[str, Quantity]:
+    """Parameters (k,) of an effect that the rows tell more of than sizes `before`."""
+    effect, sigma = group.effect, np.sqrt(np.diag(covariance))
+    if effect is None:
+        return {}
+    params = [effect.params[j] for j in group.params]
+    out = {
+        p.name: Quantity(float(v), float(s), p.unit)
+        for p, v, s, b in zip(params, values, sigma, before, strict=True)
+        if s**2 < thresholds.DETERMINED * b**2
     }
+    if there.inference.dictionary.free.all():
+        out = found_effects.whatever_turned(group, values, covariance, before, out)
+    return out
 
 
 def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
     """Numbers of a cause, as far as the rows determine them."""
-    cause, group = member
+    group = member[1]
     if group.effect is None:
         return {}
     if isinstance(group.effect, Scatter):
         d = there.inference.dictionary
         return found_effects.sizes_of(there.set, d, group, _size_of(there, member))
     values, covariance = there.estimate(group.columns)
-    sigma = np.sqrt(np.diag(covariance))
     before = group.sizes(_size_of(there, member))
-    names = [group.effect.params[j] for j in group.params]
-    out = {
-        p.name: Quantity(float(v), float(s), p.unit)
-        for p, v, s, b in zip(names, values, sigma, before, strict=True)
-        if s**2 < thresholds.DETERMINED * b**2
-    }
-    if there.inference.dictionary.free.all():
-        out = found_effects.whatever_turned(group, values, covariance, before, out)
+    out = _determined(there, group, values, covariance, before)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
         unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None

@@ -43,18 +43,21 @@ def _checks(
 ) -> Iterator[Check]:
     left, usual = counted(found), limits.factory
     measured = {sensor_of(group_of(n)) for n in found.names}
-    of_grade = "the grade"
+    of_grade = "as usual for the grade"
     if shows := found.info.get("grade_shown"):
         usual = read(shows["grade"]).factory
-        of_grade = f"{shows['grade']} grade"
+        of_grade = f"as usual for {shows['grade']} grade"
         yield _coarser(found, about, shows)
 
-    def whose(said: float | None, size: float, grade: float) -> str:
-        stated = said is not None or size != grade
-        return "as stated" if stated else f"as usual for {of_grade}"
+    def whose(kind: str, said: float | None = None) -> str:
+        size = getattr(left, kind)
+        by_grade, if_fine = getattr(usual, kind), getattr(limits.factory, kind)
+        if said is not None or size not in (by_grade, if_fine):
+            return "as stated"
+        return of_grade if size == by_grade else "as the recording shows"
 
     if left.cross_coupling and "acc" in measured:
-        by = whose(about.squareness, left.cross_coupling, usual.cross_coupling)
+        by = whose("cross_coupling", about.squareness)
         says = (
             f"this relies on axes that are square to ± {100 * left.cross_coupling:.2g}"
             f" %, {by}; each ± includes it. An uncalibrated device has more: estimate"
@@ -62,7 +65,7 @@ def _checks(
         )
         yield Check("cross-coupling", None, says)
     if left.quadratic and "acc" in measured:
-        by = whose(about.quadratic, left.quadratic, usual.quadratic)
+        by = whose("quadratic", about.quadratic)
         size = 1e3 * left.quadratic * G0
         says = (
             f"this relies on accelerometers that are linear: K2 is 0 ± {size:.2g}"
@@ -73,12 +76,12 @@ def _checks(
     if left.hysteresis and "acc" in measured:
         says = (
             "this relies on accelerometers with a hysteresis of 0 ±"
-            f" {1e3 * left.hysteresis / G0:.2g} mg, as usual for {of_grade}; each ±"
+            f" {1e3 * left.hysteresis / G0:.2g} mg, {whose('hysteresis')}; each ±"
             " includes it"
         )
         yield Check("hysteresis", None, says)
     if left.g_sensitivity and "gyr" in measured:
-        by = whose(about.g_sensitivity, left.g_sensitivity, usual.g_sensitivity)
+        by = whose("g_sensitivity", about.g_sensitivity)
         felt = float(f"{left.g_sensitivity * G0 / DEG_H:.2g}")  # 180, and not 1.8e+02
         says = (
             f"this relies on gyroscopes that feel 0 ± {felt:g} deg/h per g, {by}"
@@ -99,7 +102,7 @@ def _per_k(left: FactoryErrors, measured: set[str], of_grade: str) -> Iterator[C
     if told:
         says = (
             f"this relies on biases that change by 0 ± {' and '.join(told)} per K while"
-            f" the device warms up, as usual for {of_grade}; each ± includes it"
+            f" the device warms up, {of_grade}; each ± includes it"
         )
         yield Check("warm-up", None, says)
 
@@ -124,9 +127,9 @@ def _coarser(found: Calibration, about: Description, shows: Mapping[str, str]) -
         return Check("grade", False, says)
     says = (
         f"this is no device of {about.grade} grade: {shows['because']}; what is not"
-        f" estimated of it is taken to be as large as {shows['grade']} grade has it. If"
-        f" that is what it is, state it (--grade {shows['grade']}), which has its own"
-        " limits as well; if its data sheet says less, state that (--squareness,"
-        " --quadratic, --g-sensitivity)"
+        f" estimated of it is taken to be as large as {shows['grade']} grade has it,"
+        " unless the recording shows less. If that is what it is, state it (--grade"
+        f" {shows['grade']}), which has its own limits as well; if its data sheet"
+        " says less, state that (--squareness, --quadratic, --g-sensitivity)"
     )
     return Check("grade", None, says)

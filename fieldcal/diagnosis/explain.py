@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.calibration.names import TILTS
-from fieldcal.core.factory import WARMING
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
+from fieldcal.diagnosis.factory_left import as_good_as_shown, left_by_factory
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
-from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -42,7 +39,6 @@ from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turn, Turning
 from fieldcal.session.description import Description
-from fieldcal.session.factory import factory_errors
 
 
 @dataclass(frozen=True)
@@ -171,7 +167,7 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     posterior = Posterior(
         found.search, found.best, lambda there: inference.beside(found, there)
     )
-    _as_good_as_shown(inference.dictionary, best.set, prepared.source.about)
+    as_good_as_shown(inference.dictionary, best.set, prepared.source.about)
     return Explanation(
         prepared, found, best, base_of(inference, prepared.rows), posterior
     )
@@ -203,7 +199,7 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
         rows.x, rows.used, origins(source, rows), common, unit, turned,
         Wander.of(rows, unit), rows.alike,
     )  # fmt: skip
-    dictionary.unfitted = tuple(_factory(dictionary, about, prepared))
+    dictionary.unfitted = tuple(left_by_factory(dictionary, about, prepared))
     dictionary.tried_at(change_points(rows).tolist())
     dictionary.expected_within(interruptions(source.block, about))
     grain = grain_of(source.block, spans(source.block, about))
@@ -213,47 +209,6 @@ def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(WindowSystem(rows, dictionary), nominal, turns)
-
-
-def _factory(
-    dictionary: Dictionary, about: Description, prepared: Prepared
-) -> Iterator[Group]:
-    """What the factory left, but for what the simulation has already.
-
-    A warm-up is none of it: the search looks for it as for all that time changes.
-    """
-    known = {term.effect.id for term in prepared.known} | {*WARMING}
-    turned = not dictionary.x.oriented.any()
-    for one in of_factory(dictionary, factory_errors(about), turned):
-        if one.part not in known:
-            yield one
-
-
-def _as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> None:
-    """Let what the factory left be as large as biases and scale factors make likely."""
-    state, nominal = best.state, about.nominal
-    sigma = np.sqrt(np.diag(state.inverse))
-    names: list[str] = []
-    found: list[tuple[float, float]] = []
-    for kind, first in (("bias", dictionary.bias), ("scale", dictionary.scale)):
-        for c, channel in enumerate(CHANNELS):
-            group = f"{'acc' if c < 3 else 'gyr'}_{kind}"
-            for at in np.flatnonzero(state.columns == first + c):
-                names.append(f"{group}.{channel[-1]}")
-                value = nominal[group][c % 3] + state.estimate[at]
-                found.append((float(value), float(sigma[at])))
-    values, error = np.array(found).reshape(-1, 2).T
-    shows = GradeShown.of(about.grade, names, values, error, about.sent)
-    if not shows.because:
-        return
-    said, likely = (
-        factory_sizes(dictionary.x, factory_errors(about, grade))
-        for grade in (None, shows.grade)
-    )
-    dictionary.unfitted = tuple(
-        replace(g, typical=g.typical * likely[g.part] / said[g.part])
-        for g in dictionary.unfitted
-    )
 
 
 def nominal_of(about: Description, places: int, prepared: Prepared) -> State:

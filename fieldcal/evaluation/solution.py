@@ -220,6 +220,7 @@ def solved_as(
         found = solve(laid.observations, recorded=recorded, **asked)
     shows = _grade(found, about)
     if shows.because and not printed:
+        asked["at_best"] = asked["factory"]
         asked["factory"] = factory_errors(device, shows.grade)
         found = solve(laid.observations, recorded=recorded, **asked)
         found = replace(found, info={**found.info, "grade_shown": asdict(shows)})

@@ -112,6 +112,10 @@ BOTH_RESTART = 20.0
 """Odds that all axes of a triad do so if those of the other one do, by what is typical;
 and the inverse that some do, or by less."""
 
+AS_STATED = 0.2
+"""Chance that a kind of error is as small as the stated grade has it in a device with
+biases of a coarser one: its gyroscopes tell little of its accelerometers."""
+
 UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 

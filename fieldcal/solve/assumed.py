@@ -34,6 +34,8 @@ class Asked:
     angles_deg : how well each position's angles are set
     lot : what the unit's lot says of it; None where it is not asked
     factory : what the factory left of errors that are not estimated
+    at_best : the same by the grade that the device is called, where biases show a
+        coarser one; each kind of error then has one of the two sizes
 
     """
 
@@ -46,6 +48,7 @@ class Asked:
     angles_deg: float = 0.0
     lot: LotPrior | None = None
     factory: FactoryErrors = FactoryErrors()
+    at_best: FactoryErrors | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS or self.tilt not in CHOICES:

@@ -41,6 +41,9 @@ from fieldcal.solve.rows import of_means, without_angles
 Earth = Literal["stated", "another", "none"]
 """Whose rate gyroscopes have: of the stated latitude, of another one, or none."""
 
+EVEN = 0.5
+"""Chance from which an error is taken to be as large as the coarser grade has it."""
+
 NO_EARTH = (
     "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
     " their biases are stated without; real ones that do so take out what is a bias"
@@ -60,6 +63,7 @@ def solve(
     recorded: Recorded | None = None,
     lot: LotPrior | None = None,
     factory: FactoryErrors | None = None,
+    at_best: FactoryErrors | None = None,
 ) -> Calibration:
     """Estimate the calibration.
 
@@ -79,6 +83,8 @@ def solve(
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
     factory : what the factory left of errors that are not estimated; nothing if None
+    at_best : the same if the device is as good as it is called, where `factory` is what
+        its biases make likely: the rows tell which, for each kind of error
     lot : what the unit's lot says of its parameters, which the result then has in it
         unless the unit is odd
 
@@ -100,7 +106,7 @@ def solve(
     asked = Asked(
         method, tilt, cross, as_printed,
         level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot,
-        factory or FactoryErrors(),
+        factory or FactoryErrors(), at_best,
     )  # fmt: skip
     if as_printed:
         return printed.solve(observations, asked)
@@ -229,7 +235,17 @@ class _Session:
             turned=turned,
             lot=self.asked.lot,
         )
-        return estimated(self.recorded, turning, self.nominal, wanted, follow)
+        found = estimated(self.recorded, turning, self.nominal, wanted, follow)
+        if (stated := self.asked.at_best) is None:
+            return found
+        chances = found.coarser(stated)
+        finer = {k: getattr(stated, k) for k, p in chances.items() if p < EVEN}
+        if not finer:
+            return found
+        wanted = replace(wanted, factory=replace(wanted.factory, **finer))
+        best = estimated(self.recorded, turning, self.nominal, wanted, follow)
+        as_stated = np.prod([1 - chances[k] for k in finer])
+        return best.mixed_with(best, found, 1 - float(as_stated))
 
     def _by_tilt(self) -> tuple[Estimated, list[str]]:
         """The model of the tilt that fits better, the other one being weighed in.

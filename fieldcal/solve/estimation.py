@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known import KnownRows
+from fieldcal.model.evidence.of_two_grades import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.search.selection import Search
@@ -132,6 +134,12 @@ class Estimated:
         """Covariance of some of its parameters, in their order."""
         at = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(at, at)]
+
+    def coarser(self, stated: FactoryErrors) -> dict[str, float]:
+        """How likely each kind of error is as in the set, and not as is stated."""
+        state = self.search.evaluated(self.given.members).state
+        left = [group for _, group in self.given.asked if group.cause == "factory"]
+        return chances_of_coarser(state, left, self.given.wanted.factory, stated)
 
     @property
     def causes(self) -> dict[str, float]:

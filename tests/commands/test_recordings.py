@@ -75,8 +75,11 @@ def test_five_mpu9150_leave_no_more_than_the_peer_s_model(
     assert solved["method"] == "scalar"
     assert solved["verdict"] == "good"
     half_a_digit = 0.00005
-    # theirs is the least there is; ours weighs the stops, and fits the turns as well
-    assert solved["fit"]["rms"] <= 1.05 * NORM_RESIDUAL[i] + half_a_digit
+    # theirs is the least there is; ours weighs the stops, fits the turns as well, and
+    # what a device with such biases may have besides, hysteresis and a warm-up, is not
+    # in its parameters
+    assert solved["fit"]["rms"] <= 1.15 * NORM_RESIDUAL[i] + half_a_digit
+    assert solved["quadratic_sigma"] == 2e-5  # the stops show it: not 2.5e-4
 
 
 def stops_without_weights(folder: Path) -> np.ndarray:

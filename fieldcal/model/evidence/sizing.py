@@ -88,7 +88,7 @@ def alike_in(some: Array, density: Array = UNSTEADY) -> Array:
     return out
 
 
-def _told(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Array]:
+def told_of(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Array]:
     """What (3) needs of groups alike in width, columns (..., k) of a set, of size v."""
     wide, size = state.sizes[at], np.asarray(v)[..., None]
     cov = state.inverse[at[..., :, None], at[..., None, :]]
@@ -103,7 +103,7 @@ def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
 
     The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
     """
-    strength, power = _told(state, at, v)
+    strength, power = told_of(state, at, v)
     near = v * np.exp(np.linspace(-STEP, STEP, FINER))
     before = np.interp(np.log(near), np.log(priors.SIZES), DENSITY)
     best = float(near[np.argmax(gained(strength, power, near) + before)])
@@ -118,7 +118,7 @@ def likeliest_of_axis(
 
     The axes are alike within `UNLIKE`; `triad` is what was found of all of them.
     """
-    strength, power = _told(state, at, v)
+    strength, power = told_of(state, at, v)
     middle, part = triad
     apart = np.linspace(-4.0, 4.0, FINER)
     near = middle * np.exp(priors.UNLIKE * apart)
@@ -240,7 +240,7 @@ class Sizing:
             first = np.array([self.places[i].start for i in alike])
             at = first[:, None] + np.arange(width)
             v = priors.SIZES[[self.sizes[i] for i in alike]]
-            out.update(zip(alike, gained(*_told(state, at, v)), strict=True))
+            out.update(zip(alike, gained(*told_of(state, at, v)), strict=True))
         return out
 
     def _triad(self, channels: Sequence[int]) -> list[Array]:

@@ -154,6 +154,15 @@ def averaged(
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
+def with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
+    """A set's columns with those of further groups that it leaves out."""
+    names, told = {cause.name for cause, _ in one.members}, one.state
+    left = [group for group in more if group.part not in names]
+    columns = np.concatenate([told.columns, *(group.columns for group in left)])
+    sizes = np.concatenate([told.sizes, *(group.typical for group in left)])
+    return Eliminated.of(told.rows, columns, sizes)
+
+
 def estimate_of(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
     """What a set says of its columns, with those of `unfitted` that it leaves out."""
     names = {cause.name for cause, _ in one.members}

@@ -1,0 +1,74 @@
+"""How large each kind of error is in a device that may be of either of two grades.
+
+Biases that no unit of the stated grade has make the errors of a coarser one likely, and
+not certain: gyroscopes that are 5 deg/s off come with accelerometers as straight as
+those of tactical grade. Each kind of error has the size s_1 of the stated grade or s_2
+of the coarser one. The rows tell which, as they tell any size: with gain(v) by (3) of
+`gram` and the chances of both before the rows are seen,
+
+    p_2 / p_1 = exp[gain(s_2) - gain(s_1)] (1 - AS_STATED) / AS_STATED             (1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from fieldcal.core.factory import WARMING, FactoryErrors
+from fieldcal.core.samples import CHANNELS, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.evidence.gram import Eliminated, gained
+from fieldcal.model.evidence.sizing import told_of
+
+STRAIGHT = ("quadratic", "scale_asymmetry", "cubic")
+"""Effects whose sizes are one of `FactoryErrors`: a curve of unknown shape."""
+
+
+def chances_of_coarser(
+    state: Eliminated,
+    groups: Sequence[Group],
+    coarser: FactoryErrors,
+    stated: FactoryErrors,
+) -> dict[str, float]:
+    """Probability of the coarser size of each kind of error, by `FactoryErrors`' names.
+
+    Parameters
+    ----------
+    state : a set with the groups in it, as large as the coarser grade has them
+    groups : what the factory left, each named by `part`
+    coarser, stated : sizes by the two grades; those that are alike are left out
+
+    """
+    chances = {}
+    for kind, columns in _kinds(groups):
+        most, least = getattr(coarser, kind), getattr(stated, kind)
+        at = np.flatnonzero(np.isin(state.columns, columns))
+        if len(at) and 0 < least < most:
+            chances[kind] = _of_coarser(state, at, least / most)
+    return chances
+
+
+def _kinds(groups: Sequence[Group]) -> Iterator[tuple[str, Index]]:
+    """The columns of each size of `FactoryErrors`, by its name."""
+    for kind in (field.name for field in fields(FactoryErrors)):
+        names = STRAIGHT if kind in STRAIGHT else (kind,)
+        some = [g.columns for g in groups if g.part in names]
+        some += [_of_biases(g, kind) for g in groups if g.part in WARMING]
+        yield kind, np.concatenate([np.empty(0, dtype=np.intp), *some])
+
+
+def _of_biases(group: Group, kind: str) -> Index:
+    """The columns of what warms up that one temperature coefficient is the size of."""
+    triads = {"acc_per_k": CHANNELS[:3], "gyr_per_k": CHANNELS[3:]}
+    at = [i for i, p in enumerate(group.params) if CHANNELS[p] in triads.get(kind, ())]
+    return group.columns[at]
+
+
+def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
+    """Probability that columns are as large as in a set, and not a part of that."""
+    gain = gained(*told_of(state, at, 1.0), np.array([part, 1.0]))  # (1)
+    ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
+    return float(1 / (1 + np.exp(-ahead)))

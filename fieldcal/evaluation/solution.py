@@ -160,7 +160,7 @@ class Laid:
             rows,
             origins(source, rows),
             source if turns else None,
-            tuple(Shown(s.members, p) for s, p in likely),
+            tuple(Shown.of(s, p) for s, p in likely),
             None if shown is None else shown.filters,
             tuple(self.rounding.toward_zero.tolist()),
         )

@@ -25,13 +25,14 @@ from itertools import combinations
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.model import thresholds
+from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import at_points, parts, points
 from fieldcal.model.causes.random_causes import of_chance
 from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import only
@@ -57,12 +58,27 @@ class Shown:
     members : its causes, of any dictionary
     probability : that it is the right one
     maybe : the same causes on triads that do not show them, and may have them
+    sizes : how large the recording shows each of the members to be, v; it is told here
+        beside more that is uncertain, and a size sought again would shrink it
 
     """
 
     members: tuple[Member, ...]
     probability: float
     maybe: tuple[Member, ...] = ()
+    sizes: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, one: Set, probability: float) -> Shown:
+        """A set of a search, as large as it has its causes."""
+        sizes = priors.SIZES[list(one.sizes.members)].tolist()
+        return cls(one.members, probability, sizes=tuple(sizes))
+
+    @property
+    def size_of(self) -> dict[str, float]:
+        """How large each cause is, by its key; none where that is not known."""
+        keys = [cause.key for cause, _ in self.members]
+        return dict(zip(keys, self.sizes, strict=True)) if self.sizes else {}
 
 
 def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown, ...]:
@@ -86,7 +102,10 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     likely = {k: p for k, p in total.items() if p >= least}
     # in the order in which they came: that of a set is another one in every run
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
-    here = {g: m for g, m in _in_other_dictionary(d, wanted)}
+    size: dict[str, float] = {}
+    for one in sorted(shown, key=lambda s: s.probability):
+        size |= one.size_of
+    here = {g: m for g, m in _in_other_dictionary(d, wanted, size)}
     also = list(_on_other_triad(d, [c for c, _ in here.values()]))
     out: dict[frozenset[Group], Shown] = {}
     for key, p in likely.items():
@@ -115,12 +134,16 @@ def _adds(member: Member, has: set[str]) -> bool:
 
 
 def _in_other_dictionary(
-    d: Dictionary, wanted: Mapping[Group, Cause]
+    d: Dictionary, wanted: Mapping[Group, Cause], size: Mapping[str, float]
 ) -> Iterator[tuple[Group, Member]]:
-    """Groups of another dictionary, each with the member that it is in this one."""
+    """Groups of another dictionary, each with the member that it is in this one.
+
+    Causes whose size is known by their key have that.
+    """
     every: dict[str, Cause] = {}
     if not all(has_equation(g) for g in wanted):
-        every = {c.key: c for c in [*of_chance(d), *of_no_effect(d)]}
+        every = {c.key: c.of_size(size.get(c.key))
+                 for c in [*of_chance(d), *of_no_effect(d)]}  # fmt: skip
     new: dict[str, list[tuple[Group, list[Group]]]] = {}
     for group, cause in wanted.items():
         if has_equation(group):
@@ -133,11 +156,12 @@ def _in_other_dictionary(
         pairs = new.get(cause.key, [])
         variants = tuple(one for _, some in pairs for one in some)
         instants = [(at, at) for g in cause.expected for at in g.shape.values()]
-        same = replace(cause, variants=variants).expecting(instants)
+        sized = replace(cause, variants=variants).of_size(size.get(cause.key))
+        same = sized.expecting(instants)
         for group, some in pairs:
             off = (g for g in same.expected if g.shape == group.shape)
-            own = next(off, some[0]) if group in cause.expected else some[0]
-            yield group, (same, own)
+            own = same.variants[variants.index(some[0])]
+            yield group, (same, next(off, own) if group in cause.expected else own)
 
 
 def _variants(d: Dictionary, group: Group) -> list[Group]:

@@ -119,7 +119,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     for k in np.unique(width).tolist():
         some = np.flatnonzero(width == k)
         at = np.searchsorted(every, [others[j].columns for j in some])
-        size = np.array([others[j].typical for j in some])
+        size = np.array([others[j].sizes(others[j].fixed or 1.0) for j in some])
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)

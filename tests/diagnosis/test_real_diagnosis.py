@@ -90,7 +90,7 @@ def test_six_faces_are_not_square(
     """The published residuals with known axes, without and with cross-coupling.
 
     How well a hand sets faces is estimated along: what is left of the residual is not
-    that of least squares, but much less than without.
+    that of least squares, the least there is, but not much more than half of without.
     """
     said = faces(session)
     assert said["verdict"] in ("left_out", "ambiguous")
@@ -98,11 +98,11 @@ def test_six_faces_are_not_square(
     assert "gyro_scale" not in named(said)  # nobody held the heading
     fit = said["fit"]
     assert fit["before"]["rms"] == pytest.approx(before, rel=0.05)
-    assert fit["after"]["rms"] < 1.8 * after
+    assert fit["after"]["rms"] < 0.6 * before
     assert fit["after"]["held_out_rms"] < 0.95 * fit["before"]["held_out_rms"]
     replay = {k: said["twin"][k]["rms_acceleration"] for k in ("refitted", "twin")}
     assert replay["refitted"] == pytest.approx(before, rel=0.05)
-    assert replay["twin"] < 1.8 * after
+    assert 0.95 * after < replay["twin"] < 0.6 * before
 
 
 @pytest.mark.thorough

@@ -33,15 +33,15 @@ DEVICE = Profile(
 def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
     known_s: float, right: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of sensors that are taken to be quick, one is five sigmas off."""
+    """Of sensors that are taken to be quick, one is wrong or not known any more."""
     monkeypatch.setattr(priors, "FILTERED_S", known_s)
     positions = places(FACES, 20.0, 6.0)
     block = recorded(DEVICE, positions, seed=1)
     session = Session.open(write_session(tmp_path / "faces", block, positions))
     found = solved(session, rests(session))
-    pulls = []
+    good = []
     for axis, true in zip("xyz", DEVICE.truth.gyr_scale, strict=True):
         name = f"gyr_scale.{axis}"
-        assert found.uncertainty(name) < 1e-3
-        pulls.append(abs(found.value(name) - true) / found.uncertainty(name))
-    assert max(pulls) < 3.0 if right else max(pulls) > 4.0
+        sigma, off = found.uncertainty(name), abs(found.value(name) - true)
+        good.append(sigma < 1e-3 and off < 3 * sigma)
+    assert all(good) == right

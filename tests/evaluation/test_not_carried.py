@@ -67,12 +67,17 @@ def test_wrongly_decoded_bytes_are_put_right(
 
 
 @pytest.mark.parametrize(
-    "size", [1e-4, pytest.param(-3e-5, marks=pytest.mark.thorough)]
+    ("size", "ignored"),
+    [(1e-4, 5.0), pytest.param(-3e-5, 1.0, marks=pytest.mark.thorough)],
 )
 def test_a_drift_is_in_the_result(
-    size: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    size: float, ignored: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The bias is that at the end, and what the drift moves is said."""
+    """The bias is that at the end, and what the drift moves is said.
+
+    Angles that are set to 0.05° show a drift of 8e-3 m/s² in 5 minutes badly: it is as
+    large as was found, and no smaller because it is less certain.
+    """
     profile = device(effect("bias_drift", {"ax": size}))
     code, said = solved(profile, tmp_path / "s", capsys)
     assert code == 0 and said["verdict"] == "good"
@@ -82,8 +87,8 @@ def test_a_drift_is_in_the_result(
     truth = profile.truth
     ended = truth.acc_bias[0] + size * there["as_of"]["since_start_s"]
     at_end = replace(truth, acc_bias=(ended, *truth.acc_bias[1:]))
-    assert (np.abs(off(said, replace(profile, truth=at_end))) < 4).all()
-    assert np.abs(off(said, profile)).max() > 5
+    assert (np.abs(off(said, replace(profile, truth=at_end))) < 2.5).all()
+    assert np.abs(off(said, profile)).max() > ignored
     worst = max(there["moved_sigmas"], key=lambda n: abs(there["moved_sigmas"][n]))
     assert worst == "acc_bias.x"
     assert np.sign(there["moved_sigmas"][worst]) == np.sign(size)

@@ -78,6 +78,39 @@ def test_explanations_that_differ_in_nothing_that_is_carried_are_one() -> None:
     assert [s.probability for s in d.explanations] == pytest.approx([0.8, 0.2])
 
 
+@pytest.mark.parametrize("name", ["bias_drift", "random_walk"])
+def test_a_cause_is_as_large_as_its_likeliest_explanation_has_it(name: str) -> None:
+    """In all its variants; one whose size nobody tells has that of its rows."""
+    one = member(name)
+    shown = [Shown((one,), 0.3, sizes=(2.0,)), Shown((one,), 0.7, sizes=(5.0,))]
+    ((cause, group),) = given(shown).explanations[0].members
+    assert {g.fixed for g in (*cause.variants, group)} == {5.0}
+    assert group in cause.variants
+    ((cause, group),) = given([Shown((one,), 1.0)]).explanations[0].members
+    assert {g.fixed for g in (*cause.variants, group)} == {None}
+
+
+def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
+    """Badly set angles hide a drift: its size is the one found, and not the least."""
+
+    truth = BIAS[0] + DRIFT * TIMES[-1]
+
+    def off(sizes: tuple[float, ...], seed: int) -> float:
+        shown = (Shown((member("bias_drift", (0,)),), 1.0, sizes=sizes),)
+        recorded = replace(recording(noise=seed), shown=shown)
+        found = estimated(recorded, None, NOMINAL, Wanted(angles_deg=0.1))
+        at = found.names.index("acc_bias.x")
+        assert (
+            abs(float(found.values[at]) - truth) < 2 * found.covariance[at, at] ** 0.5
+        )
+        return float(abs(found.values[at] - truth))
+
+    as_found, sought = (
+        np.mean([off(sizes, seed) for seed in range(4)]) for sizes in ((4.0,), ())
+    )
+    assert as_found < 0.7 * sought
+
+
 def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None:
     drift = member("bias_drift")
     unlikely = given([Shown((drift,), 0.002), Shown((), 0.998)])

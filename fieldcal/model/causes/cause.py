@@ -157,6 +157,13 @@ class Cause:
         least = min(apart)
         return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
 
+    def of_size(self, v: float | None) -> Cause:
+        """The same with variants of size v; itself where that is not known."""
+        if v is None:
+            return self
+        every = tuple(replace(group, fixed=v) for group in self.variants)
+        return replace(self, variants=every)
+
     def expecting(self, spans: Sequence[tuple[float, float]]) -> Cause:
         """The same with what begins within some spans, s, likelier in all its axes.
 

@@ -234,6 +234,8 @@ def test_a_search_that_begins_with_what_was_found_before_finds_the_same(
     assert [c.key for c, _ in quick.best.set.members] == [
         c.key for c, _ in whole.best.set.members
     ]
-    assert len(quick.inferred.search.visited) <= len(whole.inferred.search.visited)
+    # what was found before, it tries as well to do without
+    most = 1.25 * len(whole.inferred.search.visited)
+    assert len(quick.inferred.search.visited) < most
     worth, full = (gain_of(one).of(LADDER) for one in (quick, whole))
     np.testing.assert_allclose(worth.gain, full.gain, rtol=0.05, atol=0.02)

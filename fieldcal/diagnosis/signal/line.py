@@ -25,6 +25,9 @@ FEW, STRETCHES, FOLDS = 3, 5, 12
 """Windows below which stretches of them are left out instead, how many of each, and
 parts of the recording that are left out in turn."""
 
+SLOW = 30.0
+"""Periods in a window up to which a slope takes a part of a line: 0.07 % here."""
+
 AT_ONCE = 256
 """Frequencies tried together: all of a long recording would take much memory."""
 
@@ -92,7 +95,12 @@ def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
-    return _at_best(pieces, effect, moments, offsets, step, 3)
+    tone = _at_best(pieces, effect, moments, offsets, step, 3)
+    if not pieces.usable or tone.hz * shortest > SLOW:
+        return tone
+    amplitude = effect.response(pieces.x, tone.hz) @ tone.causes
+    again = moments_of(pieces.with_whole_line(tone.hz, amplitude), tone.hz)
+    return _at_best(pieces, effect, again, np.linspace(-step, step, 11), step / 5, 2)
 
 
 def remains(pieces: Pieces, tone: Tone) -> Remains:
@@ -145,11 +153,23 @@ def _at_best(
 ) -> Tone:
     for _ in range(rounds):
         some = np.array_split(offsets, -(-len(offsets) // AT_ONCE))
-        chi2 = [_fitted(pieces, effect, moments, each)[2] for each in some]
-        near = float(offsets[np.argmax(np.concatenate(chi2))])
+        chi2 = np.concatenate(
+            [_fitted(pieces, effect, moments, each)[2] for each in some]
+        )
+        near = _top(offsets, chi2)
         offsets = near + np.linspace(-step, step, 11)
         step /= 5
     return _tone(pieces, effect, moments, near)
+
+
+def _top(offsets: Array, chi2: Array) -> float:
+    """Where evenly spaced values are highest, by the parabola of three of them."""
+    top = int(np.argmax(chi2))
+    if not 0 < top < len(chi2) - 1:
+        return float(offsets[top])
+    below, highest, above = chi2[top - 1 : top + 2]
+    bend = max(2 * highest - below - above, 1e-300)
+    return float(offsets[top] + (offsets[1] - offsets[0]) * (above - below) / 2 / bend)
 
 
 def _fitted(

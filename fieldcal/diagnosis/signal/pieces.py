@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,40 @@ SHORTEST = 64
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Samples of each window about their mean, and where the device was in it."""
+    """Samples of each window about their mean, and where the device was in it.
+
+    Attributes
+    ----------
+    x : one row for each window
+    samples, times : (n, 6) without means and slope, (n,) s, of each window
+    noise : (6,) of one sample
+    rate : Hz
+    usable : (n, 6) of each window, samples that say something; all if not given
+    cuts : s, instants at which a bias jumps: there is a mean for each side
+
+    """
 
     x: Experience
     samples: tuple[Array, ...]
     times: tuple[Array, ...]
     noise: Array
     rate: float
+    usable: tuple[NDArray[np.bool_], ...] = ()
+    cuts: Array = field(default_factory=lambda: np.zeros(0))
+
+    def with_whole_line(self, hz: float, amplitude: Complex) -> Pieces:
+        """The same with what means and slopes have taken of a line, (w, 6).
+
+        A wave of n periods loses up to 6 / (pi n)^2 of its power to a slope.
+        """
+        samples = []
+        for own, t, known, one in zip(
+            self.samples, self.times, self.usable, amplitude, strict=True
+        ):
+            line = line_of(t, hz, one)
+            samples.append(own + np.where(known, line, 0.0))
+            samples[-1] -= _flat(t, line, known, self.cuts)
+        return replace(self, samples=tuple(samples))
 
 
 def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
@@ -55,12 +82,15 @@ def pieces_of(source: RowSource, rows: Rows) -> Pieces:
     block, held = source.block, held_in(source, rows)
     times = tuple(block.t[a:b] for _, a, b in held)
     cuts = np.ravel(clear_jumps(rows))
-    samples = []
+    samples, usable = [], []
     for (row, a, b), t in zip(held, times, strict=True):
-        usable = source.usable[a:b] & rows.used[row]
-        samples.append(_flat(t, block.acc[a:b], block.gyr[a:b], usable, cuts))
-    x = places_of(rows, held)
-    return Pieces(x, tuple(samples), times, rows.noise, rate_of(block))
+        values = np.hstack([block.acc[a:b], block.gyr[a:b]])
+        usable.append(source.usable[a:b] & rows.used[row] & np.isfinite(values))
+        samples.append(_flat(t, values, usable[-1], cuts))
+    return Pieces(
+        places_of(rows, held), tuple(samples), times, rows.noise, rate_of(block),
+        tuple(usable), cuts,
+    )  # fmt: skip
 
 
 def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
@@ -76,9 +106,7 @@ def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
     )
 
 
-def _flat(
-    t: Array, acc: Array, gyr: Array, usable: NDArray[np.bool_], cuts: Array
-) -> Array:
+def _flat(t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array) -> Array:
     """Samples without slope and the means between cuts, (n, 6); zero if not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))
@@ -86,9 +114,8 @@ def _flat(
     s -= np.repeat(np.add.reduceat(s, first) / long, long)
     out = np.empty((len(t), 6))
     for c in range(6):
-        values = (acc if c < 3 else gyr)[:, c % 3]
-        known = usable[:, c] & np.isfinite(values)
-        column = np.where(known, values, 0.0)
+        known = usable[:, c]
+        column = np.where(known, values[:, c], 0.0)
         many = np.add.reduceat(known.astype(float), first)
         column -= np.repeat(np.add.reduceat(column, first) / np.maximum(many, 1), long)
         column *= known

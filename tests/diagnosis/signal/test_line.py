@@ -98,3 +98,26 @@ def test_a_line_is_tuned_in_windows_longer_than_a_periodogram() -> None:
     tone = tuned(pieces, Hum(), moments_of(pieces, HZ + off))
     assert tone.channels == ("ay",)
     assert abs(tone.hz - HZ) < 4 * tone.sigmas["hz"]
+
+
+def test_a_slow_line_keeps_what_the_slopes_of_windows_took() -> None:
+    """Its amplitude and frequency are as certain as they say; six periods a window."""
+    t = [15.0 * i + np.arange(1000) / RATE for i in range(10)]
+    x = Experience.at_rest(np.zeros(10), np.zeros(10), 9.81)
+    every = tuple(np.ones((1000, 6), dtype=bool) for _ in t)
+    off = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        samples = []
+        for own in t:
+            six = rng.normal(0, SIGMA, (1000, 6))
+            six[:, 1] += 0.01 * np.cos(2 * np.pi * 0.6 * own + 0.1)
+            line = np.polynomial.polynomial.polyfit(own - own.mean(), six, 1)
+            samples.append(six - line[0] - np.outer(own - own.mean(), line[1]))
+        pieces = Pieces(x, tuple(samples), tuple(t), np.full(6, SIGMA), RATE, every)
+        tone = tuned(pieces, Hum(), moments_of(pieces, 0.601))
+        off.append([(tone.values["ay"] - 0.01) / tone.sigmas["ay"],
+                    (tone.hz - 0.6) / tone.sigmas["hz"]])  # fmt: skip
+    mean, rms = np.mean(off, axis=0), np.sqrt(np.mean(np.square(off), axis=0))
+    assert (np.abs(mean) < 0.7).all(), "3 of the means' errors"
+    assert (rms > 0.5).all() and (rms < 1.5).all()

@@ -47,9 +47,12 @@ class CourseSpan:
         self.count = count
 
     def waves(self, x: Experience) -> Array:
-        """Cosines of the time, (n, count)."""
+        """Means of cosines of the time over the rows, (n, count)."""
+        k = np.arange(1, self.count + 1)
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
-        out: Array = np.cos(np.pi * np.outer(part, np.arange(1, self.count + 1)))
+        few, at = np.unique(x.lasts.round(6), return_inverse=True)
+        mean = np.sinc(np.outer(few / (2 * self.length), k))[at]
+        out: Array = np.cos(np.pi * np.outer(part, k)) * mean
         return out
 
     def fading(self, x: Experience) -> Array:

@@ -2,21 +2,23 @@
 
 Biases have a random walk of q per sqrt(s), or flicker: cosines k with variance a^2 / k
 over T s, a one-sided power of a^2 / 2 over the frequency (`wander_sizes`). With K
-cosines fitted, means over l s of a walk keep the variance
+cosines fitted, means over l s of a walk keep the variance, with z = pi l / T and m_k =
+sin(k z / 2) / (k z / 2), the mean of cosine k over l s,
 
-    q^2 [T / (pi^2 K) - l / 6]                                                      (1)
+    q^2 T / pi^2 [pi^2 / 6 - pi z / 6 + z^2 / 24 - sum_k m_k^2 / k^2]               (1)
 
-which is nearly white from row to row, and means of flicker, with z = pi l / T,
+which is nearly white from row to row, and means of flicker
 
-    a^2 / 2 [3 / 2 - ln z + z^2 / 144 - sum_k (sin(k z / 2) / (k z / 2))^2 / k]     (2)
+    a^2 / 2 [3 / 2 - ln z + z^2 / 144 - sum_k m_k^2 / k]                            (2)
 
 The covariance of two means tau apart is, with y = pi tau / T,
 
     q^2 T / pi^2 [pi^2 / 6 - pi y / 2 + y^2 / 4 - sum_k cos(k y) / k^2]             (3)
     + a^2 / 2 [-ln(2 sin(y / 2)) - sum_k cos(k y) / k]                              (4)
 
-with k = 1 ... K. (2) is the mean of (4) over an interval of l, to the fourth power of
-z. Cosine k exceeds the noise of rows with standard deviations s up to
+with k = 1 ... K. (1) and (2) are the means of (3) and (4) over two intervals of l, (2)
+to the fourth power of z. Cosine k exceeds the noise of rows with standard deviations s
+up to
 
     k = q sqrt(2 T J) / pi,    k = a^2 J,    J = sum 1 / (2 s^2)                    (5)
 
@@ -100,13 +102,13 @@ class Wander:
     def left(self, length: Array, channel: int) -> Array:
         """Variance that its cosines leave of means over some lengths, (n,)."""
         q, a, count = self._of_channel(channel)
-        walks: Array = q**2 * _left_of_walk(self.length, length, count)
-        if not a:
-            return walks
+        if not (q or a):
+            return np.zeros(len(length))
         # rows are of few lengths, but for the rounding of their times
         few, at = np.unique(length.round(6), return_inverse=True)
-        flickers: Array = a**2 * _left_of_flicker(self.length, few, count)[at]
-        return walks + flickers
+        walks = q**2 * _left_of_walk(self.length, few, count)
+        out: Array = (walks + a**2 * _left_of_flicker(self.length, few, count))[at]
+        return out
 
     def apart(self, t: Array, length: Array) -> Array:
         """Covariance that they leave of means about some instants, (6, n, n)."""
@@ -136,13 +138,21 @@ class Wander:
 
 def _left_of_walk(whole: float, length: Array, count: int) -> Array:
     """Variance that cosines leave of means of a walk of 1 per sqrt(s), (n,)."""
-    left: Array = np.maximum(whole / (np.pi**2 * count) - length / 6, 0.0)  # (1)
-    return left
+    z, k = np.pi * length / whole, np.arange(1, count + 1)
+    total = np.pi**2 / 6 - np.pi * z / 6 + z**2 / 24
+    left: Array = np.maximum(total - _means(z, k) ** 2 @ k**-2.0, 0.0)  # (1)
+    return whole / np.pi**2 * left
 
 
 def _left_of_flicker(whole: float, length: Array, count: int) -> Array:
     """Variance that cosines leave of means of flicker with a = 1, (n,)."""
     z, k = np.maximum(np.pi * length / whole, NEAR), np.arange(1, count + 1)
-    taken = np.sinc(np.multiply.outer(z, k) / (2 * np.pi)) ** 2 @ (1 / k)
+    taken = _means(z, k) ** 2 @ (1 / k)
     out: Array = np.maximum(1.5 - np.log(z) + z**2 / 144 - taken, 0.0) / 2  # (2)
+    return out
+
+
+def _means(z: Array, k: Index) -> Array:
+    """Means m_k of cosines over intervals, (n, k)."""
+    out: Array = np.sinc(np.multiply.outer(z, k) / (2 * np.pi))
     return out

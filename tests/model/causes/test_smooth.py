@@ -27,6 +27,15 @@ def test_waves_are_cosines_over_the_session() -> None:
     np.testing.assert_array_equal(alone.waves(still), np.ones((9, smooth.WAVES)))
 
 
+def test_a_row_has_the_mean_of_a_cosine_over_what_it_lasts() -> None:
+    span, k = CourseSpan(np.array([0.0, 60.0]), 7), np.arange(1, 8)
+    x = replace(ladder(1), t=np.full(9, 20.0), lasts=np.linspace(0.0, 16.0, 9))
+    for row, lasts in zip(span.waves(x), x.lasts, strict=True):
+        inside = 20.0 + lasts * (np.arange(2000) / 1999 - 0.5)
+        mean = np.cos(np.pi * np.outer(inside / 60.0, k)).mean(axis=0)
+        np.testing.assert_allclose(row, mean, atol=1e-3)
+
+
 def test_a_walk_has_the_variance_of_its_series() -> None:
     """Of Brownian motion less its mean over T: T / 6 on average."""
     sizes = CourseSpan(np.array([0.0, 100.0]), 20_000).walk()

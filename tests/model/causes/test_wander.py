@@ -161,9 +161,19 @@ def test_what_cosines_leave_is_the_rest_of_their_series() -> None:
     every = one.apart(t, np.full(4, piece))
     for c, there in zip((0, 5), covariance, strict=True):
         off = np.abs(every[c] - there)
-        assert np.diag(off).max() < (0.02, 0.002)[c // 3] * there[0, 0]
+        assert np.diag(off).max() < 0.002 * there[0, 0]
         assert off.max() < 0.06 * there[0, 0]  # of instants, not of means
         assert every[c][0, 0] == pytest.approx(one.left(np.array([piece]), c)[0])
+
+
+@pytest.mark.parametrize("lasts", [0.5, 4.0, 25.0])
+def test_rows_keep_of_a_walk_what_cosines_beyond_have_over_them(lasts: float) -> None:
+    """However many periods of a cosine a row lasts."""
+    one = Wander(np.full(6, 2e-3), np.zeros(6), np.zeros(6), np.full(6, 60), 300.0)
+    k = np.arange(61, 200_000)
+    z = np.pi * k * lasts / 600.0
+    every = 300.0 * (2e-3 / (np.pi * k) * np.sin(z) / z) ** 2
+    assert one.left(np.array([lasts]), 1)[0] == pytest.approx(every.sum(), rel=1e-3)
 
 
 def test_one_axis_may_walk_alone_and_none_flickers_alone() -> None:

@@ -32,13 +32,16 @@ from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings
 from fieldcal.model.search.inference import Inference, Inferred
-from fieldcal.model.search.selection import Search
+from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turn, Turning
 from fieldcal.session.description import Description
+
+RESUMED = 2
+"""Times that a search goes on with what it looked at only as another name."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,14 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     """Find what explains a recording, beginning with what explained a part of it."""
     inference = inference_of(prepared.source, prepared.rows, prepared)
     found = inference.run(None if before is None else _begun(before))
+    posterior = _posterior(found)
+    for _ in range(RESUMED):
+        better = found.search.highest
+        if better.score <= found.best.score + SETTLED:
+            break
+        # what may stand in the place of a cause does so better than the cause itself
+        found = found.inference.resumed(better)
+        posterior = _posterior(found)
     inference = found.inference
     windows = inference.system.linearised(found.state)
     best = Fitted(
@@ -164,12 +175,16 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
         found.values,
         reported(found.search, found.best),
     )
-    posterior = Posterior(
-        found.search, found.best, lambda there: inference.beside(found, there)
-    )
     as_good_as_shown(inference.dictionary, best.set, prepared.source.about)
     return Explanation(
         prepared, found, best, base_of(inference, prepared.rows), posterior
+    )
+
+
+def _posterior(found: Inferred) -> Posterior:
+    """Probabilities of what was found, and of what may stand in its place."""
+    return Posterior(
+        found.search, found.best, lambda there: found.inference.beside(found, there)
     )
 
 

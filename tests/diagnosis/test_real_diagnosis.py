@@ -28,9 +28,12 @@ from benchmarks.injected.recorded import (
 from fieldcal.cli import main
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
+from fieldcal.diagnosis.explain import explain
+from fieldcal.diagnosis.prepare import prepare
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
+from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile, Truth
 from fieldcal.sim_device.vocabulary import parse
 
@@ -182,6 +185,24 @@ def test_an_autopilot_on_the_bench_warms_up(shared: Path, tmp_path: Path) -> Non
     assert replays["twin"]["rms_angular_rate"] < (
         0.5 * replays["refitted"]["rms_angular_rate"]
     )
+
+
+@pytest.mark.thorough
+def test_what_is_told_is_the_likeliest_of_all_that_was_looked_at(
+    shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two walks may stand in the place of two warm-ups, and one of each is likelier."""
+    pytest.importorskip("pyulog", reason="pyulog reads PX4 logs")
+    path = shared / "real" / "pyulog_samples" / "sample.ulg.gz"
+    if not path.is_file():
+        pytest.skip(f"the recording is not here: {path}")
+    assert main(["import", str(path), "-o", str(tmp_path / "bench")]) == 0
+    capsys.readouterr()
+    session = Session.open(tmp_path / "bench")
+    found = explain(prepare(session.block, session.about))
+    likely = dict(found.posterior.weights)
+    assert likely[found.inferred.best] == max(likely.values()) > 0.5
+    assert {"warm_up", "random_walk"} <= set(named(diagnosed(tmp_path / "bench")))
 
 
 @pytest.mark.thorough

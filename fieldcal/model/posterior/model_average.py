@@ -90,6 +90,8 @@ class ModelAverage:
                 (s, w) for s, w in there if set(_group_in(s, member).params) <= mine
             ]
 
+        there = there or [(s, 1.0) for s in self.best]  # it is too unlikely to count
+
         def places(one: Set) -> list[Index]:
             own = _group_in(one, member)
             at = dict(zip(own.params or own.columns, own.columns, strict=True))

@@ -87,6 +87,12 @@ class Inference(Refinement):
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         return self._until_it_stays(state, values, found, thorough=begin is None)
 
+    def resumed(self, better: Set) -> Inferred:
+        """Go on with a set that is better than what was found."""
+        start: Array = np.zeros(self.dictionary.width)
+        state, values, _ = self.settled(self.nominal, start, ())
+        return self._until_it_stays(state, values, better, thorough=False)
+
     def _until_it_stays(
         self, state: State, values: Array, found: Set, thorough: bool
     ) -> Inferred:

@@ -57,6 +57,11 @@ class Search(Offers):
             best = better
         return self._of_effects(best)
 
+    @property
+    def highest(self) -> Set:
+        """The set of the highest weight of all that were visited."""
+        return self._of_effects(max(self.visited.values(), key=_score))
+
     def upheld(self, members: tuple[Member, ...]) -> Set:
         """What of some causes is worth more than less of it."""
         best = self.evaluated(members)
@@ -87,14 +92,31 @@ class Search(Offers):
         """Variants of a cause that are about as likely as one that a set has."""
         rows, wide = there.state.rows, less.state.sizes
         rest = Eliminated.of(rows, less.state.columns, wide)
-        worth: dict[Group, float] = {}
-        for one in group.siblings(cause.variants):
-            before = np.diag(rows.matrix(one.columns, one.columns)) * one.typical**2
-            inner, pull = rest.rest(one.columns, one.typical)
-            gain = gains(inner, pull, float(before.max()))
-            worth[one] = float(np.logaddexp.reduce(gain + DENSITY))
+        worth = _worth(rest, group.siblings(cause.variants))
         least = worth[group] - OTHERWISE
         yield from (g for g, w in worth.items() if g is not group and w > least)
+
+    def _on_more_outputs(self, there: Set) -> Set:
+        """A set with its causes on more outputs, where those raise the weight.
+
+        What a further cause did on an output may be what another one does there, too.
+        """
+        state = there.state
+        for cause, group in there.members:
+            own = group.siblings(cause.variants)
+            some = [g for g in own if {*g.params} > {*group.params}]
+            if cause.kind != "effect" or not some:
+                continue
+            kept = ~np.isin(state.columns, group.columns)
+            rest = Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
+            worth = _worth(rest, [group, *some])
+            most = max(worth, key=lambda g: worth[g])
+            if most is not group:
+                members = tuple((c, most if c is cause else g)
+                                for c, g in there.members)  # fmt: skip
+                there = max([there, self.evaluated(members, there.sizes)], key=_score)
+                state = there.state
+        return there
 
     def _of_effects(self, best: Set) -> Set:
         """The best set of effects alone, where that it is no effect is unlikely.
@@ -129,7 +151,7 @@ class Search(Offers):
             less = self.without(best, i)
             beside = best.sizes.instability
             other = self._followed(less, best.score, beside)
-            best = max([best, less, other], key=_score)
+            best = max([best, self._on_more_outputs(less), other], key=_score)
         return best
 
     def _wider(self, there: Set) -> Set:
@@ -250,6 +272,16 @@ class Search(Offers):
         """Chance of two more causes beside those of a set, ln."""
         both = [*there.members, one.member, two.member]
         return self.chance(both) - self.chance(there.members)
+
+
+def _worth(rest: Eliminated, some: Iterable[Group]) -> dict[Group, float]:
+    """What each of some groups adds to a set, ln, over all its sizes."""
+    worth: dict[Group, float] = {}
+    for one in some:
+        own = np.diag(rest.rows.matrix(one.columns, one.columns)) * one.typical**2
+        gain = gains(*rest.rest(one.columns, one.typical), float(own.max()))
+        worth[one] = float(np.logaddexp.reduce(gain + DENSITY))
+    return worth
 
 
 def _widened(offer: Offer) -> Offer:

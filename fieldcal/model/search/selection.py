@@ -96,7 +96,7 @@ class Search(Offers):
         least = worth[group] - OTHERWISE
         yield from (g for g, w in worth.items() if g is not group and w > least)
 
-    def _on_more_outputs(self, there: Set) -> Set:
+    def on_more_outputs(self, there: Set) -> Set:
         """A set with its causes on more outputs, where those raise the weight.
 
         What a further cause did on an output may be what another one does there, too.
@@ -151,7 +151,7 @@ class Search(Offers):
             less = self.without(best, i)
             beside = best.sizes.instability
             other = self._followed(less, best.score, beside)
-            best = max([best, self._on_more_outputs(less), other], key=_score)
+            best = max([best, self.on_more_outputs(less), other], key=_score)
         return best
 
     def _wider(self, there: Set) -> Set:

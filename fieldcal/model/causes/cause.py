@@ -87,7 +87,8 @@ class Group:
     def foremost(self) -> Index:
         """The largest of its columns, by their place among them; all but of wide ones.
 
-        By these it is offered: what the quick waves of a course add decides no rank.
+        By these it is offered: what the quick waves of a course add decides no rank,
+        but for a walk far above the noise.
         """
         if len(self.columns) <= OFFERED:
             return np.arange(len(self.columns))

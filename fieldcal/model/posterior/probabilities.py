@@ -91,7 +91,7 @@ class Posterior:
         less, found = self.without(name), dict[str, Set]()
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
-        offers = self.search.offers(less, self.best.sizes.instability)
+        offers = self.search.offers(less, self.best.sizes)
         # what is predicted beside what is left is less than the whole: alike for all
         itself = [o for o in offers if o.member[0].name == name]
         predicted = max((self._bare(less, o) for o in itself), default=own)

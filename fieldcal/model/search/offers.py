@@ -8,7 +8,7 @@ other triad's stays, which nothing has explained.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +16,16 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Cause
 from fieldcal.model.causes.dictionary import AlikeGroups, Dictionary
+from fieldcal.model.causes.smooth import WAVES
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
 from fieldcal.model.evidence.sets import Set, Sets, chances
 from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member, Sizes
 
 LEVELS = (3, 6, 9, 40)
 """Steps in size by which instability may fall when something is explained."""
+
+FLICKER = (1, 2)
+"""The same of flicker, beside which a walk is small if it is as large as it was."""
 
 FALLING = ((0, 1, 2), (3, 4, 5, 6))
 """Instabilities that fall together: of a triad, and of turns with the gyroscopes."""
@@ -39,9 +43,9 @@ Level = tuple[Less, Eliminated, float]
 Best = dict[Cause, tuple[float, int, int]]
 """Of each cause what it would add, ln, the number of its variant, the index of size."""
 
-Asked = tuple[tuple[tuple[str, int], ...], Less | None]
-"""A set by its key, and the instability beside which it is asked what it may be given,
-if only beside one."""
+Asked = tuple[tuple[tuple[str, int], ...], Sizes | None]
+"""A set by its key, and the sizes of what is always there beside which it is asked what
+it may be given, if only beside those."""
 
 WIDE = 30
 """Columns of a group from which its eigenvalues cost more than to look them up."""
@@ -117,23 +121,40 @@ class Offers(Sets):
         self._at: dict[Less, Seen] = {}
         self._known: dict[int, Array] = {}
 
-    def offers(self, there: Set, beside: Less | None = None) -> list[Offer]:
+    def offers(self, there: Set, beside: Sizes | None = None) -> list[Offer]:
         """Every cause that a set has not, at its best variant, the best one first.
 
-        What takes the place of a cause that was left out stands `beside` the
-        instability that this one stood beside; other causes may need any.
+        What takes the place of a cause that was left out stands `beside` what this one
+        stood beside, an instability and a flicker; other causes may need any.
         """
         best: dict[str, Offer] = {}
         for table in self.tables(there, beside):
-            for offer in table.offers:
-                name = offer.member[0].key
+            for each in table.offers:
+                offer, name = self._in_full(there, each, table), each.member[0].key
                 if name not in best or offer.score > best[name].score:
                     best[name] = offer
         return sorted(best.values(), key=lambda o: -o.score)
 
-    def tables(self, there: Set, beside: Less | None = None) -> list[OfferTable]:
+    def _in_full(self, there: Set, offer: Offer, table: OfferTable) -> Offer:
+        """An offer by all its columns, where those it is offered by are not enough.
+
+        A walk far above the noise has more waves than another course.
+        """
+        group = offer.member[1]
+        if not group.params or len(group.columns) <= WAVES * len(group.params):
+            return offer
+        own = np.diag(table.state.rows.matrix(group.columns, group.columns))
+        top = float((own * group.typical**2).max())
+        profile = DENSITY + gains(*table.state.rest(group.columns, group.typical), top)
+        chance = self.chance([*there.members, offer.member])
+        worth = float(np.logaddexp.reduce(profile)) + chance
+        score = table.score + worth - self.chance(there.members)
+        return replace(offer, score=score, size=int(np.argmax(profile)))
+
+    def tables(self, there: Set, beside: Sizes | None = None) -> list[OfferTable]:
         """What a set may be given, beside each of some instabilities."""
         key = self.key(there.members)
+        beside = beside and replace(beside, members=())
         asked = key, None if (key, None) in self._tables else beside
         if asked not in self._tables:
             levels = list(self._levels(there, beside))
@@ -182,20 +203,22 @@ class Offers(Sets):
                     apart[i] = shares
         return out, apart
 
-    def _levels(self, there: Set, beside: Less | None) -> Iterator[Level]:
+    def _levels(self, there: Set, beside: Sizes | None) -> Iterator[Level]:
         """The set with its instability as it is and another, and its score then."""
         sizes = there.sizes
         base = there.score - there.state.score
         base -= self.alike(sizes.instability)
         columns, wide = there.state.columns, there.state.sizes
         ways = [(wide, 0.0), self.opened(there)]
-        for less in self._less(sizes.instability, beside):
+        own = None if beside is None else beside.instability
+        for less in self._less(sizes.instability, own):
             fallen = less != sizes.instability
             rows = self._seen(less).rows
             for before, cost in ways if fallen and ways[1][1] else ways[:1]:
                 state = Eliminated.of(rows, columns, before)
                 yield less, state, base + cost + state.score + self.alike(less)
         if beside is not None:
+            yield from self._as_beside(there, base, beside)
             return
         first, rows = 0, self._seen(sizes.instability).rows
         for group, size in zip(
@@ -204,12 +227,30 @@ class Offers(Sets):
             # cause does to all axes, or in time, looks like it
             some = slice(first, first := first + len(group.columns))
             if group.fixed is None and (group.in_step or not group.in_state):
-                small = wide.copy()
-                small[some] = group.sizes(float(priors.SIZES[0]))
-                state = Eliminated.of(rows, columns, small)
-                lost = DENSITY[0] - DENSITY[size]
-                score = there.score - there.state.score + state.score
-                yield sizes.instability, state, score + lost
+                # flicker is what few windows have instead of instability
+                down = [max(size - d, 0) for d in FLICKER if group.random]
+                for lower in dict.fromkeys([*down, 0]):
+                    small = wide.copy()
+                    small[some] = group.sizes(float(priors.SIZES[lower]))
+                    state = Eliminated.of(rows, columns, small)
+                    lost = DENSITY[lower] - DENSITY[size]
+                    score = there.score - there.state.score + state.score
+                    yield sizes.instability, state, score + lost
+
+    def _as_beside(self, there: Set, base: float, beside: Sizes) -> Iterator[Level]:
+        """The set with a flicker as large as beside another one, if it has any."""
+        wide, first, less = there.state.sizes.copy(), 0, beside.instability
+        pairs = zip(there.sizes.calibration, beside.calibration, strict=True)
+        changed = False
+        for group, (size, other) in zip(self.dictionary.always, pairs, strict=True):
+            some = slice(first, first := first + len(group.columns))
+            if group.random and group.fixed is None and other != size:
+                wide[some] = group.sizes(float(priors.SIZES[other]))
+                base += float(DENSITY[other] - DENSITY[size])
+                changed = True
+        if changed:
+            state = Eliminated.of(self._seen(less).rows, there.state.columns, wide)
+            yield less, state, base + state.score + self.alike(less)
 
     def _less(self, instability: Less, beside: Less | None) -> list[Less]:
         """Instabilities as they are, and one other or some that are smaller."""

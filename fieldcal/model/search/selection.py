@@ -12,8 +12,8 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import DENSITY, Member
-from fieldcal.model.search.offers import NEAR, Less, Offer, Offers, OfferTable
+from fieldcal.model.evidence.sizing import DENSITY, Member, Sizes
+from fieldcal.model.search.offers import NEAR, Offer, Offers, OfferTable
 from fieldcal.model.search.pairs import Pair, pairs
 
 SETTLED = 0.02
@@ -149,8 +149,7 @@ class Search(Offers):
             if i >= len(best.members):
                 break
             less = self.without(best, i)
-            beside = best.sizes.instability
-            other = self._followed(less, best.score, beside)
+            other = self._followed(less, best.score, best.sizes)
             best = max([best, self.on_more_outputs(less), other], key=_score)
         return best
 
@@ -187,11 +186,11 @@ class Search(Offers):
         if not (missing and others):
             return there
         whole, found = self.evaluated((*there.members, *missing)), [there]
-        near, beside = there.score - OTHERWISE, there.sizes.instability
+        near = there.score - OTHERWISE
         for i, (cause, _) in enumerate(whole.members):
             if cause.key in others:
                 less = self.without(whole, i)
-                other = self._followed(less, near, beside)
+                other = self._followed(less, near, there.sizes)
                 if other is not less:
                     found.append(self.upheld(other.members))
         return max(found, key=_score)
@@ -210,7 +209,7 @@ class Search(Offers):
         return max([there, two, self._followed(two, there.score)], key=_score)
 
     def _followed(
-        self, there: Set, level: float | None = None, beside: Less | None = None
+        self, there: Set, level: float | None = None, beside: Sizes | None = None
     ) -> Set:
         """The best set with one more; the set itself if none comes near a level.
 

@@ -204,16 +204,17 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
     assert plain.score == pytest.approx(there.score)
     starts = np.cumsum([0, *(len(g.columns) for g in d.always)])
     i = [g.cause for g in d.always].index("scale")
-    sizes = there.state.sizes.copy()
-    sizes[starts[i] : starts[i + 1]] = d.always[i].sizes(float(SIZES[0]))
-    np.testing.assert_allclose(small.state.sizes, sizes)
+    wide = there.state.sizes.copy()
+    wide[starts[i] : starts[i + 1]] = d.always[i].sizes(float(SIZES[0]))
+    np.testing.assert_allclose(small.state.sizes, wide)
     lost = DENSITY[0] - DENSITY[there.sizes.calibration[i]]
     expected = there.score - there.state.score + small.state.score + lost
     assert small.score == pytest.approx(expected)
     beside = fallen(mode, (0, 1, 2), 6)
     fresh = SESSION.search(SESSION.noise(np.random.default_rng(seed), tau))
     again = fresh.evaluated(())
-    assert {t.less for t in fresh.tables(again, beside)} == {mode, beside}
+    told = replace(again.sizes, instability=beside)
+    assert {t.less for t in fresh.tables(again, told)} == {mode, beside}
 
 
 def test_sizes_below_what_is_typical_are_opened_at_a_price() -> None:

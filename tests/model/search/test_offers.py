@@ -12,6 +12,8 @@ from small_sessions import Session, ladder
 from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set, chances
 from fieldcal.model.evidence.sizing import Member, Sizes
+from fieldcal.model.search import offers
+from fieldcal.model.search.offers import Offer
 from fieldcal.model.search.selection import SLACK, Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
@@ -98,6 +100,29 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
         assert found[i, at] == pytest.approx(0.5 * (pull[i] @ scaled - log_det))
 
 
+def test_a_walk_far_above_the_noise_is_offered_by_all_its_waves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The quick ones are as far above it; by the slow ones alone it is no walk."""
+    session = Session.of(ladder(8), ("random_walk:acc",))
+    ((walk,),) = [c.variants for c in session.dictionary.causes]
+    rng = np.random.default_rng(2)
+    size = 20 * walk.typical * rng.standard_normal(len(walk.columns))
+    off = session.noise(rng) + session.design[:, :, walk.columns] @ size
+
+    def offered() -> Offer:
+        search = session.search(off)
+        (offer,) = search.offers(search.evaluated(()))
+        return offer
+
+    by_some = offered()
+    monkeypatch.setattr(offers, "WAVES", 20)
+    by_all, search = offered(), session.search(off)
+    found = search.taken(search.evaluated(()), by_all)
+    assert by_all.score == pytest.approx(found.score, abs=6.0)
+    assert by_all.score > by_some.score + 20
+
+
 JUMPS = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr", "bias_drift:acc"))
 ACC, GYR, DRIFT = JUMPS.dictionary.causes
 
@@ -165,7 +190,7 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     acc, gyr = (next(m for m in best.members if m[0] is c) for c in (ACC, GYR))
     assert search.chance((acc, gyr)) == pytest.approx(search.chance((gyr, acc)))
     both = search.evaluated((gyr, acc))
-    offered = search.offers(search.evaluated((gyr,)), both.sizes.instability)
+    offered = search.offers(search.evaluated((gyr,)), both.sizes)
     (offer,) = [o for o in offered if o.member[0] is ACC]
     assert offer.member[1].shape == acc[1].shape
     taken = search.taken(search.evaluated((gyr,)), offer)

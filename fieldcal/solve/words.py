@@ -79,6 +79,8 @@ def carried(
             if p >= thresholds.MENTIONED
         ]
     )
+    if not names:
+        return f"the recording shows {listed}; fieldcal diagnose says what to do"
     worst = int(np.abs(moved).argmax())
     when = ""
     if ended_s is not None:

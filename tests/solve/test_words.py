@@ -116,3 +116,10 @@ def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
     assert not any("do not show the tilt" in w for w in found.warnings)
     level = solve(observe(places, outputs(places)), level_sigma_deg=0.1)
     assert not any("unseen" in w for w in level.warnings)
+
+
+def test_what_a_recording_shows_is_said_of_one_that_determines_nothing() -> None:
+    said = words.carried(1.0, {"random_walk": 0.97}, (), np.zeros(0), 60.0)
+    assert said.startswith("the recording shows random_walk (probability 0.97);")
+    of_one = words.carried(1.0, {"random_walk": 0.97}, ("acc_bias.x",), np.ones(1), 60)
+    assert "otherwise acc_bias.x would be off by 1.0 σ" in of_one

@@ -47,6 +47,9 @@ Asked = tuple[tuple[tuple[str, int], ...], Sizes | None]
 """A set by its key, and the sizes of what is always there beside which it is asked what
 it may be given, if only beside those."""
 
+TRIAD = 3
+"""Outputs that flicker is on."""
+
 WIDE = 30
 """Columns of a group from which its eigenvalues cost more than to look them up."""
 
@@ -138,10 +141,11 @@ class Offers(Sets):
     def _in_full(self, there: Set, offer: Offer, table: OfferTable) -> Offer:
         """An offer by all its columns, where those it is offered by are not enough.
 
-        A walk far above the noise has more waves than another course.
+        A walk and flicker far above the noise have more waves than another course.
         """
         group = offer.member[1]
-        if not group.params or len(group.columns) <= WAVES * len(group.params):
+        outputs = TRIAD if group.random else len(group.params)
+        if not outputs or len(group.columns) <= WAVES * outputs:
             return offer
         own = np.diag(table.state.rows.matrix(group.columns, group.columns))
         top = float((own * group.typical**2).max())

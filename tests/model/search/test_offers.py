@@ -100,11 +100,12 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
         assert found[i, at] == pytest.approx(0.5 * (pull[i] @ scaled - log_det))
 
 
-def test_a_walk_far_above_the_noise_is_offered_by_all_its_waves(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("key", ["random_walk:acc", "flicker:acc"])
+def test_what_wanders_far_above_the_noise_is_offered_by_all_its_waves(
+    key: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The quick ones are as far above it; by the slow ones alone it is no walk."""
-    session = Session.of(ladder(8), ("random_walk:acc",))
+    """The quick ones are as far above it; by some, a walk would be flicker or back."""
+    session = Session.of(ladder(8), (key,))
     ((walk,),) = [c.variants for c in session.dictionary.causes]
     rng = np.random.default_rng(2)
     size = 20 * walk.typical * rng.standard_normal(len(walk.columns))

@@ -96,7 +96,7 @@ def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
     for i, (a, b) in enumerate(bound):
         white, lasts = rows.sd[i], float(rows.length[i])
         turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
-        up = rows.x.f[i] / np.linalg.norm(rows.x.f[i])
+        up = rows.x.f[i] / (np.linalg.norm(rows.x.f[i]) or np.nan)  # gyroscopes alone
         force = block.acc[a:b] / unit
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
         pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]

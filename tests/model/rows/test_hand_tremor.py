@@ -275,3 +275,14 @@ def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
     assert found.x.position.tolist() == list(range(12)) and found.wander[7].any()
     block = replace(source.block, gyr=np.zeros_like(gyr))
     assert len(rows_in_a_hand(replace(source, block=block)).x) == 120
+
+
+def test_gyroscopes_alone_show_a_hand_as_well() -> None:
+    angles = np.zeros((12, 3))
+    angles[7] = 3e-3
+    source = recording(angles, 5, QUICKLY)
+    block = replace(source.block, acc=np.full_like(source.block.acc, np.nan))
+    usable = np.hstack([np.zeros_like(source.usable[:, :3]), source.usable[:, 3:]])
+    found = rows_in_a_hand(replace(source, block=block, usable=usable))
+    assert not found.x.f.any() and found.wander[7].any()
+    assert np.isfinite(found.sd[:, 3:]).all()

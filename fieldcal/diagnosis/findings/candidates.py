@@ -14,7 +14,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.held_out import held_out
-from fieldcal.model.search.offers import Offer
+from fieldcal.model.search.offer import Offer
 from fieldcal.physics.effect import Scatter
 
 LARGEST = 40.0

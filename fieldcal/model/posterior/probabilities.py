@@ -20,7 +20,7 @@ from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT
-from fieldcal.model.search.offers import Offer
+from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.selection import OTHERWISE, Search
 
 

@@ -14,12 +14,20 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE, Cause
-from fieldcal.model.causes.dictionary import AlikeGroups, Dictionary
+from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.smooth import WAVES
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
 from fieldcal.model.evidence.sets import Set, Sets, chances
-from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member, Sizes
+from fieldcal.model.evidence.sizing import DENSITY, EVEN, Sizes
+from fieldcal.model.search.offer import (
+    Best,
+    Less,
+    Offer,
+    OfferTable,
+    likelier,
+    offered,
+)
 
 LEVELS = (3, 6, 9, 40)
 """Steps in size by which instability may fall when something is explained."""
@@ -34,14 +42,8 @@ RAISED = (EVEN + 1, EVEN + 5)
 """Sizes to which that of turns' closures may rise where accelerometers were unsteady:
 what bends both is less then, and what turns are off by for themselves stays."""
 
-Less = tuple[int, ...]
-"""Indices of instabilities in `priors.SIZES`, (7,)."""
-
 Level = tuple[Less, Eliminated, float]
 """An instability, a set eliminated beside it, and the set's score then."""
-
-Best = dict[Cause, tuple[float, int, int]]
-"""Of each cause what it would add, ln, the number of its variant, the index of size."""
 
 Asked = tuple[tuple[tuple[str, int], ...], Sizes | None]
 """A set by its key, and the sizes of what is always there beside which it is asked what
@@ -59,43 +61,6 @@ LEAST = 0.5
 NEAR = 12.0
 """How far an offer may be behind to be followed, ln: what is further no pair makes up
 for."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Offer:
-    """A member that a set may be given.
-
-    Attributes
-    ----------
-    member : cause and variant
-    score : of the set with it, predicted
-    size : index of its likeliest size
-    less : instability beside it
-
-    """
-
-    member: Member
-    score: float
-    size: int
-    less: Less
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OfferTable:
-    """What may be added to a set beside one instability.
-
-    Attributes
-    ----------
-    less : its instability
-    state, score : of the set
-    offers : the best first
-
-    """
-
-    less: Less
-    state: Eliminated
-    score: float
-    offers: list[Offer]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +129,7 @@ class Offers(Sets):
             levels = list(self._levels(there, beside))
             found = self._found(levels, *self._chances(there))
             self._tables[asked] = [
-                OfferTable(less, state, score, _offered(there, score, less, best))
+                OfferTable(less, state, score, offered(there, score, less, best))
                 for (less, state, score), best in zip(levels, found, strict=True)
             ]
         return self._tables[asked]
@@ -180,7 +145,7 @@ class Offers(Sets):
             profile = gain + DENSITY
             size = profile.argmax(axis=2)
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
-            level, number = np.nonzero(taken >= LEAST - _likelier(alike, apart))
+            level, number = np.nonzero(taken >= LEAST - likelier(alike, apart))
             evidence = np.logaddexp.reduce(profile[level, number], axis=1)
             evidence += share[at[number]]
             for i, shares in apart.items():
@@ -347,29 +312,6 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
-
-
-def _likelier(alike: AlikeGroups, apart: dict[int, Array]) -> Array:
-    """Odds of what is likelier there than not before the rows are seen, ln, (m,).
-
-    What begins in one triad where the device was off does so in the other one, whether
-    or not rows show it; 0 of everything else.
-    """
-    out = np.zeros(len(alike.cause))
-    for i, shares in apart.items():
-        some = alike.cause == i
-        out[some] = np.maximum(shares[alike.variant[some]], 0.0)
-    return out
-
-
-def _offered(there: Set, score: float, less: Less, best: Best) -> list[Offer]:
-    """What was found for a set that has not got it, the best first."""
-    offers = [
-        Offer((cause, cause.variants[v]), score + worth, size, less)
-        for cause, (worth, v, size) in best.items()
-        if cause.key not in there.keys
-    ]
-    return sorted(offers, key=lambda o: -o.score)
 
 
 def fallen(instability: Less, some: Sequence[int], down: int) -> Less:

@@ -13,7 +13,8 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import DENSITY, Member, Sizes
-from fieldcal.model.search.offers import NEAR, Offer, Offers, OfferTable
+from fieldcal.model.search.offer import Offer, OfferTable
+from fieldcal.model.search.offers import NEAR, Offers
 from fieldcal.model.search.pairs import Pair, pairs
 
 SETTLED = 0.02

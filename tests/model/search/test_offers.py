@@ -13,7 +13,7 @@ from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set, chances
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
-from fieldcal.model.search.offers import Offer
+from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.selection import SLACK, Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",

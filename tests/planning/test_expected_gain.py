@@ -238,4 +238,5 @@ def test_a_search_that_begins_with_what_was_found_before_finds_the_same(
     most = 1.25 * len(whole.inferred.search.visited)
     assert len(quick.inferred.search.visited) < most
     worth, full = (gain_of(one).of(LADDER) for one in (quick, whole))
-    np.testing.assert_allclose(worth.gain, full.gain, rtol=0.05, atol=0.02)
+    # a set as likely as 0.02 may be looked at by one of them alone
+    np.testing.assert_allclose(worth.gain, full.gain, rtol=0.05, atol=0.06)

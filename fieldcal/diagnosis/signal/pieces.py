@@ -20,6 +20,9 @@ Complex = NDArray[np.complexfloating]
 AT_ONCE = 1 << 16
 """Samples that a line is taken out of at once."""
 
+ROUNDED = 1e-12
+"""Part of a value that taking out a mean and a slope leaves of it by rounding."""
+
 SHORTEST = 64
 """Samples of a window from which it is looked at."""
 
@@ -112,7 +115,7 @@ def _flat(t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array) -> Ar
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))
     long = np.diff(np.append(first, len(t)))
     s -= np.repeat(np.add.reduceat(s, first) / long, long)
-    out = np.empty((len(t), 6))
+    out = np.zeros((len(t), 6))
     for c in range(6):
         known = usable[:, c]
         column = np.where(known, values[:, c], 0.0)
@@ -122,7 +125,9 @@ def _flat(t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array) -> Ar
         slope = (s @ column) / max(float((s * s) @ known), 1e-12)
         column -= slope * s
         column *= known
-        out[:, c] = column
+        rounding = ROUNDED * np.abs(values[known, c]).max(initial=0.0)
+        if np.abs(column).max(initial=0.0) > rounding:  # else it never changes
+            out[:, c] = column
     return out
 
 

@@ -107,7 +107,7 @@ def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
-    return out[0], out[1], 1 / (1 + np.exp(evidence[0] - evidence[1]))
+    return out[0], out[1], np.exp(-np.logaddexp(0.0, evidence[0] - evidence[1]))
 
 
 class Hypotheses(NamedTuple):

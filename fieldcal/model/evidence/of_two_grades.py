@@ -71,4 +71,4 @@ def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
     """Probability that columns are as large as in a set, and not a part of that."""
     gain = gained(*told_of(state, at, 1.0), np.array([part, 1.0]))  # (1)
     ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
-    return float(1 / (1 + np.exp(-ahead)))
+    return float(np.exp(-np.logaddexp(0.0, -ahead)))

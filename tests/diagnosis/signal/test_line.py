@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
+from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.line import Remains, remains, tuned
 from fieldcal.diagnosis.signal.moments import moments_of
 from fieldcal.diagnosis.signal.periodogram import LONGEST
-from fieldcal.diagnosis.signal.pieces import Pieces
+from fieldcal.diagnosis.signal.pieces import Pieces, pieces_of
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
+from fieldcal.model.rows.reduce import RowSource, reduce
+from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
+from fieldcal.session.description import parse
 
 RATE, SIGMA, HZ, SIZE = 100.0, 5e-3, 7.03, 6e-4
 SEEDS = range(12)
@@ -121,3 +125,20 @@ def test_a_slow_line_keeps_what_the_slopes_of_windows_took() -> None:
     mean, rms = np.mean(off, axis=0), np.sqrt(np.mean(np.square(off), axis=0))
     assert (np.abs(mean) < 0.7).all(), "3 of the means' errors"
     assert (rms > 0.5).all() and (rms < 1.5).all()
+
+
+def test_what_never_changes_has_no_line_of_rounding() -> None:
+    """A mean that is taken out of a constant leaves 1e-17, a wave of its own."""
+    t = np.arange(0.0, 60.0, 0.01)
+    acc = np.where((t < 30.0)[:, None], [0.20593965, -10.03220295, 0.1176798],
+                   [9.7323951, 0.31415927, -0.2212121])  # fmt: skip
+    about = parse({"format": 1, "position": [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 1.0, "end_s": 28.7},
+        {"alpha_deg": 90.0, "beta_deg": 0.0, "start_s": 31.0, "end_s": 58.3},
+    ]})  # fmt: skip
+    block = Block.of(t, acc, np.full_like(acc, 0.004))
+    usable = np.ones((len(t), 6), dtype=bool)
+    source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
+    pieces = pieces_of(source, reduce(source))
+    assert len(pieces.samples) == 2
+    assert not any(samples.any() for samples in pieces.samples)

@@ -45,7 +45,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.chances import chi2_tail, of_odds
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
@@ -112,7 +112,7 @@ def _so_near_zero(
         ways.append(_earth_alone(means, own))
     stays = float(np.logaddexp.reduce(ways) - np.log(len(ways)))
     odds = zero - stays + np.log(TRACKING)  # (5)
-    chance = float(1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0))))
+    chance = float(of_odds(odds))
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
 
 

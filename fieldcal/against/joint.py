@@ -36,6 +36,7 @@ from typing import Literal
 
 import numpy as np
 
+from fieldcal.core.chances import of_odds
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence.gram import gains
 from fieldcal.model.evidence.sizing import DENSITY
@@ -160,7 +161,7 @@ def differs(difference: Array, covariance: Array, typical: Array) -> float:
         inner, typical * (information @ difference), float(np.diag(inner).max())
     )
     odds = np.log(DIFFERS) - np.log1p(-DIFFERS) + _over_sizes(told.gain)
-    return float(1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0))))
+    return float(of_odds(odds))
 
 
 def likeliest(found: Mapping[Relation, float]) -> Relation:

@@ -1,4 +1,4 @@
-"""Chances of a sum of squares, for whole degrees of freedom, and of a median.
+"""Chances of a sum of squares, for whole degrees of freedom, of odds, and of a median.
 
     Q(chi2, 2 m) = e^-x sum_{i=0}^{m-1} x^i / i!                                    (1)
     Q(chi2, 2 m + 1) = erfc(sqrt x) + e^-x sum_{i=1}^{m} x^(i-1/2) / Gamma(i + 1/2)  (2)
@@ -13,6 +13,9 @@ from __future__ import annotations
 from math import erfc, isinf, lgamma, log, sqrt
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from fieldcal.core.samples import Array
 
 DEVIATION = 1.4826
 """Standard deviation in a median of absolute deviations, of what is normal."""
@@ -33,3 +36,13 @@ def chi2_tail(chi2: float, dof: int) -> float:
     power = np.arange(m) + 0.5 * odd
     gamma = lgamma(power[0] + 1) + np.cumsum([0.0, *np.log(power[1:])])
     return start + float(np.exp(power * log(x) - x - gamma).sum())
+
+
+def of_odds(log_odds: ArrayLike) -> Array:
+    """Probability of each of some odds, ln, however large they are.
+
+    >>> of_odds([-1e4, 0.0, 1e4]).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    out: Array = np.exp(-np.logaddexp(0.0, -np.asarray(log_odds, dtype=float)))
+    return out

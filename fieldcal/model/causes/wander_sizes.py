@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldcal.core.chances import of_odds
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
@@ -107,7 +108,7 @@ def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
-    return out[0], out[1], np.exp(-np.logaddexp(0.0, evidence[0] - evidence[1]))
+    return out[0], out[1], of_odds(evidence[1] - evidence[0])
 
 
 class Hypotheses(NamedTuple):

@@ -16,6 +16,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from fieldcal.core.chances import of_odds
 from fieldcal.core.factory import WARMING, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Index
 from fieldcal.model import priors
@@ -71,4 +72,4 @@ def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
     """Probability that columns are as large as in a set, and not a part of that."""
     gain = gained(*told_of(state, at, 1.0), np.array([part, 1.0]))  # (1)
     ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
-    return float(np.exp(-np.logaddexp(0.0, -ahead)))
+    return float(of_odds(ahead))

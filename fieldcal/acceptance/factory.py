@@ -7,7 +7,7 @@ decides has to know what is relied on.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from fieldcal.acceptance.angles import would_explain
 from fieldcal.acceptance.check import Check
@@ -16,6 +16,7 @@ from fieldcal.calibration.limits import GradeLimits, read
 from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import G0
+from fieldcal.core.sentences import join
 from fieldcal.session.description import Description
 
 DEG_H = math.radians(1) / 3600
@@ -89,20 +90,24 @@ def _checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
-    yield from _per_k(left, measured, of_grade)
+    yield from _per_k(left, measured, whose)
 
 
-def _per_k(left: FactoryErrors, measured: set[str], of_grade: str) -> Iterator[Check]:
+def _per_k(
+    left: FactoryErrors, measured: set[str], whose: Callable[[str], str]
+) -> Iterator[Check]:
     """How much biases were taken to change by, while the device warms up."""
     sizes = {
         "acc": (left.acc_per_k, f"{1e3 * left.acc_per_k / G0:.2g} mg"),
         "gyr": (left.gyr_per_k, f"{float(f'{left.gyr_per_k / DEG_H:.2g}'):g} deg/h"),
     }
-    told = [text for s, (size, text) in sizes.items() if size and s in measured]
+    told = {s: text for s, (size, text) in sizes.items() if size and s in measured}
     if told:
+        by = join(list(dict.fromkeys(whose(f"{s}_per_k") for s in told)))
+        both = join(list(told.values()))
         says = (
-            f"this relies on biases that change by 0 ± {' and '.join(told)} per K while"
-            f" the device warms up, {of_grade}; each ± includes it"
+            f"this relies on biases that change by 0 ± {both} per K while the device"
+            f" warms up, {by}; each ± includes it"
         )
         yield Check("warm-up", None, says)
 

@@ -14,6 +14,7 @@ from fieldcal.acceptance.factory import relies_on_factory
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.grade import Grade
 from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
 from fieldcal.core.samples import Array
 from fieldcal.session import description
@@ -253,3 +254,24 @@ def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
             pulls += plain_pulls(result)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
     assert np.sqrt(np.mean(np.square(plain))) > 3
+
+
+@pytest.mark.parametrize(
+    ("grade", "says"),
+    [("consumer", "as usual for consumer grade"), ("tactical", "the recording shows")],
+)
+def test_a_device_beyond_its_grade_has_of_each_kind_what_the_recording_shows(
+    grade: Grade, says: str
+) -> None:
+    left = limits.read(grade).factory
+    seen = found(1e-3)
+    shows = {"grade": "consumer", "because": "acc_bias.x is far off",
+             "beyond": ["acc_bias.x"]}  # fmt: skip
+    info = {
+        **seen.info, "grade_shown": shows, "acc_hysteresis_sigma": left.hysteresis,
+        "quadratic_sigma": left.quadratic, "acc_bias_per_k_sigma": left.acc_per_k,
+    }  # fmt: skip
+    told = relies_on_factory(replace(seen, info=info), ABOUT, TACTICAL)
+    by_name = {check.name: check.says for check in told}
+    for name in ("linearity", "hysteresis", "warm-up"):
+        assert says in by_name[name]

@@ -20,6 +20,7 @@ from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.jump import jumps_too_far
 from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
 from fieldcal.acceptance.temperature import since_last
+from fieldcal.acceptance.tracked import BiasSpread
 from fieldcal.acceptance.verification import Verification, planned, verify
 from fieldcal.acceptance.warmed import WarmedFamily, warmed
 from fieldcal.calibration import Calibration
@@ -29,6 +30,7 @@ from fieldcal.core.sentences import join
 from fieldcal.evaluation.observations import Rests
 from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
+from fieldcal.session.installed import tells_an_offset
 from fieldcal.windows import Average, average
 from fieldcal.windows.dead_axis import broken
 
@@ -138,7 +140,8 @@ def _taken_out(
     """Whether biases were subtracted, where they are as large as those found."""
     held = still.at_rest(session).averages
     seen = np.nan_to_num(found.vector("acc_bias")[0])
-    repeat = np.hypot(limits.acc_bias_repeat, seen), limits.gyr_bias_repeat
+    gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
+    repeat = np.hypot(limits.acc_bias_repeat, seen), gyroscopes
     return biases_taken_out(held, session.block, repeat, limits.fit_chance)
 
 

@@ -27,6 +27,7 @@ import numpy as np
 
 from fieldcal.acceptance.tracked import (
     DOUBT,
+    BiasSpread,
     chance_near_zero,
     chi2_about_zero,
     tracked,
@@ -39,7 +40,7 @@ from fieldcal.windows import Average
 def biases_taken_out(
     windows: Sequence[Average],
     block: Block,
-    repeat: tuple[float | Array, float],
+    repeat: tuple[float | Array, BiasSpread],
     least: float,
 ) -> list[str]:
     """Sentences about biases that the recording no longer contains.
@@ -48,9 +49,8 @@ def biases_taken_out(
     ----------
     windows : at rest
     block : the whole recording
-    repeat : spread of an accelerometer's and of a gyroscope's bias, 1 sigma, m/s^2 and
-        rad/s: from run to run, and of accelerometers as large as it is found; (3,) or
-        one for all
+    repeat : spread of an accelerometer's bias from run to run, and as large as it is
+        found, 1 sigma, m/s^2, (3,) or one for all; and of a gyroscope's
     least : probability below which chance is excluded
 
     """

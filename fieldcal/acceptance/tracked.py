@@ -33,6 +33,8 @@ an unknown direction, and (5) with m = |c| in place of the second
 
     p(c) = N(c; 0, sigma_c^2) exp(-w^2 / 2 sigma_c^2) sinh(x) / x,  x = m w / sigma_c^2
                                                                                    (6)
+An autopilot that tells the offset it subtracts has, as likely as not, averaged it when
+it started, over any T: a bias of s_b^2 = noise^2 / (T rate) is left while it runs.
 Of gyroscopes with a bias one in x has a B above x at most, and of all devices TRACKING
 remove it. Device axes, rad/s. Source: Markov's inequality for a likelihood ratio.
 """
@@ -74,8 +76,23 @@ SPECTRUM = 16
 """Fewest samples for a periodogram."""
 
 
+@dataclass(frozen=True, slots=True)
+class BiasSpread:
+    """What the biases of gyroscopes that keep them may be.
+
+    Attributes
+    ----------
+    repeat : spread from run to run, 1 sigma, rad/s
+    averaged : whether the device tells of an offset that it subtracts all the time
+
+    """
+
+    repeat: float
+    averaged: bool = False
+
+
 def tracked(
-    windows: Sequence[Average], block: Block, repeat: float, least: float
+    windows: Sequence[Average], block: Block, keeps: BiasSpread, least: float
 ) -> tuple[float, str]:
     """Probability of a device that subtracts its bias at rest, (5), and chi2 in words.
 
@@ -85,17 +102,21 @@ def tracked(
     cells = [_Cells.of(one) for one in held if len(one) >= SPECTRUM]
     if not cells:
         return 0.0, ""
+    second = np.median([one.noise_of_a_second for one in cells], axis=0)
+    left = [second / np.sqrt(s) for s in LAGS] if keeps.averaged else []
+    biases = [np.full(3, keeps.repeat), *left]
+    stays = _Stays(keeps.repeat, biases)
     settled, own = _settled_means(cells)
-    found = [_so_near_zero(settled, own, [own], repeat, least)]
+    found = [_so_near_zero(settled, own, [own], stays, least)]
     found += [
-        _so_near_zero(means, own, every, repeat, least)
+        _so_near_zero(means, own, every, stays, least)
         for means, own, every in _zeroed_means(cells)
     ]
     return max(found)
 
 
 def _so_near_zero(
-    means: Array, own: Array, every: Sequence[Array], repeat: float, least: float
+    means: Array, own: Array, every: Sequence[Array], keeps: _Stays, least: float
 ) -> tuple[float, str]:
     """Probability (5) of means about zero, with an error that is one of `every`."""
     seen = np.isfinite(means) & (own > 0)
@@ -105,12 +126,8 @@ def _so_near_zero(
     chi2, larger = chi2_about_zero(means[seen], sigma[seen])
     if larger < least:
         return 0.0, ""
-    likely = [-0.5 * _unlikely(means[seen], one[seen]) for one in every]
-    zero = float(np.logaddexp.reduce(likely) - np.log(len(likely)))
-    ways = [_beside_bias(means, own, seen, repeat, leaning) for leaning in LEANING]
-    if seen.all():
-        ways.append(_earth_alone(means, own))
-    stays = float(np.logaddexp.reduce(ways) - np.log(len(ways)))
+    zero = _mean([-0.5 * _unlikely(means[seen], one[seen]) for one in every])
+    stays = keeps.likelihood(means, own, seen)
     odds = zero - stays + np.log(TRACKING)  # (5)
     chance = float(of_odds(odds))
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
@@ -119,21 +136,6 @@ def _so_near_zero(
 def _unlikely(means: Array, sigma: Array) -> float:
     """Minus twice the log likelihood of means about zero, but for a constant."""
     return float(np.sum((means / sigma) ** 2 + 2 * np.log(sigma)))
-
-
-def _beside_bias(
-    means: Array, own: Array, seen: NDArray[np.bool_], repeat: float, leaning: float
-) -> float:
-    """Log likelihood of means about biases that stay, but for a constant."""
-    felt = (leaning * repeat) ** 2 + (EARTH_RATE**2 / 3 if leaning else 0.0)
-    info = np.where(seen, 1 / np.where(seen, own**2 + felt, 1.0), 0.0)
-    value = np.where(seen, means, 0.0)
-    total, pull = info.sum(axis=0), (info * value).sum(axis=0)
-    square = (info * value**2).sum(axis=0) - repeat**2 * pull**2 / (
-        1 + repeat**2 * total
-    )
-    wide = np.log1p(repeat**2 * total).sum() - np.log(info[seen]).sum()
-    return -0.5 * float(square.sum() + wide)
 
 
 def _earth_alone(means: Array, own: Array) -> float:
@@ -170,7 +172,7 @@ def _zeroed_means(
     if not len(times):
         return
     means, own = _fitted(cells, times, lambda t, end: 1.0 * (t < end))
-    of_second = np.array([one.noise * np.sqrt(one.t[1] - one.t[0]) for one in cells])
+    of_second = np.array([one.noise_of_a_second for one in cells])
     yield means, own, [np.hypot(own, of_second / np.sqrt(s)) for s in LAGS]
 
 
@@ -182,6 +184,56 @@ def _fitted(
     left = [np.nansum([chi2 for _, _, chi2 in found]) for found in every]
     best = every[int(np.argmin(left))]
     return np.array([c for c, _, _ in best]), np.array([s for _, s, _ in best])
+
+
+@dataclass(frozen=True, slots=True)
+class _Stays:
+    """Gyroscopes that keep a bias, the second of (5).
+
+    Attributes
+    ----------
+    repeat : spread of biases from run to run, 1 sigma, rad/s
+    biases : (3,) each, of what may be left in this run: the first as likely as all
+        others together
+
+    """
+
+    repeat: float
+    biases: Sequence[Array]
+
+    def likelihood(self, means: Array, own: Array, seen: NDArray[np.bool_]) -> float:
+        """Log likelihood of means (w, 3), but for a constant."""
+        first, *others = (self._of(b, means, own, seen) for b in self.biases)
+        if not others:
+            return first
+        return float(np.logaddexp(first, _mean(others)) - np.log(2.0))
+
+    def _of(
+        self, bias: Array, means: Array, own: Array, seen: NDArray[np.bool_]
+    ) -> float:
+        ways = [self._leaning(bias, means, own, seen, part) for part in LEANING]
+        return _mean([*ways, *([_earth_alone(means, own)] if seen.all() else [])])
+
+    def _leaning(
+        self,
+        bias: Array,
+        means: Array,
+        own: Array,
+        seen: NDArray[np.bool_],
+        leaning: float,
+    ) -> float:
+        felt = (leaning * self.repeat) ** 2 + (EARTH_RATE**2 / 3 if leaning else 0.0)
+        info = np.where(seen, 1 / np.where(seen, own**2 + felt, 1.0), 0.0)
+        value, var = np.where(seen, means, 0.0), bias**2
+        total, pull = info.sum(axis=0), (info * value).sum(axis=0)
+        square = (info * value**2).sum(axis=0) - var * pull**2 / (1 + var * total)
+        wide = np.log1p(var * total).sum() - np.log(info[seen]).sum()
+        return -0.5 * float(square.sum() + wide)
+
+
+def _mean(logs: Sequence[float]) -> float:
+    """Log of the mean of exponentials."""
+    return float(np.logaddexp.reduce(logs) - np.log(len(logs)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,6 +265,12 @@ class _Cells:
         level = _white_noise(one.gyr) / np.sqrt(each)
         means = gyr.reshape(count, each, 3).mean(axis=1)
         return cls(t.reshape(count, each).mean(axis=1), means, level)
+
+    @property
+    def noise_of_a_second(self) -> Array:
+        """What white noise leaves in the mean of a second, rad/s, (3,)."""
+        second: Array = self.noise * np.sqrt(self.t[1] - self.t[0])
+        return second
 
     def beside(self, shape: Array) -> tuple[Array, Array, Array]:
         """Get c beside a shape, its error, and chi2 of the rest (0 without noise)."""

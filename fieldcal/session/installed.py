@@ -106,6 +106,14 @@ def in_one_calibration(
     return whole, said
 
 
+def tells_an_offset(marks: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether the device said that it subtracts an offset from its gyroscopes."""
+    last = ([None, *stretches(marks)])[-1]
+    if last is None or last.taken_out or last.used is None:
+        return False
+    return bool(np.any(last.used["gyr_offset"]))
+
+
 def as_sent(
     nominal: Mapping[str, Array], marks: Iterable[Mapping[str, Any]]
 ) -> dict[str, Array]:

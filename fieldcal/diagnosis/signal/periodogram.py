@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -109,36 +110,46 @@ def highest(
 ) -> Peak | None:
     """The most significant peak, None if there is none.
 
-    Peaks close to one that was taken already are ignored.
+    One that has one phase throughout, if there is any: what trembles is louder, and is
+    no line. Peaks close to one that was taken already are ignored.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
-    low = max(0.05, CYCLES / shortest)
-    best, peak = np.log(thresholds.LINE_BY_CHANCE), None
-    for spectrum in spectra:
-        band, count = spectrum.hz >= low, spectrum.count
-        hz = spectrum.hz[band]
-        free = np.ones(len(hz), dtype=bool)
-        for other in taken:
-            reach = NEAR / shortest
-            free &= (hz < other.low - reach) | (hz > other.high + reach)
-        if free.sum() < 4 * BESIDE:
-            continue
-        stands = {}
-        for c in sorted({c for some in spectrum.together for c in some}):
-            power = spectrum.power[c, band]
-            stands[c] = power / _level(power, count) * count
-        for some in spectrum.together:
-            total = np.sum([stands[c] for c in some], axis=0)
-            at = int(np.argmax(np.where(free, total, 0.0)))
-            odds = _beyond(float(total[at]), count * len(some))
-            odds += np.log(LOOKS * len(total))
-            if odds < best:
-                best, peak = odds, _peak_at(hz, total / (count * len(some)), at)
-    if peak is None:
+    low, channels = max(0.05, CYCLES / shortest), spectra[0]
+    kept = [s for s in spectra if s.count == 1]
+    for some in (kept, [s for s in spectra if s.count > 1]):
+        found = [_highest(s, low, NEAR / shortest, taken) for s in some]
+        odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
+        if peak is not None and odds < np.log(thresholds.LINE_BY_CHANCE):
+            # a line in short windows reaches its neighbours
+            near = noise_near(channels, peak.hz, pieces.noise)
+            return replace(peak, noise=np.minimum(near, pieces.noise))
+    return None
+
+
+def _highest(
+    spectrum: Spectrum, low: float, reach: float, taken: Sequence[Peak]
+) -> tuple[float, Peak] | None:
+    """The highest peak of a spectrum, with the ln probability of one by chance."""
+    band, count = spectrum.hz >= low, spectrum.count
+    hz = spectrum.hz[band]
+    free = np.ones(len(hz), dtype=bool)
+    for other in taken:
+        free &= (hz < other.low - reach) | (hz > other.high + reach)
+    if free.sum() < 4 * BESIDE:
         return None
-    # a line in short windows reaches its neighbours
-    near = noise_near(spectra[0], peak.hz, pieces.noise)
-    return replace(peak, noise=np.minimum(near, pieces.noise))
+    stands = {}
+    for c in sorted({c for some in spectrum.together for c in some}):
+        power = spectrum.power[c, band]
+        stands[c] = power / _level(power, count) * count
+    best: tuple[float, Peak] | None = None
+    for some in spectrum.together:
+        total = np.sum([stands[c] for c in some], axis=0)
+        at = int(np.argmax(np.where(free, total, 0.0)))
+        odds = _beyond(float(total[at]), count * len(some))
+        odds += np.log(LOOKS * len(total))
+        if best is None or odds < best[0]:
+            best = odds, _peak_at(hz, total / (count * len(some)), at)
+    return best
 
 
 def _level(power: Array, count: int) -> Array:

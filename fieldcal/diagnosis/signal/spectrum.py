@@ -18,6 +18,7 @@ from fieldcal.diagnosis.signal.line import Remains, Tone, remains, tuned
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
 from fieldcal.diagnosis.signal.periodogram import Peak, highest, noise_near, spectra_of
 from fieldcal.diagnosis.signal.pieces import (
+    Complex,
     Pieces,
     held_in,
     line_of,
@@ -84,8 +85,27 @@ def without(
 
 
 def _explained(pieces: Pieces, near: float) -> Tone | None:
-    """The line near a frequency under the explanation that needs least."""
+    """The line near a frequency under the explanation that needs least.
+
+    Where some outputs tremble there, others may have a line: then each output is as
+    noisy as its windows differ by.
+    """
     moments = moments_of(pieces, near)
+    best = _best(pieces, near, moments)
+    if (
+        best is not None
+        and _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE
+    ):
+        scatter = _between_windows(pieces, best, moments)
+        pieces = replace(pieces, noise=np.maximum(pieces.noise, scatter))
+        best = _best(pieces, near, moments)
+        if best and _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE:
+            return None
+    return best if best and _in_both_halves(pieces, best) else None
+
+
+def _best(pieces: Pieces, near: float, moments: Moments) -> Tone | None:
+    """The effect that explains most near a frequency, if it is not by chance."""
     tried = []
     for effect in catalogue().values():
         if not isinstance(effect, Line) or not effect.band[0] <= near <= effect.band[1]:
@@ -99,9 +119,24 @@ def _explained(pieces: Pieces, near: float) -> Tone | None:
     places = np.log(sum(map(len, pieces.samples)))
     if best.gain <= places - np.log(thresholds.LINE_BY_CHANCE) or not best.channels:
         return None
-    if _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE:
-        return None
-    return best if _in_both_halves(pieces, best) else None
+    return best
+
+
+def _off_the_line(
+    pieces: Pieces, tone: Tone, moments: Moments
+) -> tuple[Complex, Complex]:
+    """Amplitudes of the windows, and how far they are from those of one steady line."""
+    seen = moments.seen(np.array([tone.hz - moments.near]))[0]
+    modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
+    return seen, seen - modelled
+
+
+def _between_windows(pieces: Pieces, tone: Tone, moments: Moments) -> Array:
+    """Noise of a sample that makes windows differ as they do beside a line, (6,)."""
+    _, off = _off_the_line(pieces, tone, moments)
+    square = moments.counts @ np.abs(off) ** 2 / 4  # the variance beside (1) of moments
+    scatter: Array = np.sqrt(square / max(len(off) - 1, 1))
+    return scatter
 
 
 def _noise_beside(pieces: Pieces, tone: Tone) -> Array:
@@ -144,11 +179,10 @@ def _coherent_part(pieces: Pieces, tone: Tone, moments: Moments) -> float:
     that is pushed has as much energy there, but another phase each time.
     """
     clear = tone.clear
-    seen = moments.seen(np.array([tone.hz - moments.near]))[0]
+    seen, off = _off_the_line(pieces, tone, moments)
     half = moments.counts[:, None] / 2
-    modelled = tone.effect.response(pieces.x, tone.hz) @ tone.causes
     energy = (half * np.abs(seen[:, clear]) ** 2).sum(axis=0)
-    left = (half * np.abs((seen - modelled)[:, clear]) ** 2).sum(axis=0)
+    left = (half * np.abs(off[:, clear]) ** 2).sum(axis=0)
     weight = 1 / pieces.noise[clear] ** 2
     noise = 2.0 * len(half) * len(clear)
     return float(1 - (weight @ left - noise) / max(weight @ energy - noise, 1e-9))

@@ -5,55 +5,34 @@ single samples, or in the mean of a tenth or half a second. Usual is the noise, 
 the window shows at that length throughout, so that a base that rocks, a machine that
 shakes or a hand that trembles makes no bumps. It is left out. Source: model of this
 project.
-
->>> import numpy as np
->>> quiet = np.random.default_rng(1).standard_normal((1000, 1))
->>> quiet[400:420] += 7.0
->>> [(int(a), int(b)) for a, b in disturbed(quiet, 10)]
-[(400, 420)]
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fieldcal.core.chances import DEVIATION
-from fieldcal.core.samples import CHANNELS, Array, runs
+from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
+from fieldcal.physics.pushes import (
+    LARGEST,
+    SHAKEN,
+    Usual,
+    disturbed,
+    running_means,
+    usual,
+)
 from fieldcal.physics.recording import CheckedSamples, Fault, medians
 from fieldcal.physics.shape import Shape
-
-LARGEST = 6.5
-"""A single sample, in standard deviations."""
-
-LARGE = 4.0
-"""A sample that belongs to a stretch found by its mean."""
-
-MEAN = 6.0
-"""The mean of a short stretch, in standard deviations."""
 
 NEXT = 4.02
 """Two steps of an output, in half steps: to the next one, off a course between two."""
 
-SHAKEN, TAILS = 1.5, 1.6
-"""Spread beyond the noise that a machine or a hand makes, and how far its tails go at
-least: what a nonlinear sensor makes of it goes further to one side."""
-
-OUTER = (0.9, 0.95)
-"""Shares of the values that tell how a tail goes on, beyond what a bump takes up."""
-
-SELDOM = 1e-4
-"""Windows in which what shakes them throughout goes further than is told from them."""
-
-MANY = 50_000
-"""Values that tell the usual spread to half a percent."""
-
 LONGEST_S = 5.0
 """A disturbance that lasts longer is a change of the device, not a bump."""
 
-AROUND_S = 3.0
-"""Before and after a disturbance, where a jump of the level shows."""
+AROUND_S, BESIDE_S = 6.0, 1.5
+"""Before and after a disturbance, where a jump of the level shows, and how much of that
+is on either side of it: a jump bends the course of two of its parts."""
 
 FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
 """Time constants of what fades after a turn; slower ones are no disturbance anyway."""
@@ -61,110 +40,13 @@ FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
 FEWEST = 20
 """Samples of a window that tell what is usual in it."""
 
+LOUDEST_S = 1.0
+"""Of a window that may have been pushed, as long as pushes of a hand or a gust are."""
+
+NOTHING = slice(0, 0)
+
 SHORTEST = 3
 """Samples; a single wild one is left out and not called a bump."""
-
-
-def disturbed(z: Array, m: int) -> NDArray[np.intp]:
-    """Stretches far beyond unit noise, (k, 2) first and one past the last sample.
-
-    `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
-    shortest stretch looked at as a whole.
-    """
-    scale = usual(z)
-    scale *= np.where(scale > SHAKEN, np.maximum(_tails(z, scale), TAILS), 1.0)
-    # channel by channel: an hour of samples need not be in memory once more
-    size = np.zeros(len(z))
-    for column, one in zip(z.T, scale, strict=True):
-        np.maximum(size, np.abs(column) / one, out=size)
-    loud = size > LARGEST
-    alone = _alone(size)
-    for width in (m, 4 * m):
-        if width < 2 or width >= len(z):
-            continue
-        peak = np.zeros(len(z) - width + 1)
-        for column, one in zip(z.T, scale, strict=True):
-            # a byte decoded wrongly is no push: without it, what of the mean is left
-            level = np.where(alone, 0.0, column / one)
-            np.maximum(peak, _means(level, width), out=peak)
-        for first, last in runs(peak > MEAN):
-            at = first + int(np.argmax(peak[first:last]))
-            loud[at : at + width] = True
-    found = _joined(runs(loud), 2 * m)
-    return np.array([_trimmed(size, a, b) for a, b in found])
-
-
-def _alone(size: Array) -> NDArray[np.bool_]:
-    """Single samples beyond noise between usual ones, by their deviations (n,).
-
-    >>> _alone(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
-    (array([1]),)
-    """
-    calm = np.concatenate([[True], size <= LARGE, [True]])
-    alone: NDArray[np.bool_] = (size > LARGEST) & calm[:-2] & calm[2:]
-    return alone
-
-
-def _means(column: Array, width: int) -> Array:
-    """Means over stretches of that width, in those that are usual, (n - width + 1,)."""
-    total = np.concatenate([[0.0], np.cumsum(column)])
-    mean: Array = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
-    mean /= usual(mean[:, None])
-    return mean
-
-
-def usual(z: Array) -> Array:
-    """Spread of each column by its middle half, at least that of the noise, (c,).
-
-    >>> usual(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
-    array([4.45])
-    """
-    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
-    spread: Array = DEVIATION * np.median(some, axis=1)
-    return np.maximum(spread, 1.0)
-
-
-def _tails(z: Array, spread: Array) -> Array:
-    """How much further each column may go than a normal law of that spread, (c,).
-
-    The tail is an exponential one, as of the square that a nonlinear sensor adds to a
-    vibration; that of a normal law is shorter. It is that of the third of the window in
-    which it is shortest: a bump is not in all of them.
-
-    >>> z = np.random.default_rng(1).standard_normal((10_000, 2))
-    >>> z[:, 1] = z[:, 1] ** 2 - 1.0
-    >>> z[2000:5000, 0] += 50.0
-    >>> _tails(z, np.array([1.0, 1.1])).round(1)
-    array([1.6, 3.6])
-    """
-    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
-    parts = np.array_split(some, 3, axis=1)
-    told = [np.quantile(part, OUTER, axis=1) for part in parts]
-    inner, outer = np.stack(told, axis=1)
-    share = (1 - OUTER[0]) / (1 - OUTER[1])
-    length = (outer - inner) / np.log(share)
-    far = inner + length * np.log((1 - OUTER[0]) * len(z) / SELDOM)
-    shortest: Array = far.min(axis=0) / (LARGEST * spread)
-    return shortest
-
-
-def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
-    """Stretches with the short breaks between them closed."""
-    out: list[list[int]] = []
-    for first, last in stretches:
-        if out and first - out[-1][1] <= gap:
-            out[-1][1] = int(last)
-        else:
-            out.append([int(first), int(last)])
-    return np.array(out, dtype=np.intp).reshape(-1, 2)
-
-
-def _trimmed(size: Array, first: int, last: int) -> tuple[int, int]:
-    """A stretch from its first large sample to its last; `size` (n,) in deviations."""
-    large = np.flatnonzero(size[first:last] > LARGE)
-    if len(large) < 2:
-        return first, last
-    return first + int(large[0]), first + int(large[-1]) + 1
 
 
 class Bump(Chain):
@@ -193,7 +75,7 @@ def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     steps = 0.5 * recording.steps
     noise = np.maximum(recording.noise, steps)
     z = recording.six(first, last)
-    _flatten(z, rate)
+    _flatten(z, rate, _loudest(z / noise, rate))
     z /= noise
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
@@ -201,25 +83,45 @@ def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
         z[np.abs(z[:, c]) <= NEXT, c] = 0.0
     if recording.x.rate[p].any():
         z[:, :3] = 0.0  # the force goes round with the table
-    around = round(AROUND_S * rate)
-    for a, b in disturbed(z, max(2, round(0.1 * rate))):
+    around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
+    there = Usual.of(z, shortest)
+    for a, b in disturbed(z, shortest, there):
         if b - a > LONGEST_S * rate:
             continue
         near = recording.six(first + max(a - around, 0), min(first + b + around, last))
-        if not _steady(near / noise, usual(z), int(a), rate):
+        if not _steady(near / noise, there, int(a), rate):
             out.append(_fault(recording, first, int(a), int(b), z, rate))
     return out
 
 
-def _flatten(piece: Array, rate: float) -> None:
-    """Take its course over seconds out of a window, in place."""
+def _loudest(z: Array, rate: float) -> slice:
+    """The second, or quarter of a window, that is furthest off its course.
+
+    `z` is (n, c) in standard deviations. A push as long as that bends the course that
+    is taken out with it, and is no part of what is usual.
+    """
+    flat = np.nan_to_num(z)
+    _flatten(flat, rate)
+    width = max(min(round(LOUDEST_S * rate), len(z) // 4), 1)
+    peak = np.max([running_means(column, width) for column in flat.T], axis=0)
+    at = int(np.argmax(peak))
+    return slice(at, at + width)
+
+
+def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
+    """Take its course over seconds out of a window, in place.
+
+    The course is that of the samples but for some.
+    """
     width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
     count = max(len(piece) // width, 1)
-    level, centre = _levels(piece, count)
+    known = piece.copy()
+    known[without] = np.nan
+    level, centre = _levels(known, count)
     for c, column in enumerate(piece.T):
-        known = np.isfinite(level[:, c])
-        if known.any():
-            column -= _course(len(piece), centre[known], level[known, c])
+        some = np.isfinite(level[:, c])
+        if some.any():
+            column -= _course(len(piece), centre[some], level[some, c])
 
 
 def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
@@ -247,22 +149,26 @@ def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
     return level, (first + np.append(first[1:], len(piece)) - 1) / 2
 
 
-def _steady(near: Array, spread: Array, start: int, rate: float) -> bool:
+def _steady(near: Array, there: Usual, start: int, rate: float) -> bool:
     """Whether the level only jumps there, or fades from the window's start.
 
     `near` is (n, 6) in standard deviations, what lies around a stretch that begins
-    with a sample of the window, `spread` (6,) what is usual in that.
+    with a sample of the window, `there` what is usual in that.
     """
     near, around = np.nan_to_num(near), round(AROUND_S * rate)
-    courses = [_jump(near, around // 2)]
+    courses = [_jump(near, round(BESIDE_S * rate))]
     if start < around:
         courses += [_fading(near, tau * rate) for tau in FADES_S]
-    rest = [near - c for c in courses if c is not None]
     shortest = max(2, round(0.1 * rate))
-    return any(
-        (usual(r) < SHAKEN * spread).all() and len(disturbed(r, shortest)) == 0
-        for r in rest
-    )
+    for course in courses:
+        if course is None:
+            continue
+        rest = near - course
+        _flatten(rest, rate)
+        calm = (usual(rest) < SHAKEN * there.sample).all()
+        if calm and len(disturbed(rest, shortest, there)) == 0:
+            return True
+    return False
 
 
 def _jump(z: Array, margin: int) -> Array | None:

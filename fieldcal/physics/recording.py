@@ -122,13 +122,14 @@ def medians(values: Array) -> Array:
 
     `numpy.median` looks for nan in each row, which takes four times as long.
     """
-    if not np.isfinite(values.sum()):
-        some = [row[np.isfinite(row)] for row in values]
-        return np.array([np.median(row) if len(row) else np.nan for row in some])
     half, odd = divmod(values.shape[1], 2)
     ordered = np.partition(values, half, axis=1)
     upper: Array = ordered[:, half]
-    return upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
+    found = upper if odd else (ordered[:, :half].max(axis=1) + upper) / 2
+    for i in np.flatnonzero(~np.isfinite(values.sum(axis=1))):
+        known = values[i][np.isfinite(values[i])]
+        found[i] = np.median(known) if len(known) else np.nan
+    return found
 
 
 def lsb_of(values: Array) -> float:

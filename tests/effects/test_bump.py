@@ -86,3 +86,44 @@ def test_the_long_tail_of_a_rectified_vibration_is_no_bump() -> None:
     for seed in range(10):
         (at,) = bumps_while_shaken(seed, push=60.0)
         assert abs(at - 64.0) < 0.5
+
+
+def pushed(
+    seed: int, lasts: float, shape: str, size: float
+) -> list[tuple[float, float]]:
+    """When bumps are said to be, s, in a window of some seconds, at 100 Hz.
+
+    A push begins after three seconds of it: there and back within a second, a jump that
+    lasts, or what fades from there; `size` in standard deviations of a sample.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(round((lasts + 30) * 100)) / 100
+    acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.04, (len(t), 3))
+    since = t - 33.0
+    push = {
+        "there and back": np.sin(np.pi * since) * ((since > 0) & (since < 1)),
+        "jump": (since > 0).astype(float),
+    }
+    acc[:, 1] += 0.04 * size * push[shape]
+    block = Block.of(t, acc, rng.normal(0, 1e-3, (len(t), 3)))
+    ends = ((0.0, 29.9), (30.1, 30 + lasts))
+    held = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b} for a, b in ends
+    ]
+    site = {"gravity": G, "latitude_deg": 50.0}
+    checked = check(block, parse({"format": 1, "site": site, "position": held}))
+    return [(f.from_s, f.to_s) for name, f in checked.faults if name == "bump"]
+
+
+@pytest.mark.parametrize("lasts", [6.0, 20.0, 300.0])
+def test_a_push_of_a_second_is_found_however_long_the_window_is(lasts: float) -> None:
+    """It bends the course of a short window, and is much of what is near it."""
+    for seed in range(5):
+        ((start, end),) = pushed(seed, lasts, "there and back", 3.5)
+        assert 32.9 < start < 33.4 and 33.6 < end < 34.1
+
+
+@pytest.mark.parametrize("lasts", [10.0, 40.0])
+def test_a_jump_is_no_push(lasts: float) -> None:
+    for seed in range(5):
+        assert pushed(seed, lasts, "jump", 3.5) == []

@@ -1,0 +1,189 @@
+"""Stretches of samples far beyond what is usual in a window.
+
+In single samples, or in the mean of a tenth or half a second, where m samples are a
+tenth. Usual is the noise, or what the window does at that length throughout, but for
+where it does most. Units: standard deviations of the noise of a sample.
+Source: model of this project.
+
+>>> import numpy as np
+>>> quiet = np.random.default_rng(1).standard_normal((1000, 1))
+>>> quiet[400:420] += 7.0
+>>> [(int(a), int(b)) for a, b in disturbed(quiet, 10)]
+[(400, 420)]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.chances import DEVIATION
+from fieldcal.core.samples import Array, runs
+
+LARGEST = 6.5
+"""A single sample, in standard deviations."""
+
+LARGE = 4.0
+"""A sample that belongs to a stretch found by its mean."""
+
+MEAN = 6.0
+"""The mean of a short stretch, in standard deviations."""
+
+SHAKEN, TAILS = 1.5, 1.6
+"""Spread beyond the noise that a machine or a hand makes, and how far its tails go at
+least: what a nonlinear sensor makes of it goes further to one side."""
+
+OUTER = (0.9, 0.95)
+"""Shares of the values that tell how a tail goes on, beyond what a bump takes up."""
+
+SELDOM = 1e-4
+"""Windows in which what shakes them throughout goes further than is told from them."""
+
+MANY = 50_000
+"""Values that tell the usual spread to half a percent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """What outputs do throughout a window, in standard deviations of noise.
+
+    Attributes
+    ----------
+    sample : (c,) spread of a sample
+    tail : (c,) how much further than a normal law of that spread its tails go
+    means : (c,) spread of the mean over a stretch, by the samples in it
+
+    """
+
+    sample: Array
+    tail: Array
+    means: Mapping[int, Array]
+
+    @classmethod
+    def of(cls, z: Array, m: int) -> Usual:
+        """Of outputs (n, c) without their slow part; `m` as in `disturbed`."""
+        sample = usual(z)
+        tail = np.where(sample > SHAKEN, np.maximum(_tails(z, sample), TAILS), 1.0)
+        means = {width: np.ones(z.shape[1]) for width in _widths(len(z), m)}
+        for c, column in enumerate(z.T):
+            one = column / (sample[c] * tail[c])
+            for width, spread in means.items():
+                spread[c] = _usual_mean(running_means(one, width), width)
+        return cls(sample, tail, means)
+
+
+def disturbed(z: Array, m: int, beside: Usual | None = None) -> NDArray[np.intp]:
+    """Stretches far beyond what is usual, (k, 2) first and one past the last sample.
+
+    `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
+    shortest stretch looked at as a whole; `beside` what is usual there, if not in `z`.
+    """
+    there = beside or Usual.of(z, m)
+    scale = there.sample * there.tail
+    # channel by channel: an hour of samples need not be in memory once more
+    size = np.zeros(len(z))
+    for column, one in zip(z.T, scale, strict=True):
+        np.maximum(size, np.abs(column) / one, out=size)
+    loud = size > LARGEST
+    alone = _alone(size)
+    for width in _widths(len(z), m):
+        peak = np.zeros(len(z) - width + 1)
+        for c, column in enumerate(z.T):
+            # a byte decoded wrongly is no push: without it, what of the mean is left
+            mean = running_means(np.where(alone, 0.0, column / scale[c]), width)
+            np.maximum(peak, mean / there.means[width][c], out=peak)
+        for first, last in runs(peak > MEAN):
+            at = first + int(np.argmax(peak[first:last]))
+            loud[at : at + width] = True
+    found = _joined(runs(loud), 2 * m)
+    return np.array([_trimmed(size, a, b) for a, b in found])
+
+
+def _widths(n: int, m: int) -> list[int]:
+    """Samples of the stretches whose means are looked at, of n."""
+    return [width for width in (m, 4 * m) if 2 <= width < n]
+
+
+def _alone(size: Array) -> NDArray[np.bool_]:
+    """Single samples beyond noise between usual ones, by their deviations (n,).
+
+    >>> _alone(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
+    (array([1]),)
+    """
+    calm = np.concatenate([[True], size <= LARGE, [True]])
+    alone: NDArray[np.bool_] = (size > LARGEST) & calm[:-2] & calm[2:]
+    return alone
+
+
+def running_means(column: Array, width: int) -> Array:
+    """Means over stretches of that width, in those of noise, (n - width + 1,)."""
+    total = np.concatenate([[0.0], np.cumsum(column)])
+    mean: Array = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
+    return mean
+
+
+def _usual_mean(mean: Array, width: int) -> float:
+    """Spread of means over stretches of that width, but for the furthest."""
+    at = int(np.argmax(mean))
+    rest = np.delete(mean, slice(max(at - width + 1, 0), at + width))
+    return float(usual(rest[:, None])[0]) if len(rest) >= width else np.inf
+
+
+def usual(z: Array) -> Array:
+    """Spread of each column by its middle half, at least that of the noise, (c,).
+
+    >>> usual(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
+    array([4.45])
+    """
+    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
+    spread: Array = DEVIATION * np.median(some, axis=1)
+    return np.maximum(spread, 1.0)
+
+
+def _tails(z: Array, spread: Array) -> Array:
+    """How much further each column may go than a normal law of that spread, (c,).
+
+    The tail is an exponential one, as of the square that a nonlinear sensor adds to a
+    vibration; that of a normal law is shorter. It is that of the third of the window in
+    which it is shortest: a bump is not in all of them.
+
+    >>> z = np.random.default_rng(1).standard_normal((10_000, 2))
+    >>> z[:, 1] = z[:, 1] ** 2 - 1.0
+    >>> z[2000:5000, 0] += 50.0
+    >>> _tails(z, np.array([1.0, 1.1])).round(1)
+    array([1.6, 3.6])
+    """
+    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
+    parts = np.array_split(some, 3, axis=1)
+    told = [np.quantile(part, OUTER, axis=1) for part in parts]
+    inner, outer = np.stack(told, axis=1)
+    share = (1 - OUTER[0]) / (1 - OUTER[1])
+    length = (outer - inner) / np.log(share)
+    far = inner + length * np.log((1 - OUTER[0]) * len(z) / SELDOM)
+    shortest: Array = far.min(axis=0) / (LARGEST * spread)
+    return shortest
+
+
+def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
+    """Stretches with the short breaks between them closed."""
+    out: list[list[int]] = []
+    for first, last in stretches:
+        if out and first - out[-1][1] <= gap:
+            out[-1][1] = int(last)
+        else:
+            out.append([int(first), int(last)])
+    return np.array(out, dtype=np.intp).reshape(-1, 2)
+
+
+def _trimmed(size: Array, first: int, last: int) -> tuple[int, int]:
+    """A stretch from its first large sample to its last; `size` (n,) in deviations.
+
+    All of it where none stands out by itself: a gentle push.
+    """
+    large = np.flatnonzero(size[first:last] > LARGE)
+    if len(large) < 2 or size[first:last].max() <= LARGEST:
+        return first, last
+    return first + int(large[0]), first + int(large[-1]) + 1

@@ -127,7 +127,12 @@ class RowSource:
         return shaking(block, windows[held], self.rate)
 
 
-def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -> Rows:
+def reduce(
+    source: RowSource,
+    whole: bool = False,
+    level: Array | None = None,
+    apart: bool = False,
+) -> Rows:
     """Cut the windows into blocks and average them.
 
     Parameters
@@ -135,6 +140,8 @@ def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -
     source : what is cut
     whole : whether each window is one row, as a hand held the device
     level : (6,) standard deviation of one sample; if not given, what windows show
+    apart : whether each window also has a row of its own for the gyroscopes, its last,
+        and the blocks are those of the accelerometers
 
     """
     block, rate = masked(source.block, source.usable), source.rate
@@ -148,12 +155,12 @@ def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -
         noise, levels = level, np.tile(level, (len(held), 1))
     source = replace(source, block=shaken.block)
     without = source.about.without
-    bounds = [
-        np.array([(a, b)], dtype=np.intp)
-        if whole
-        else block_bounds(block.t, (a, b), rate, len(held), without)
-        for a, b in windows[held].tolist()
-    ]
+    bounds = []
+    for a, b in windows[held].tolist():
+        each = np.zeros((0, 2), dtype=np.intp)
+        if not whole:
+            each = block_bounds(block.t, (a, b), rate, len(held), without)
+        bounds.append(np.vstack([each, [(a, b)]]) if whole or apart else each)
     rows = [len(b) for b in bounds]
     out = averaged(
         source,
@@ -173,6 +180,11 @@ def reduce(source: RowSource, whole: bool = False, level: Array | None = None) -
     free = out.x.earth_unseen & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
+    if apart:
+        ends = np.zeros(len(off), dtype=bool)
+        ends[np.cumsum(rows) - 1] = True
+        out.sd[ends, :3] = np.nan
+        out.sd[~ends, 3:] = np.nan
     return replace(out, common=off, alike=alike)
 
 

@@ -158,6 +158,13 @@ def test_of_one_that_trembles_alike_everywhere_the_pulls_are_even() -> None:
     assert np.sqrt(((off / told) ** 2).mean()) == pytest.approx(0.8, abs=0.2)
 
 
+def test_a_hand_that_is_calm_most_of_the_time_is_one() -> None:
+    """What one window does is no course that windows share."""
+    angles = np.full((5, 3), 2e-4)
+    angles[4] = 2e-2
+    assert all(wander(reduce(recording(angles, seed))) > 0 for seed in range(20))
+
+
 def test_on_a_table_rows_are_as_ever() -> None:
     found = rows_in_a_hand(recording(np.zeros((5, 3))))
     assert len(found.x) == 50 and found.wander.max() == 0.0
@@ -178,6 +185,28 @@ def test_a_quick_hand_is_no_noise_of_the_sensors() -> None:
         along.append(norm / found.sd[:, 0])
     assert 0.2 < np.sqrt(np.mean(np.square(pulls))) < 1.3
     assert 0.2 < np.sqrt(np.mean(np.square(along))) < 1.3
+
+
+def test_a_table_that_trembles_turns_no_force() -> None:
+    """Accelerometers keep their blocks, in which what settles shows.
+
+    Gyroscopes have one row for each window, and their means are off by what trembles.
+    """
+    pulls, along = [], []
+    for seed in range(6):
+        source = recording(np.full((5, 3), 2e-5), seed, (1.0, 8.1))
+        found = rows_in_a_hand(source)
+        assert 1e-5 < found.wander.mean() < 3e-5
+        acc, gyr = found.used[:, :3].all(axis=1), found.used[:, 3:].all(axis=1)
+        assert (acc != gyr).all() and acc.sum() == 5 * 10
+        assert found.x.position[gyr].tolist() == [0, 1, 2, 3, 4]
+        assert found.length[gyr] == pytest.approx(SECONDS, abs=0.1)
+        assert found.noise == pytest.approx(NOISE * np.repeat([1, 2], 3), rel=0.6)
+        pulls.append(found.y[gyr, 3:] / found.sd[gyr, 3:])
+        norm = np.linalg.norm(found.y[acc, :3], axis=1) - 2.0 * G
+        along.append(norm / found.sd[acc, 0])
+    assert 0.2 < np.sqrt(np.mean(np.square(pulls))) < 1.3
+    assert 0.8 < np.sqrt(np.mean(np.square(along))) < 1.2
 
 
 def test_where_it_is_quick_in_some_windows_the_others_tell_the_noise() -> None:

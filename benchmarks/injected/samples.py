@@ -157,7 +157,7 @@ def quantisation(scene: Scene, sigmas: float, rng: Rng) -> Added:
     if not whole:
         raise CannotShow("every triad is clipped")
     first = int(rng.choice(whole))
-    noise = float(scene.noise[first : first + 3].max())
+    noise = float(scene.noise[first : first + 3].min())
     step = (1.8 if sigmas > STRONG else 1.4) * noise
     own = max(grid(six[:, c]) for c in range(first, first + 3))
     if step < 4 * own:

@@ -15,6 +15,7 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.pushes import (
     LARGEST,
+    MEAN,
     SHAKEN,
     Usual,
     disturbed,
@@ -71,41 +72,45 @@ class Bump(Chain):
 def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     """Disturbed stretches of one window."""
     out = []
+    around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
     first, last = (int(i) for i in recording.windows[p])
     steps = 0.5 * recording.steps
     noise = np.maximum(recording.noise, steps)
     z = recording.six(first, last)
-    _flatten(z, rate, _loudest(z / noise, rate))
     z /= noise
+    _flatten(z, rate, _loudest(z, rate, shortest))
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
     for c in np.flatnonzero(steps >= noise):
         z[np.abs(z[:, c]) <= NEXT, c] = 0.0
     if recording.x.rate[p].any():
         z[:, :3] = 0.0  # the force goes round with the table
-    around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
     there = Usual.of(z, shortest)
     for a, b in disturbed(z, shortest, there):
         if b - a > LONGEST_S * rate:
             continue
         near = recording.six(first + max(a - around, 0), min(first + b + around, last))
-        if not _steady(near / noise, there, int(a), rate):
+        if not _steady(near / noise, there, (int(a), int(b)), rate):
             out.append(_fault(recording, first, int(a), int(b), z, rate))
     return out
 
 
-def _loudest(z: Array, rate: float) -> slice:
-    """The second, or quarter of a window, that is furthest off its course.
+def _loudest(z: Array, rate: float, m: int) -> slice:
+    """The second, or quarter of a window, in which some 4 m samples are furthest off.
 
     `z` is (n, c) in standard deviations. A push as long as that bends the course that
-    is taken out with it, and is no part of what is usual.
+    is taken out with it, and is no part of what is usual. None where even the furthest
+    is no further than noise goes.
     """
     flat = np.nan_to_num(z)
     _flatten(flat, rate)
-    width = max(min(round(LOUDEST_S * rate), len(z) // 4), 1)
-    peak = np.max([running_means(column, width) for column in flat.T], axis=0)
-    at = int(np.argmax(peak))
-    return slice(at, at + width)
+    width = max(min(4 * m, len(z) // 4), 1)
+    mean = np.max([running_means(column, width) for column in flat.T], axis=0)
+    at, long = int(np.argmax(mean)), min(round(LOUDEST_S * rate), len(z) // 4)
+    first = at - (long - width) // 2
+    # at the ends nothing on the other side tells the course
+    inside = long <= first <= len(z) - 2 * long
+    return slice(first, first + long) if mean[at] > MEAN and inside else NOTHING
 
 
 def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
@@ -121,7 +126,7 @@ def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
     for c, column in enumerate(piece.T):
         some = np.isfinite(level[:, c])
         if some.any():
-            column -= _course(len(piece), centre[some], level[some, c])
+            column[:] = _beside(column, centre[some], level[some, c])
 
 
 def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
@@ -149,24 +154,27 @@ def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
     return level, (first + np.append(first[1:], len(piece)) - 1) / 2
 
 
-def _steady(near: Array, there: Usual, start: int, rate: float) -> bool:
-    """Whether the level only jumps there, or fades from the window's start.
+def _steady(near: Array, there: Usual, at: tuple[int, int], rate: float) -> bool:
+    """Whether what is near does so, or its level jumps, or fades from the start.
 
-    `near` is (n, 6) in standard deviations, what lies around a stretch that begins
-    with a sample of the window, `there` what is usual in that.
+    `near` is (n, 6) in standard deviations, what lies around a stretch `at` of the
+    window, first and one past the last sample; `there` what is usual in that.
     """
     near, around = np.nan_to_num(near), round(AROUND_S * rate)
     courses = [_jump(near, round(BESIDE_S * rate))]
-    if start < around:
+    if at[0] < around:
         courses += [_fading(near, tau * rate) for tau in FADES_S]
-    shortest = max(2, round(0.1 * rate))
+    shortest, margin = max(2, round(0.1 * rate)), round(LOUDEST_S * rate / 2)
+    first = min(at[0], around)
+    beside = slice(max(first - margin, 0), first + at[1] - at[0] + margin)
     for course in courses:
         if course is None:
             continue
         rest = near - course
         _flatten(rest, rate)
         calm = (usual(rest) < SHAKEN * there.sample).all()
-        if calm and len(disturbed(rest, shortest, there)) == 0:
+        usually = there.at_least(np.delete(rest, beside, axis=0), shortest)
+        if calm and len(disturbed(rest, shortest, usually)) == 0:
             return True
     return False
 
@@ -195,16 +203,22 @@ def _fading(z: Array, tau: float) -> Array:
     return course
 
 
-def _course(n: int, centre: Array, level: Array) -> Array:
-    """Straight from part to part, and on beyond the first and the last, (n,)."""
-    rows = np.arange(n)
-    course: Array = np.interp(rows, centre, level)
-    if len(centre) > 1:
-        ends = (slice(0, int(centre[0]) + 1), 0), (slice(int(centre[-1]), n), -2)
-        for side, at in ends:
-            slope = (level[at + 1] - level[at]) / (centre[at + 1] - centre[at])
-            course[side] = level[at] + slope * (rows[side] - centre[at])
-    return course
+def _beside(column: Array, centre: Array, level: Array) -> Array:
+    """What is left of samples (n,) beside a course from part to part.
+
+    Beyond the first and the last part it goes on as it was, or stays, whichever is
+    nearer: what drifts goes on, and what sways turns back.
+    """
+    rows = np.arange(len(column))
+    stays: Array = column - np.interp(rows, centre, level)
+    if len(centre) == 1:
+        return stays
+    goes = stays.copy()
+    ends = (slice(0, int(centre[0]) + 1), 0), (slice(int(centre[-1]), len(column)), -2)
+    for side, at in ends:
+        slope = (level[at + 1] - level[at]) / (centre[at + 1] - centre[at])
+        goes[side] = column[side] - level[at] - slope * (rows[side] - centre[at])
+    return np.where(np.abs(goes) < np.abs(stays), goes, stays)
 
 
 def _fault(

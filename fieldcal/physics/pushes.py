@@ -74,6 +74,16 @@ class Usual:
                 spread[c] = _usual_mean(running_means(one, width), width)
         return cls(sample, tail, means)
 
+    def at_least(self, z: Array, m: int) -> Usual:
+        """The same, and what other outputs (n, c) do, if that is more."""
+        other = Usual.of(z, m)
+        wide = {w: np.fmax(s, other.means.get(w, s)) for w, s in self.means.items()}
+        return Usual(
+            np.maximum(self.sample, other.sample),
+            np.maximum(self.tail, other.tail),
+            wide,
+        )
+
 
 def disturbed(z: Array, m: int, beside: Usual | None = None) -> NDArray[np.intp]:
     """Stretches far beyond what is usual, (k, 2) first and one past the last sample.

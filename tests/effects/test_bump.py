@@ -127,3 +127,22 @@ def test_a_push_of_a_second_is_found_however_long_the_window_is(lasts: float) ->
 def test_a_jump_is_no_push(lasts: float) -> None:
     for seed in range(5):
         assert pushed(seed, lasts, "jump", 3.5) == []
+
+
+def test_a_sway_that_turns_back_at_the_end_of_a_window_is_no_push() -> None:
+    """Its course goes on neither as it was nor stays."""
+    for phase in np.linspace(0, 2 * np.pi, 12):
+        rng = np.random.default_rng(3)
+        t = np.arange(1500) / 25
+        rates = rng.normal(0, 1e-3, (len(t), 3))
+        rates[:, 2] += 0.1 * np.sin(2 * np.pi * t / 9.0 + phase) * (t > 30)
+        acc = np.array([0.0, -G, 0.0]) + rng.normal(0, 0.01, (len(t), 3))
+        ends = ((0.0, 29.9), (30.1, 59.9))
+        held = [
+            {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
+            for a, b in ends
+        ]
+        site = {"gravity": G, "latitude_deg": 50.0}
+        about = parse({"format": 1, "site": site, "position": held})
+        checked = check(Block.of(t, acc, rates), about)
+        assert [f for name, f in checked.faults if name == "bump"] == []

@@ -1,19 +1,21 @@
 """What a filter of the sensors makes of a turn.
 
 Outputs are the motion as an impulse response h lets it through, which is late by its
-mean d, wide by its variance v, s^2, and skew by its third cumulant c, s^3:
+mean d, wide by its variance v, s^2, and skew by its third moment c, s^3. Where the
+fourth is q, the motion follows from the outputs, r = q - 6 v^2, as
 
-    U = f + v/2 f'' - c/6 f''' + ...,    W = w + v/2 w'' - c/6 w''' + ...           (1)
+    f = U - v/2 U'' + c/6 U''' - r/24 U'''' + ...,    w likewise of W               (1)
 
-with what was d ago on the right. The delay shifts a whole turn. Of w'', however, the
-closure keeps
+with what comes d later on the right. The delay shifts a whole turn. Of w'', however,
+the closure keeps
 
     integral R^T w'' dt = -integral R^T (w x w') dt                                 (2)
 
 for a device that rests at both ends: nothing of a turn about one axis, something of one
-about two at once. Of a low-pass of first order v is tau^2 and c 2 tau^3; of a mean over
-L they are L^2/12 and 0; of a Butterworth filter v is 0. Source: cumulants of an impulse
-response, to third order; (2) by parts, as R^T' = R^T [w x].
+about two at once. Of a low-pass of first order v is tau^2, c 2 tau^3 and r 3 tau^4; of
+a mean over L they are L^2/12, 0 and -7 L^4/240; of a Butterworth filter v is 0. Source:
+moments of an impulse response about its mean, and the inverse of the series; (2) by
+parts, as R^T' = R^T [w x].
 """
 
 from __future__ import annotations
@@ -31,23 +33,24 @@ FILTERED = "bandwidth"
 
 
 def filtered_turns(table: ColumnTable) -> Group:
-    """Columns of v of the accelerometers and of the gyroscopes, then of c of both."""
-    at = table.add(General(FILTERED, _bent, along=True), 4) + np.arange(4)
+    """Columns of v of accelerometers and of gyroscopes, then of c, then of r."""
+    at = table.add(General(FILTERED, _bent, along=True), 6) + np.arange(6)
     tau = priors.FILTERED_S
-    size = np.array([tau**2, tau**2, 2 * tau**3, 2 * tau**3])
+    size = np.repeat([tau**2, 2 * tau**3, 3 * tau**4], 2)
     return Group("device", FILTERED, at, size, fixed=1.0)
 
 
 def _bent(view: RowView) -> Array:
-    """By v and c at the edges of a turn, (n, 6, 4), (1); nothing at rest."""
-    x, out = view.x, np.zeros((len(view.x), 6, 4))
+    """By v, c and r at the edges of a turn, (n, 6, 6), (1); nothing at rest."""
+    x, out = view.x, np.zeros((len(view.x), 6, 6))
     if not x.w_dot.any() or np.any(x.position >= 0):
         return out
     change = np.hstack([np.gradient(x.f, x.t, axis=0), x.w_dot]) * view.state.scale
     change[[0, -1]] = 0.0  # it rests there, so that all of (2) is seen
-    second = np.gradient(change, x.t, axis=0)
-    third = np.gradient(np.pad(second[1:-1], ((1, 1), (0, 0))), x.t, axis=0)
-    for i, triad in enumerate((ACC, GYR)):
-        out[:, triad, i] = second[:, triad] / 2
-        out[:, triad, 2 + i] = -third[:, triad] / 6
+    bent = np.gradient(change, x.t, axis=0) / 2
+    for k in range(3):
+        for i, triad in enumerate((ACC, GYR)):
+            out[:, triad, 2 * k + i] = bent[:, triad]
+        at_rest = np.pad(bent[1:-1], ((1, 1), (0, 0)))
+        bent = -np.gradient(at_rest, x.t, axis=0) / (k + 3)
     return out

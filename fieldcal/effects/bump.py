@@ -102,10 +102,11 @@ def _loudest(z: Array, rate: float, m: int) -> slice:
     is taken out with it, and is no part of what is usual. None where even the furthest
     is no further than noise goes.
     """
-    flat = np.nan_to_num(z)
-    _flatten(flat, rate)
     width = max(min(4 * m, len(z) // 4), 1)
-    mean = np.max([running_means(column, width) for column in flat.T], axis=0)
+    mean = np.zeros(len(z) - width + 1)
+    for column in z.T:
+        off = np.nan_to_num(_off_course(column, rate))
+        np.maximum(mean, running_means(off, width), out=mean)
     at, long = int(np.argmax(mean)), min(round(LOUDEST_S * rate), len(z) // 4)
     first = at - (long - width) // 2
     # at the ends nothing on the other side tells the course
@@ -114,44 +115,36 @@ def _loudest(z: Array, rate: float, m: int) -> slice:
 
 
 def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
-    """Take its course over seconds out of a window, in place.
+    """Take its course over seconds out of a window, in place."""
+    for column in piece.T:
+        column[:] = _off_course(column, rate, without)
 
-    The course is that of the samples but for some.
-    """
-    width = int(np.clip(round(2 * rate), 8, max(len(piece) // 4, 8)))
-    count = max(len(piece) // width, 1)
-    known = piece.copy()
+
+def _off_course(column: Array, rate: float, without: slice = NOTHING) -> Array:
+    """Samples (n,) beside the course over seconds of them all, but for some."""
+    width = int(np.clip(round(2 * rate), 8, max(len(column) // 4, 8)))
+    known = column.copy()
     known[without] = np.nan
-    level, centre = _levels(known, count)
-    for c, column in enumerate(piece.T):
-        some = np.isfinite(level[:, c])
-        if some.any():
-            column[:] = _beside(column, centre[some], level[some, c])
+    level, centre = _levels(known, max(len(column) // width, 1))
+    some = np.isfinite(level)
+    return _beside(column, centre[some], level[some]) if some.any() else column
 
 
-def _levels(piece: Array, parts: int) -> tuple[Array, Array]:
-    """Medians (parts, c) of what is known in parts of a window, and their middles.
+def _levels(column: Array, parts: int) -> tuple[Array, Array]:
+    """Medians (parts,) of what is known in parts of a window, and their middles.
 
     The parts are as long as each other, but for one sample; nan where nothing is known.
 
-    >>> _levels(np.array([[1.0], [5.0], [3.0], [7.0], [np.nan]]), 2)
-    (array([[3.],
-           [7.]]), array([1. , 3.5]))
+    >>> _levels(np.array([1.0, 5.0, 3.0, 7.0, np.nan]), 2)
+    (array([3., 7.]), array([1. , 3.5]))
     """
-    each, more = divmod(len(piece), parts)
+    each, more = divmod(len(column), parts)
     middle = more * (each + 1)
-    halves = [part for part in (piece[:middle], piece[middle:]) if len(part)]
-    counts = [n for n in (more, parts - more) if n]
-    level = np.empty((parts, piece.shape[1]))
-    for c in range(piece.shape[1]):
-        level[:, c] = np.concatenate(
-            [
-                medians(half[:, c].reshape(n, -1))
-                for half, n in zip(halves, counts, strict=True)
-            ]
-        )
+    halves = (column[:middle], more), (column[middle:], parts - more)
+    found = [medians(part.reshape(n, -1)) for part, n in halves if n]
     first = np.arange(parts) * each + np.minimum(np.arange(parts), more)
-    return level, (first + np.append(first[1:], len(piece)) - 1) / 2
+    centre = (first + np.append(first[1:], len(column)) - 1) / 2
+    return np.concatenate(found), centre
 
 
 def _steady(near: Array, there: Usual, at: tuple[int, int], rate: float) -> bool:

@@ -146,3 +146,19 @@ def test_a_sway_that_turns_back_at_the_end_of_a_window_is_no_push() -> None:
         about = parse({"format": 1, "site": site, "position": held})
         checked = check(Block.of(t, acc, rates), about)
         assert [f for name, f in checked.faults if name == "bump"] == []
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
+def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
+    """It never changes, or nobody sent it; beside it a push is found."""
+    rng = np.random.default_rng(9)
+    t = np.arange(N) / HZ
+    six = np.array([0.0, -G, 0.0, 0.0, 0.0, 0.0]) + rng.normal(0, 1e-3, (N, 6))
+    six[:, 4] = value
+    six[100:700, 2] = np.nan
+    six[400:430, 3] += 5e-3
+    held = [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 0.0, "end_s": 20.0}]
+    about = parse({"format": 1, "site": {"gravity": G}, "position": held})
+    checked = check(Block.of(t, six[:, :3], six[:, 3:]), about)
+    (found,) = [fault for name, fault in checked.faults if name == "bump"]
+    assert found.channel == "gx" and abs(found.from_s - 8.0) < 0.1

@@ -107,7 +107,6 @@ def test_angles_set_by_hand_say_nothing_of_the_gyroscopes(tmp_path: Path) -> Non
     agrees(said, "angle_setting", {"sigma_deg": 0.2})
 
 
-@pytest.mark.thorough
 def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, walk)
     assert named(said) == ["random_walk"]

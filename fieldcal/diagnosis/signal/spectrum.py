@@ -85,23 +85,31 @@ def without(
 
 
 def _explained(pieces: Pieces, near: float) -> Tone | None:
-    """The line near a frequency under the explanation that needs least.
-
-    Where some outputs tremble there, others may have a line: then each output is as
-    noisy as its windows differ by.
-    """
+    """The line near a frequency under the explanation that needs least."""
     moments = moments_of(pieces, near)
     best = _best(pieces, near, moments)
-    if (
-        best is not None
-        and _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE
-    ):
-        scatter = _between_windows(pieces, best, moments)
-        pieces = replace(pieces, noise=np.maximum(pieces.noise, scatter))
-        best = _best(pieces, near, moments)
-        if best and _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE:
-            return None
+    if best and _coherent_part(pieces, best, moments) <= thresholds.ONE_LINE:
+        best = _beside_tremor(pieces, best, moments)
     return best if best and _in_both_halves(pieces, best) else None
+
+
+def _beside_tremor(pieces: Pieces, tone: Tone, moments: Moments) -> Tone | None:
+    """The line where some outputs tremble at its frequency, and others may have it.
+
+    Each output is as noisy as its windows differ by. That is told by few of them, and
+    the gain is that of Student's law of n degrees of freedom, n / 2 ln(1 + chi2 / n)
+    in place of chi2 / 2.
+    """
+    if len(moments.counts) < 2:
+        return None
+    scatter = _between_windows(pieces, tone, moments)
+    noisy = replace(pieces, noise=np.maximum(pieces.noise, scatter))
+    best = _best(noisy, moments.near, moments)
+    if best is None or _coherent_part(noisy, best, moments) <= thresholds.ONE_LINE:
+        return None
+    n = 2 * (len(moments.counts) - 1) * len(best.channels)
+    less = best.chi2 / 2 - n / 2 * np.log1p(best.chi2 / n)
+    return best if best.gain - less > _least_gain(pieces) else None
 
 
 def _best(pieces: Pieces, near: float, moments: Moments) -> Tone | None:
@@ -113,13 +121,16 @@ def _best(pieces: Pieces, near: float, moments: Moments) -> Tone | None:
         if effect.kind == "motion" and not pieces.x.oriented.all():
             continue
         tried.append(tuned(pieces, effect, moments))
-    if not tried:
-        return None
-    best = max(tried, key=lambda tone: tone.gain)
-    places = np.log(sum(map(len, pieces.samples)))
-    if best.gain <= places - np.log(thresholds.LINE_BY_CHANCE) or not best.channels:
+    best = max(tried, key=lambda tone: tone.gain, default=None)
+    if best is None or best.gain <= _least_gain(pieces) or not best.channels:
         return None
     return best
+
+
+def _least_gain(pieces: Pieces) -> float:
+    """Gain of a line that chance does not make in so many samples."""
+    places = np.log(sum(map(len, pieces.samples)))
+    return float(places - np.log(thresholds.LINE_BY_CHANCE))
 
 
 def _off_the_line(
@@ -135,7 +146,7 @@ def _between_windows(pieces: Pieces, tone: Tone, moments: Moments) -> Array:
     """Noise of a sample that makes windows differ as they do beside a line, (6,)."""
     _, off = _off_the_line(pieces, tone, moments)
     square = moments.counts @ np.abs(off) ** 2 / 4  # the variance beside (1) of moments
-    scatter: Array = np.sqrt(square / max(len(off) - 1, 1))
+    scatter: Array = np.sqrt(square / (len(off) - 1))
     return scatter
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.pushes import (
+    FEWEST,
     LARGEST,
     MEAN,
     SHAKEN,
@@ -37,9 +38,6 @@ is on either side of it: a jump bends the course of two of its parts."""
 
 FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
 """Time constants of what fades after a turn; slower ones are no disturbance anyway."""
-
-FEWEST = 20
-"""Samples of a window that tell what is usual in it."""
 
 LOUDEST_S = 1.0
 """Of a window that may have been pushed, as long as pushes of a hand or a gust are."""
@@ -76,6 +74,7 @@ def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     first, last = (int(i) for i in recording.windows[p])
     steps = 0.5 * recording.steps
     noise = np.maximum(recording.noise, steps)
+    noise[noise == 0.0] = np.inf  # what never changes is not pushed
     z = recording.six(first, last)
     z /= noise
     _flatten(z, rate, _loudest(z, rate, shortest))

@@ -209,9 +209,9 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
         return None
     counts = np.round(values / lsb).astype(np.int64)
     kind, mended = undone(counts)
-    if np.abs(counts).max() <= BYTE // 2:
+    fine = _within(values, lsb) if np.abs(counts).max() <= BYTE // 2 else 0.0
+    if fine:
         # whoever swaps counts of one byte gets multiples of 256, or one less
-        fine = _within(values, lsb)
         swapped = np.round(values / fine).astype(np.int64)
         other, whole = undone(swapped)
         if other and _nearer(recording, c, whole * fine):
@@ -233,10 +233,11 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
 
 
 def _within(values: Array, step: float) -> float:
-    """Step of a grid 256 times finer, of values near a coarse one."""
+    """Step of a grid 256 times finer, of values near a coarse one; 0 of others."""
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps < 1.5 * step]
-    return float(gaps.sum() / np.round(BYTE * gaps / step).sum())
+    fine = np.round(BYTE * gaps / step).sum()
+    return float(gaps.sum() / fine) if fine else 0.0
 
 
 def _nearer(recording: CheckedSamples, c: int, mended: Array) -> bool:

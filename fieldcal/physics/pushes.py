@@ -42,6 +42,9 @@ OUTER = (0.9, 0.95)
 SELDOM = 1e-4
 """Windows in which what shakes them throughout goes further than is told from them."""
 
+FEWEST = 20
+"""Samples that tell what is usual in them."""
+
 MANY = 50_000
 """Values that tell the usual spread to half a percent."""
 
@@ -75,7 +78,12 @@ class Usual:
         return cls(sample, tail, means)
 
     def at_least(self, z: Array, m: int) -> Usual:
-        """The same, and what other outputs (n, c) do, if that is more."""
+        """The same, and what other outputs (n, c) do, if that is more.
+
+        Of very few samples nobody can tell.
+        """
+        if len(z) < FEWEST:
+            return self
         other = Usual.of(z, m)
         wide = {w: np.fmax(s, other.means.get(w, s)) for w, s in self.means.items()}
         return Usual(

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Block
@@ -162,3 +164,47 @@ def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
     checked = check(Block.of(t, six[:, :3], six[:, 3:]), about)
     (found,) = [fault for name, fault in checked.faults if name == "bump"]
     assert found.channel == "gx" and abs(found.from_s - 8.0) < 0.1
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    hz=st.sampled_from([4.0, 10.0, 50.0, 400.0]),
+    many=st.integers(8, 400),
+    pushes=st.integers(0, 4),
+    step=st.sampled_from([0.0, 0.05]),
+    missing=st.sampled_from([0.0, 0.1]),
+    silent=st.sampled_from([None, 0.0, 1.0, np.nan]),
+)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_however_short_a_window_is_and_whatever_is_in_it_nothing_breaks(
+    seed: int,
+    hz: float,
+    many: int,
+    pushes: int,
+    step: float,
+    missing: float,
+    silent: float | None,
+) -> None:
+    """Pushes of any length and size, coarse steps, gaps; warnings are errors."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(2 * many) / hz
+    six = [0.0, -G, 0.0, 0.0, 0.0, 0.0] + 0.01 * rng.standard_normal((2 * many, 6))
+    for _ in range(pushes):
+        first = int(rng.integers(0, 2 * many))
+        last = first + int(rng.integers(1, max(many // 2, 2)))
+        six[first:last, rng.integers(0, 6)] += 10 ** rng.uniform(-2, 2)
+    if step:
+        six = step * np.round(six / step)
+    if silent is not None:
+        six[:, rng.integers(0, 6)] = silent
+    six[rng.random(six.shape) < missing] = np.nan
+    ends = (t[0], t[many - 1]), (t[many], t[-1])
+    held = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": float(a), "end_s": float(b)}
+        for a, b in ends
+    ]
+    about = parse({"format": 1, "site": {"gravity": G}, "position": held})
+    checked = check(Block.of(t, six[:, :3], six[:, 3:]), about)
+    assert checked.usable.shape == six.shape
+    for fault in checked.faults:
+        assert t[0] <= fault[1].from_s <= fault[1].to_s <= t[-1] + 2 / hz

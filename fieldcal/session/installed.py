@@ -106,12 +106,16 @@ def in_one_calibration(
     return whole, said
 
 
+def _applied(marks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Offsets and scales that the last samples hold; None if none, or not known."""
+    last = ([None, *stretches(marks)])[-1]
+    return None if last is None or last.taken_out else last.used
+
+
 def tells_an_offset(marks: Iterable[Mapping[str, Any]]) -> bool:
     """Whether the device said that it subtracts an offset from its gyroscopes."""
-    last = ([None, *stretches(marks)])[-1]
-    if last is None or last.taken_out or last.used is None:
-        return False
-    return bool(np.any(last.used["gyr_offset"]))
+    used = _applied(marks)
+    return used is not None and bool(np.any(used["gyr_offset"]))
 
 
 def as_sent(
@@ -125,10 +129,10 @@ def as_sent(
     marks : of the session
 
     """
-    last = ([None, *stretches(marks)])[-1]
-    if last is None or last.taken_out or last.used is None:
+    used = _applied(marks)
+    if used is None:
         return dict(nominal)
-    o, k, w = (np.array(last.used[n], float) for n in NOTHING)
+    o, k, w = (np.array(used[n], float) for n in NOTHING)
     return {
         **nominal,
         "acc_bias": (nominal["acc_bias"] - o) * k,  # U = (r - o) k

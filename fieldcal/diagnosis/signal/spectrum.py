@@ -97,8 +97,8 @@ def _beside_tremor(pieces: Pieces, tone: Tone, moments: Moments) -> Tone | None:
     """The line where some outputs tremble at its frequency, and others may have it.
 
     Each output is as noisy as its windows differ by. That is told by few of them, and
-    the gain is that of Student's law of n degrees of freedom, n / 2 ln(1 + chi2 / n)
-    in place of chi2 / 2.
+    the gain is that of Student's t distribution with n degrees of freedom,
+    n / 2 ln(1 + chi2 / n) in place of chi2 / 2.
     """
     if len(moments.counts) < 2:
         return None

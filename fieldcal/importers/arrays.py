@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
+from fieldcal.importing.arrays.array_groups import imu_groups, within
 from fieldcal.importing.arrays.array_tables import (
     ROWS,
     WIDEST,
@@ -34,6 +37,7 @@ from fieldcal.importing.arrays.matlab_objects import holds_objects, object_table
 from fieldcal.importing.arrays.paired_tables import ArrayPairing, pairing
 from fieldcal.importing.files.gzip_stream import head, on_disk
 from fieldcal.importing.headings.heading import Heading
+from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.said_rate import rate_of, scalars
 
@@ -71,10 +75,46 @@ class ArrayFile(ColumnRecording):
     """How its arrays go together, so that it is found once."""
     _units: dict[str, str] | None = None
     """Of the arrays of an HDF5 file, so that it is looked through once."""
+    group = ""
+    """The only group that is read, where each of several holds an IMU."""
+    _parts: dict[str, Self] | None = None
+    """The file with one such group alone, by the name of its IMU."""
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
         return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
+
+    def imus(self) -> dict[str, ReadOptions]:
+        """Options of each IMU, of which each may lie in a group of its own."""
+        if self.imus_found is None and (parts := self._by_group()):
+            self.imus_found = {}
+            for name, part in parts.items():
+                (wanted,) = part.imus().values()
+                self.imus_found[name] = wanted
+                part.imus_found = {name: wanted}
+                self.says += [s for s in part.says if s not in self.says]
+        return super().imus()
+
+    def alone(self, stream: str) -> Recording:
+        """The recording of one IMU, as far as it has a group of its own."""
+        return self._by_group().get(stream) or super().alone(stream)
+
+    def _by_group(self) -> dict[str, Self]:
+        """The file with one group alone, where several hold an IMU each."""
+        if self._parts is None:
+            groups: dict[str, str] = {}
+            if not (self.wanted.columns or self.group):
+                with self._arrays() as tables:
+                    groups = imu_groups(tables)
+            self._parts = {
+                name: self._of_group(group) for name, group in groups.items()
+            }
+        return self._parts
+
+    def _of_group(self, group: str) -> Self:
+        one = copy(self)
+        one.says, one.mended, one.guessed, one.group = [], [], {}, group
+        return one
 
     def heading(self) -> list[Heading]:
         """Names of the columns of its arrays."""
@@ -193,7 +233,7 @@ class ArrayFile(ColumnRecording):
     def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
         """Every array of numbers in the file, as it lies there."""
         if self._loaded is not None:
-            yield self._loaded
+            yield within(self.group, self._loaded)
             return
         with ExitStack() as stack:
             path = stack.enter_context(on_disk(self.path, self.cut_off))
@@ -218,7 +258,7 @@ class ArrayFile(ColumnRecording):
                     f"{self.path}: is not whole: {error or type(error).__name__}; copy"
                     " it again from where it came"
                 ) from error
-            yield tables
+            yield within(self.group, tables)
 
     def _hdf5(self, path: Path, stack: ExitStack) -> dict[str, ArrayTable]:
         import h5py
@@ -228,4 +268,4 @@ class ArrayFile(ColumnRecording):
             self._units = hdf5_units(file)
             if hdf5_has_objects(file):
                 self._objects = tables_of(object_tables(path))
-        return hdf5_tables(file, self._units) | dict(self._objects)
+        return hdf5_tables(file, within(self.group, self._units)) | dict(self._objects)

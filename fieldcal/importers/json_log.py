@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.importers.arrays import ArrayFile
+from fieldcal.importing.arrays.array_groups import within
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.text_encoding import as_utf8
 from fieldcal.importing.records.json_lists import json_lists
@@ -73,7 +74,7 @@ class JsonLog(ArrayFile):
         return (), ""
 
     @contextmanager
-    def _opened(self) -> Iterator[dict[str, ArrayTable]]:
+    def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
         """Every list of numbers in the file."""
         if self._loaded is None:
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
@@ -81,7 +82,7 @@ class JsonLog(ArrayFile):
             self._scalars = dict(scalars(document))
             lists = json_lists(document, says=self.says)
             self._loaded = {name: table_of(values) for name, values in lists}
-        yield self._loaded
+        yield within(self.group, self._loaded)
 
     def _document(self, text: str) -> Any:
         """What the text holds; lines of records as a list.

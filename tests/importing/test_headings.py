@@ -208,6 +208,14 @@ def test_several_imus_share_what_one_alone_has() -> None:
     assert {"t=t", "ax=imu1_ax", "temperature=imu1_temp"} - {*second} == set()
 
 
+def test_each_of_several_imus_has_its_own_time() -> None:
+    names = [f"imu{k}_{c}" for k in (0, 1) for c in BARE]
+    found = read([Column(name, name) for name in names])
+    assert [[c.partition("=")[2] for c in one.columns] for one in found] == [
+        names[: len(BARE)], names[len(BARE) :]
+    ]  # fmt: skip
+
+
 def test_a_barometer_is_the_last_thermometer_that_is_taken() -> None:
     (found,) = read([Column("", n) for n in (*BARE, "baro_temp")], "_")
     assert found.columns[-1] == "temperature" and "that of the baro" in found.says[0]

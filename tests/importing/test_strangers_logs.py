@@ -227,6 +227,12 @@ FORMS: dict[str, Writer] = {
     "a rate among words": lambda: lines(
         A / G, DEG, head="# made by a logger at 50 Hz, filter 20\nax,ay,az,gx,gy,gz"
     ),
+    "types beside names": lambda: lines(
+        np.round(T * 1e6), W, A / G,
+        head='# Data format: "%int(ChipTimeUS),'
+        + ",".join(f"%float(Raw{s}{i})" for s in ("Gyro", "Accel") for i in "XYZ")
+        + '"',
+    ),
     "a rate in JSON": lambda: json.dumps(
         {"interval_ms": 20, "values": np.round(ROWS[:, 1:], 6).tolist()}
     ),
@@ -356,9 +362,13 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
                np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
         (lines(T, W, UP), "say what its columns are"),
         (lines(["1.70E+12"] * len(T), A, W, head=f"time,{SIX}"), "--rate 50"),
+        (lines(np.round(np.arange(len(T)) * 1.5) + 115, DEG, A / G,
+               head="Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),"
+               "Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),"
+               "Accelerometer Z (g)"), "no column is t"),
     ],
     ids=["rows that are counted", "a thermometer's counts", "a direction",
-         "a time that a spreadsheet shortened"],
+         "a time that a spreadsheet shortened", "messages that are counted"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str

@@ -167,7 +167,8 @@ def hdf5_units(file: Any) -> dict[str, str]:
             return
         if DECODE in item.attrs:
             return
-        said = item.attrs.get("units", item.attrs.get("unit", ""))
+        attributes = {name.lower(): value for name, value in item.attrs.items()}
+        said = attributes.get("units", attributes.get("unit", ""))
         unit = said.decode() if isinstance(said, bytes) else str(said)
         for field, kind in _fields(item.dtype).items():
             if kind.base.kind in "iuf" and item.ndim + len(kind.shape) in DIMENSIONS:

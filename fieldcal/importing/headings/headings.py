@@ -87,8 +87,8 @@ def read(
     lacking = all(one.says.weak for three in acc.values() for one in three)
     if not gyr and lacking and not weak:
         return ()
-    times = _one(_stamps([n for n in named if n.says.kind == "t"]), OTHER_CLOCK)
-    times = times or [n for n in named if n.says.kind == "dt"][:1]
+    times = _stamps([n for n in named if n.says.kind == "t"])
+    steps = [n for n in named if n.says.kind == "dt"][:1]
     apart = [n for n in named if n.says.kind == "l"]
     found = []
     for label in acc or gyr:
@@ -96,7 +96,8 @@ def read(
         warm, says = _thermometer(named, label)
         rest = _one([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
-        chosen = [*times, *both, *apart, *warm, *rest]
+        clock = _one(_own(times, label) or times, OTHER_CLOCK) or steps
+        chosen = [*clock, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if len(found) == 1:
         found = [replace(found[0], name="0")]
@@ -219,6 +220,11 @@ def _beside(
     return gyr.get(label) or (next(iter(gyr.values())) if len(gyr) == 1 else [])
 
 
+def _own(named: Iterable[Named], label: tuple[str, ...]) -> list[Named]:
+    """Columns whose names say that they are those of one of several IMUs."""
+    return [n for n in named if label and set(label) <= set(n.says.label)]
+
+
 def _one(named: Sequence[Named], but: Sequence[str]) -> list[Named]:
     """One of several of a kind: the plainest name, with no word of `but` if can be."""
     return sorted(
@@ -237,8 +243,9 @@ def _thermometer(
 ) -> tuple[list[Named], tuple[str, ...]]:
     """Return the thermometer nearest to an IMU, and what must be said of it."""
     warm = [n for n in named if n.says.kind == "temperature"]
-    own = [n for n in warm if label and set(label) <= set(n.says.label)]
-    near = own or [n for n in warm if not set(n.says.label) & set(FOREIGN)]
+    near = _own(warm, label) or [
+        n for n in warm if not set(n.says.label) & set(FOREIGN)
+    ]
     if near or not warm:
         return _one(near, ()), ()
     chosen = _one(warm, ())

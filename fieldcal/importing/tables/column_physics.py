@@ -26,6 +26,7 @@ from fieldcal.importing.units.gravity_size import (
 from fieldcal.importing.units.rate_size import rate_in
 from fieldcal.importing.units.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting, gains
 from fieldcal.importing.units.time_units import step_of
+from fieldcal.importing.words.heading_words import counts
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -73,7 +74,7 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     channels = dict(known)
     times = [i for i in _growing(table) if i not in known]
     if "t" not in channels.values():
-        clocks = [i for i in times if not _counts(table[:, i])]
+        clocks = [i for i in times if not (_counts(table[:, i]) or counts(names[i]))]
         if clocks:
             # a thermometer may only grow as well, but the time stands first
             channels[clocks[0]] = "t"
@@ -90,9 +91,12 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     for kind, three in (("a", acc), ("g", gyr)):
         if three is not None:
             channels |= {i: kind + axis for i, axis in zip(three, EACH, strict=True)}
-    if all(known.get(i) == name for i, name in channels.items()):
+    new = {name for i, name in channels.items() if known.get(i) != name}
+    if not new:
         return None
-    return Told(channels, why)
+    return Told(
+        channels, "the time is the first that only grows" if new == {"t"} else why
+    )
 
 
 def directions(table: Array) -> list[Three]:

@@ -40,6 +40,9 @@ NUMBERS = 0.5
 _AXIS = re.compile(r"(.*[^\W_].*?|.*\(|[A-Za-z])([xyzXYZ])(\)?\s*(?:[\[({].*[\])}])?)")
 """A name that ends with an axis, and maybe a unit."""
 
+_DESCRIBED = re.compile(r"%\w+\(([^()]*)\)")
+"""A column as loggers describe it by its type and name: ``%float(RawGyroX)``."""
+
 _RATE_WITHIN = re.compile(
     r"(?:\bat|rate|frequency|freq|odr|fs)\b[\s:=_]*(?:is|of)?\s*([0-9]+(?:\.[0-9]+)?)\s*hz\b",
     re.IGNORECASE,
@@ -127,7 +130,10 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
     tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
     # who listens before the device starts has rows above the names
     tops += [line for line in lines[first : first + LATEST] if _all_words(line)]
-    rows = [cells(line, separator or separator_of(line)) for line in tops]
+    rows = [
+        _DESCRIBED.findall(line) or cells(line, separator or separator_of(line))
+        for line in tops
+    ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
     return [one for one in found if len(one.columns) > 2]
 

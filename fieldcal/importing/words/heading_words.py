@@ -82,6 +82,11 @@ _ANGLES = {"rad": "rad/s", "deg": "deg/s"}
 _NO_RATE = ("angle", "roll", "pitch", "yaw", "heading", "euler", "theta", "phi")
 """Words of angles that are no rates."""
 
+COUNTERS = ("packet", "packets", "counter", "count", "cnt", "index", "idx", "number",
+            "nr", "no", "frame", "row", "line", "sample", "samples", "seq", "sequence",
+            "id", "n")  # fmt: skip
+"""Words of columns that count rows or messages."""
+
 _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
 """Words that tell no IMU from another where all of one kind have them."""
@@ -244,6 +249,16 @@ def words_of(name: str) -> list[str]:
     bracketed = _BRACKETS.fullmatch(name.strip())
     bare = bracketed.group(1) if bracketed else name
     return [w.lower() for w in _WORD.findall(bare)]
+
+
+def counts(name: str) -> bool:
+    """Whether a name says that its column counts, so its numbers are no times.
+
+    >>> counts("Packet number"), counts("sample_time"), counts("")
+    (True, False, False)
+    """
+    words = words_of(name)
+    return bool(words) and {*words} <= {*COUNTERS}
 
 
 def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:

@@ -1,0 +1,65 @@
+"""Groups of a file of arrays that each hold an IMU: a folder of HDF5, a structure.
+
+Where the names of all arrays leave a choice, as there are two accelerometers, those
+within one group may leave none. Such a group is an IMU, with times of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from fieldcal.importing.arrays.array_tables import ArrayTable, columns_of
+from fieldcal.importing.headings import headings
+
+T = TypeVar("T")
+
+BOTH = ({"a", "g"}, {"a"})
+"""What a group has to hold: both sensors, or force alone where nothing has rates."""
+
+
+def imu_groups(tables: Mapping[str, ArrayTable]) -> dict[str, str]:
+    """Groups that hold one IMU each, by its name; none where there are not several.
+
+    Parameters
+    ----------
+    tables : by name, with a ``/`` behind each group that they lie in
+
+    """
+    folders = sorted({f for name in tables for f in _folders(name)})
+    if len(folders) < 2 or headings.read(columns_of(tables)):
+        return {}
+    kinds = {folder: _kinds(within(folder, tables)) for folder in folders}
+    for wanted in BOTH:
+        if found := [f for f in folders if wanted <= kinds[f]]:
+            whole = [f for f in found if not any(o.startswith(f"{f}/") for o in found)]
+            return dict(zip(_names(whole), whole, strict=True)) if whole[1:] else {}
+    return {}
+
+
+def within(folder: str, named: Mapping[str, T]) -> dict[str, T]:
+    """What lies in a group and in the groups in it; all where none is named."""
+    begins = folder and f"{folder}/"
+    return {name: one for name, one in named.items() if name.startswith(begins)}
+
+
+def _folders(name: str) -> list[str]:
+    """Groups that an array lies in.
+
+    >>> _folders("a/b/acc")
+    ['a', 'a/b']
+    """
+    parts = name.split("/")[:-1]
+    return ["/".join(parts[: i + 1]) for i in range(len(parts))]
+
+
+def _kinds(tables: Mapping[str, ArrayTable]) -> set[str]:
+    """Sensors of the IMU that names of arrays tell; none where they tell several."""
+    found = headings.read(columns_of(tables))
+    return {*found[0].units} if len(found) == 1 else set()
+
+
+def _names(folders: list[str]) -> list[str]:
+    """What tells groups apart: their last part, or all where two share that."""
+    last = [folder.rpartition("/")[2] for folder in folders]
+    return last if len({*last}) == len(last) else folders

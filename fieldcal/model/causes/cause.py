@@ -146,6 +146,10 @@ class Cause:
     variants: tuple[Group, ...]
     kind: Kind = "effect"
     expected: frozenset[Group] = frozenset()
+    _nearest: dict[Group, tuple[Group, ...]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    """What `at_once` found, as every pair of a search asks again."""
 
     def at_once(self, other: Group) -> tuple[Group, ...]:
         """Variants that happen when a group does of the same effect on the other triad.
@@ -154,9 +158,11 @@ class Cause:
         """
         if other.cause != self.name or not other.begins:
             return ()
-        apart = [g.apart(other) for g in self.variants]
-        least = min(apart)
-        return tuple(g for g, d in zip(self.variants, apart, strict=True) if d == least)
+        if other not in self._nearest:
+            apart = [g.apart(other) for g in self.variants]
+            least, each = min(apart), zip(self.variants, apart, strict=True)
+            self._nearest[other] = tuple(g for g, d in each if d == least)
+        return self._nearest[other]
 
     def of_size(self, v: float | None) -> Cause:
         """The same with variants of size v; itself where that is not known."""

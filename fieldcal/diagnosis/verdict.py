@@ -282,5 +282,8 @@ def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
     for one in explanation.best.linear:
         if first <= one.channel < first + 3:
             reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
+    for cause, group in explanation.best.set.members:
+        if not cause.told:  # noise is no parameter
+            reach[group.columns] = False
     narrowed = np.diag(found.inverse) < thresholds.DETERMINED * found.sizes**2
     return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())

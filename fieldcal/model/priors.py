@@ -66,6 +66,10 @@ ALONE_DEG, REPEATED_DEG, GAUGE = 10.0, 0.2, 5e-3
 """Largest usual mistake of one position, deg, of an angle that is repeated, deg, and of
 a gauge that all angles come from, as a part of them."""
 
+LEANS, LEANS_RAD = 0.1, 2e-4
+"""Chance that what a device lies on gives way while it rests, and by how much, rad:
+tyres, foam and grass do, by tenths of a milliradian in a minute."""
+
 ARRIVAL_S = 0.3
 """Standard uncertainty of the instant at which a turn by hand ends."""
 

@@ -13,6 +13,7 @@ from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
+from fieldcal.model.causes.leaning import leaning
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -27,6 +28,8 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
     if len(table.held) >= FEW:  # of fewer, it is always there
         for group in _flicker(table):
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
+    if (leans := leaning(table)) is not None:
+        yield Cause(leans.cause, leans.part, priors.LEANS, (leans,), "noise")
     if len(table.held) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
 

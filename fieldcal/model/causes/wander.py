@@ -28,7 +28,7 @@ Source: Karhunen-Loeve series of Brownian motion; IEEE Std 952 for flicker noise
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from fieldcal.model.causes import smooth
 from fieldcal.model.causes.cause import FEW
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander_sizes import sizes
+from fieldcal.model.rows.lean_modes import lean_modes
 from fieldcal.model.rows.reduce import Rows
 
 MORE = 2.0
@@ -60,6 +61,8 @@ class Wander:
     length : s that these are drawn over
     series : flicker of few windows, where it is always there; None of more
     unseen : (n, 6) variance that this leaves of each row
+    leans : (p,) cosines by which the force is seen to turn in each position; none where
+        its angles are set
 
     """
 
@@ -70,6 +73,7 @@ class Wander:
     length: float
     series: FlickerSeries | None = None
     unseen: Array | None = None
+    leans: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
@@ -81,7 +85,8 @@ class Wander:
         modes = np.clip(MORE * resolved, smooth.WAVES, priors.MOST_WAVES).astype(
             np.intp
         )
-        out = cls(speed, flicker, share, modes, length)
+        leans = lean_modes(rows)
+        out = cls(speed, flicker, share, modes, length, leans=leans)
         if not len(np.unique(rows.x.position)) < FEW < len(rows.x):
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)

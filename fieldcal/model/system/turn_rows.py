@@ -111,6 +111,7 @@ class Turns:
         }
         if self.dictionary.free.any():
             self.means = _means(windows, self.dictionary)
+            self.off = _off(windows, self.dictionary)
             self.spread = _spread(windows, self.dictionary)
         turns = list(self.turning.turns(state))
         views = [self._view(turn, state) for turn in turns]
@@ -145,6 +146,8 @@ class Turns:
         loose = dict(self._loose_ends(turn)) if d.free.any() else {}
         ends: Array = np.zeros((3, 3))
         for p, bent in loose.items():
+            # the force there is the one that is read, which the state may not meet
+            seen = seen - bent @ self.off[p]
             close = close - bent @ self.means[p][:, index]
             ends += bent @ self._unsure(p) @ bent.T
         there = np.abs(close).max(axis=0) > 0
@@ -252,6 +255,18 @@ def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
             table = np.add.reduceat(part.design * weight, first, axis=0)
             table /= np.add.reduceat(weight**2, first, axis=0)
             out[part.window[first][:, None], part.channel, part.columns] = table
+    return out
+
+
+def _off(windows: Sequence[Linear], d: Dictionary) -> Array:
+    """Recorded less calculated of the accelerometers' mean in each window, (p, 3)."""
+    out = np.zeros((len(d.held), 3))
+    for part in windows:
+        if part.channel < 3:
+            first = np.flatnonzero(np.diff(part.window, prepend=-1))
+            total = np.add.reduceat(part.white * part.weight, first)
+            total /= np.add.reduceat(part.weight**2, first)
+            out[part.window[first], part.channel] = total
     return out
 
 

@@ -1,0 +1,75 @@
+"""Leaning: what a device lies on gives way, so it turns slowly within a stop.
+
+A vehicle stands on tyres, a box on grass or foam. In a stop whose orientation nobody
+set, the angle about each of two axes across the force is a random walk about its mean,
+
+    theta_i(t) = sum_k a_ik cos(pi k u),   u = (t - t_0) / (t_1 - t_0),  a_ik ~ 1 / k,
+
+and a device that turns by theta about e reads
+
+    f' = f - theta e x f,    w' = w + (d theta / dt) e                              (1)
+
+so the length of the force stays, which is what tells it from a bias that changes. A
+fixture is taken to stand firm: how well its angles are set is known otherwise. Where
+most stops turn so, somebody holds the device (`hand_tremor`). A turn between two stops
+goes from the mean of the one to that of the other: the lean at its ends is in what
+closures scatter by.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldcal.core.samples import Array, Index
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.state import across
+
+
+def leaning(table: ColumnTable) -> Group | None:
+    """The columns of all stops that have rows enough; None if there are none."""
+    held = np.flatnonzero(table.wander.leans)
+    if not len(held):
+        return None
+    waves = np.ceil(_share(table.wander.leans) * table.wander.leans[held]).astype(int)
+    ends = np.array([_ends(table, int(p)) for p in held])
+    first = np.cumsum([0, *(2 * waves)])
+
+    def columns(view: RowView) -> Array:
+        """(n, 6, k), of each stop about one axis and then about the other, (1)."""
+        out = np.zeros((len(view.x), 6, first[-1]))
+        each = zip(first[:-1], held, waves, ends, strict=True)
+        for at, p, count, (begin, end) in each:
+            rows = np.flatnonzero((view.x.position == p) & ~view.plain.oriented)
+            f, k = view.x.f[rows], np.arange(1, count + 1)
+            phase = np.pi * np.outer((view.x.t[rows] - begin) / (end - begin), k)
+            speed = -np.pi * k / (end - begin) * np.sin(phase)
+            for axis, side in enumerate(across(f)):
+                about = np.cross(side, f) / (f**2).sum(axis=1, keepdims=True)
+                turned = [side[:, :, None] * np.cos(phase)[:, None],
+                          about[:, :, None] * speed[:, None]]  # fmt: skip
+                some = slice(at + axis * count, at + (axis + 1) * count)
+                out[rows, :, some] = np.concatenate(turned, axis=1)
+        out *= view.state.scale[:, None]
+        return out
+
+    start = table.add(General("leaning", columns), int(first[-1]))
+    size = priors.LEANS_RAD / np.concatenate(
+        [[*np.arange(1, n + 1)] * 2 for n in waves]
+    )
+    return Group("leaning", "", start + np.arange(first[-1]), size, random=True)
+
+
+def _share(leans: Index) -> float:
+    """The part of the cosines that is taken: a session has no more than a walk."""
+    return min(1.0, priors.MOST_WAVES / int(leans.sum()))
+
+
+def _ends(table: ColumnTable, p: int) -> tuple[float, float]:
+    """When a stop began and when it ended, s."""
+    x = table.x
+    rows = x.position == p
+    half = x.lasts[rows] / 2
+    return float((x.t[rows] - half).min()), float((x.t[rows] + half).max())

@@ -141,8 +141,8 @@ def _taken_out(
     held = still.at_rest(session).averages
     seen = np.nan_to_num(found.vector("acc_bias")[0])
     gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
-    repeat = np.hypot(limits.acc_bias_repeat, seen), gyroscopes
-    return biases_taken_out(held, session.block, repeat, limits.fit_chance)
+    repeat = limits.acc_bias_repeat, gyroscopes
+    return biases_taken_out(held, session.block, repeat, seen, limits.fit_chance)
 
 
 def store_in_history(history: History, session: Session, found: Calibration) -> str:

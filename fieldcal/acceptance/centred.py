@@ -15,7 +15,17 @@ with d = 0 if values are rounded to the nearest step, -1/2 if they are rounded d
 rounded to zero q is twice as large. Values that were on this grid before are all moved
 by the same part of a step, so d = 0 and the sum in (2) is 1. For each of the four, the
 probability follows from (1) and (2) of `tracked` over all axes, with s_b of
-accelerometers; the least of them counts, times four (Bonferroni). Device axes, SI.
+accelerometers; the least of them counts, times four (Bonferroni).
+
+Whatever else was done to the samples afterwards, such as drawing new ones between them,
+moves a mean a little. Of a recording from which none was subtracted, the mean m is that
+of the force and the bias b: for m to be so small, the mean force has to be -b, and
+whatever it is spread by, about zero, the chance of that is on each axis at most
+
+    x = 2 |m| / (sqrt(2 pi e) |b|),   P = x (1 + L + L^2 / 2),   L = -ln x          (3)
+
+with x in P the product over axes, as that of three numbers drawn evenly from 0 to 1.
+Device axes, SI.
 """
 
 from __future__ import annotations
@@ -40,7 +50,8 @@ from fieldcal.windows import Average
 def biases_taken_out(
     windows: Sequence[Average],
     block: Block,
-    repeat: tuple[float | Array, BiasSpread],
+    repeat: tuple[float, BiasSpread],
+    seen: Array,
     least: float,
 ) -> list[str]:
     """Sentences about biases that the recording no longer contains.
@@ -49,8 +60,9 @@ def biases_taken_out(
     ----------
     windows : at rest
     block : the whole recording
-    repeat : spread of an accelerometer's bias from run to run, and as large as it is
-        found, 1 sigma, m/s^2, (3,) or one for all; and of a gyroscope's
+    repeat : spread of an accelerometer's bias from run to run, 1 sigma, m/s^2, and of a
+        gyroscope's
+    seen : (3,) biases of the accelerometers as they are found, m/s^2; 0 where none is
     least : probability below which chance is excluded
 
     """
@@ -65,7 +77,11 @@ def biases_taken_out(
             " again"
         )
     odd = [name for name, p in centred(block) if p < least]
-    if not odd and centred_and_rounded(windows, block, repeat[0], least) < least:
+    spread = np.hypot(repeat[0], seen)
+    if not odd and (
+        centred_and_rounded(windows, block, spread, least) < least
+        or centred_and_altered(block, seen) < least
+    ):
         odd = list(CHANNELS[ACC])
     if odd:
         said.append(
@@ -113,6 +129,17 @@ def centred_and_rounded(
         if larger >= least:
             found.append((1.0 - larger) * chance_near_zero(sigma, repeat))
     return min(len(ways) * min(found), 1.0)
+
+
+def centred_and_altered(block: Block, seen: Array) -> float:
+    """Probability that the force makes up for biases of that size on all axes, (3)."""
+    known = np.isfinite(block.acc)
+    if not known.any(axis=0).all():
+        return 1.0
+    mean = np.abs(np.nanmean(block.acc, axis=0))
+    density = 1 / (np.sqrt(2 * np.pi * np.e) * np.maximum(np.abs(seen), 1e-300))
+    x = max(float(np.minimum(2 * mean * density, 1.0).prod()), 1e-300)
+    return min(x * (1 - np.log(x) + np.log(x) ** 2 / 2), 1.0)  # (3)
 
 
 def _noise(values: Array) -> float:

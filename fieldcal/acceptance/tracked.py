@@ -16,10 +16,11 @@ What a turn put out is removed again in some seconds, so the means are c of
     W(t) = c + d exp(-t / tau)                                                     (3)
 
 in each window, with the tau that all windows have the least residual with. The removal
-also takes out slow noise, so sigma is that of the noise at all frequencies: the median
-of the periodogram over ln 2. A device that takes the mean of its first T seconds at
-rest for its bias until the next turn leaves the noise of that mean in all of a window,
-and before what it took out the last time. The means are c of
+also takes out slow noise, so sigma is that of the noise at quick frequencies: the
+median of the periodogram over ln 2, or that of a lower octave with more than a filter
+left of it. A device that takes the mean of its first T seconds at rest for its bias
+until the next turn leaves the noise of that mean in all of a window, and before what it
+took out the last time. The means are c of
 
     W(t) = c + d (t < T'),   sigma^2 = sigma_c^2 + noise^2 / (T rate)              (4)
 
@@ -72,8 +73,9 @@ LAGS = np.geomspace(0.25, 16.0, 49)
 CELLS = 256
 """Most means of a window in which (3) and (4) are fitted."""
 
-SPECTRUM = 16
-"""Fewest samples for a periodogram."""
+SPECTRUM, OCTAVES, FILTERS = 16, 4, 4.0
+"""Fewest samples for a periodogram, and powers for one of its upper octaves; and by
+how many standard deviations one has more that lies below a filter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,7 +286,17 @@ class _Cells:
 
 
 def _white_noise(gyr: Array) -> Array:
-    """Noise of a sample at all frequencies, (3,)."""
+    """Noise of a sample at all frequencies, (3,); before a filter, if one took some.
+
+    A filter, or a program that draws lines between samples, leaves less in the upper
+    octaves than in those below. The median of m powers scatters by its 1.44 m^-1/2.
+    """
     power = np.abs(np.fft.rfft(gyr - gyr.mean(axis=0), axis=0)[1:-1]) ** 2
-    level: Array = np.sqrt(np.median(power, axis=0) / len(gyr) / np.log(2.0))
-    return level
+    level: Array = np.median(power, axis=0)
+    for k in range(1, OCTAVES):
+        octave = power[len(power) >> (k + 1) : len(power) >> k]
+        if len(octave) < SPECTRUM:
+            break
+        own, scatters = np.median(octave, axis=0), 1.44 / np.sqrt(len(octave))
+        level = np.where(own > (1 + FILTERS * scatters) * level, own, level)
+    return np.asarray(np.sqrt(level / len(gyr) / np.log(2.0)))

@@ -180,8 +180,10 @@ def _try(seed: int, options: Options, rows: dict[str, list[Judged]]) -> None:
     bench = spoilt(bench, names, rng)
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where) / "session"
-        write(folder, session(bench, names, rng))
-        one = judged(folder, bench.truth, bench.grade, options.diagnose, options.limit)
+        written = session(bench, names, rng)
+        write(folder, written)
+        truth = written.truth(bench)
+        one = judged(folder, truth, bench.grade, options.diagnose, options.limit)
     rows[names[0] if names else SOUND].append(one)
     odd = one.wrong or one.over if one.go else not names
     if odd or one.late or options.each:

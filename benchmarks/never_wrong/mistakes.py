@@ -73,7 +73,7 @@ def triad_turned_round(written: Written, bench: Bench, rng: Rng) -> Written:
     """All of a triad has the other sign: gravity for specific force, left for right."""
     s = written.samples
     if rng.integers(2):
-        return replace(written, samples=replace(s, acc=-s.acc))
+        return replace(written, samples=replace(s, acc=-s.acc), mirrored=True)
     return replace(written, samples=replace(s, gyr=-s.gyr))
 
 

@@ -15,11 +15,23 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Written:
-    """A session: its tables and its samples; `ending` of the file of samples."""
+    """A session: its tables and its samples; `ending` of the file of samples.
+
+    `mirrored` says that all accelerometers have the other sign. Where no angle is
+    stated, nothing that is recorded shows it, and the outputs have minus the bias.
+    """
 
     about: dict[str, Any]
     samples: Samples
     ending: str = "parquet"
+    mirrored: bool = False
+
+    def truth(self, bench: Bench) -> dict[str, float]:
+        """Parameters of the outputs by full name."""
+        own = bench.truth
+        if not self.mirrored or bench.stated:
+            return own
+        return own | {n: -v for n, v in own.items() if n.startswith("acc_bias")}
 
 
 Before = Callable[[Bench, Rng], Bench]

@@ -94,7 +94,7 @@ def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
             " rates"
         ]
     group = group_of(name)
-    if abs(value / usual - 1) - UNSEEN * sigma / abs(usual) > UNREAL[group]:
+    if abs(value - usual) > max(UNREAL[group] * abs(usual), UNSEEN * sigma):
         return [
             f"{name} is {value:.3g} ± {sigma:.2g}, nominal {usual:.3g}: no sensor is"
             " that far off; the unit or full scale of the recording is another than"
@@ -110,8 +110,7 @@ def _bias(
     parameter = ParameterName.of(name)
     sensor = sensor_of(parameter.group)
     unit = abs(getattr(nominal, f"{sensor}_scale")[parameter.axis])
-    off = abs(value - usual) - UNSEEN * sigma
-    if off <= UNREAL[parameter.group] * unit:
+    if abs(value - usual) <= max(UNREAL[parameter.group] * unit, UNSEEN * sigma):
         return []
     si = "m/s^2" if sensor == "acc" else "rad/s"
     return [

@@ -26,6 +26,23 @@ def test_a_base_out_of_level_by_tens_of_degrees_is_another_mounting(
         assert "[frame] mounting" in said[0] and name in said[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "sigma", "odd"),
+    [("acc_scale.y", 0.80, 0.038, True), ("acc_scale.y", 0.80, 0.05, False),
+     ("acc_scale.x", 1.09, 1e-4, False), ("gyr_scale.z", 1.11, 0.02, True),
+     ("acc_bias.x", 5.1, 0.5, True), ("acc_bias.x", 5.1, 1.1, False),
+     ("acc_bias.z", -4.9, 0.01, False), ("gyr_bias.y", -0.51, 0.05, True)],
+)  # fmt: skip
+def test_a_value_that_no_sensor_has_is_none_unless_it_is_as_uncertain(
+    name: str, value: float, sigma: float, odd: bool
+) -> None:
+    """More than 10 %, half a g or 30 deg/s from nominal, and by five sigma."""
+    said = senseless([name], np.array([value]), np.array([sigma]), Nominal())
+    assert bool(said) == odd
+    if odd:
+        assert name in said[0] and "no sensor is that far off" in said[0]
+
+
 def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
     """Of four the fourth is counted."""
     assert elsewhere([]) == []

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+UNCHECKED = (
+    "not contradicted, and not confirmed: nothing is left to check these numbers"
+)
+"""Verdict about an estimate with as many parameters as means."""
+
+
 def show(
     calibration: Calibration,
     truth: Mapping[str, Any] | None = None,
@@ -68,7 +74,8 @@ def _tell(console: Console, calibration: Calibration) -> None:
     if not calibration.good:
         say(console, "", "verdict: BAD, do not use these numbers")
     elif "decision" not in calibration.info:  # which says more, below
-        say(console, "", "verdict: good")
+        checked = calibration.dof > 0 or not math.isfinite(calibration.chi2)
+        say(console, "", f"verdict: {'good' if checked else UNCHECKED}")
 
 
 def say(console: Console, mark: str, text: str) -> None:

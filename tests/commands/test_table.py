@@ -2,7 +2,31 @@
 
 from __future__ import annotations
 
-from fieldcal.commands.table import concealed_values
+import io
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+from calibrations import calibration
+
+from fieldcal.commands.table import concealed_values, show
+
+
+@pytest.mark.parametrize(
+    ("chi2", "dof", "good", "says"),
+    [(1.0, 1, True, "verdict: good"), (0.0, 0, True, "nothing is left to check these"),
+     (nan, 0, True, "verdict: good"), (9.0, 0, False, "verdict: BAD")],
+    ids=["checked", "as many parameters as means", "a closed form", "bad"],
+)  # fmt: skip
+def test_an_estimate_that_nothing_checks_is_not_called_good(
+    chi2: float, dof: int, good: bool, says: str
+) -> None:
+    found = calibration(np.random.default_rng(1), 0.0)
+    out = io.StringIO()
+    show(replace(found, chi2=chi2, dof=dof, good=good), out=out)
+    (verdict,) = [line for line in out.getvalue().splitlines() if "verdict" in line]
+    assert says in verdict
 
 
 def test_words_of_an_effect_are_no_values() -> None:

@@ -43,13 +43,17 @@ def moving(
         return None
     if not unbroken(block.t, first, last, rate):
         return None
-    rest = [np.nanmean(rows.y[rows.x.position == p, 3:], axis=0) for p in pair]
+    whole = (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
+    seen = [rows.y[rows.x.position == p, 3:] for p in pair]
+    if not all(np.isfinite(one).any(axis=0).all() for one in seen):
+        return whole  # nothing tells how they rest
+    rest = [np.nanmean(one, axis=0) for one in seen]
     total = np.vstack([np.zeros(3), np.cumsum(block.gyr[gap] - rest[1], axis=0)])
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
     at = np.flatnonzero((level > limit).any(axis=1))
     if not (len(at) and level.max() > CLEARLY * limit.min()):
-        return (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
+        return whole
     noise, each = rows.noise[3:], round(TOUCH_S * rate)
     before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
     after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]

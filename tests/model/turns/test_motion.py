@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +58,14 @@ def test_the_motion_is_found_with_some_time_around_it(size: float, bias: float) 
     start, end = found
     assert 2000 - MARGIN - 12 <= start <= 2000 - MARGIN + 1
     assert 2500 + MARGIN - 1 <= end <= 2500 + MARGIN + 12
+
+
+def test_beside_a_window_without_gyroscopes_all_of_the_way_is_motion() -> None:
+    """A device that sends on change has none where it rests; nothing warns of it."""
+    source, rows = recorded(turning(2000, 2500))
+    rows.y[rows.x.position == 1, 4] = np.nan
+    with warnings.catch_warnings(action="error"):
+        assert moving(source, rows, (0, 1), *GAP) == GAP
 
 
 def test_it_ends_where_the_windows_do() -> None:

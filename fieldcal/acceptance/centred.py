@@ -31,7 +31,7 @@ Device axes, SI.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import erf, log
+from math import e, erf, log, pi, sqrt
 
 import numpy as np
 
@@ -137,7 +137,7 @@ def centred_and_altered(block: Block, seen: Array) -> float:
     if not known.any(axis=0).all():
         return 1.0
     mean = np.abs(np.nanmean(block.acc, axis=0))
-    density = 1 / (np.sqrt(2 * np.pi * np.e) * np.maximum(np.abs(seen), 1e-300))
+    density = 1 / (sqrt(2 * pi * e) * np.maximum(np.abs(seen), 1e-300))
     x = max(float(np.minimum(2 * mean * density, 1.0).prod()), 1e-300)
     return min(x * (1 - log(x) + log(x) ** 2 / 2), 1.0)  # (3)
 

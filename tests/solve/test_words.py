@@ -59,7 +59,7 @@ def test_numbers_are_only_called_senseless_when_they_are_sure() -> None:
     values = np.array([1.4, 6.0, 0.05])
     sure = senseless(names, values, np.full(3, 1e-3), plain)
     assert [s.partition(" ")[0] for s in sure] == names
-    unsure = senseless(names[:2], values[:2], np.array([0.08, 0.5]), plain)
+    unsure = senseless(names[:2], values[:2], np.array([0.08, 1.3]), plain)
     assert unsure == []
     assert senseless(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain) == []
 

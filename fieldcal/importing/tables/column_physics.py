@@ -26,7 +26,7 @@ from fieldcal.importing.units.gravity_size import (
 from fieldcal.importing.units.rate_size import rate_in
 from fieldcal.importing.units.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting, gains
 from fieldcal.importing.units.time_units import step_of
-from fieldcal.importing.words.heading_words import counts
+from fieldcal.importing.words.heading_words import is_counter
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -74,7 +74,9 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     channels = dict(known)
     times = [i for i in _growing(table) if i not in known]
     if "t" not in channels.values():
-        clocks = [i for i in times if not (_counts(table[:, i]) or counts(names[i]))]
+        clocks = [
+            i for i in times if not (_counts(table[:, i]) or is_counter(names[i]))
+        ]
         if clocks:
             # a thermometer may only grow as well, but the time stands first
             channels[clocks[0]] = "t"

@@ -251,10 +251,10 @@ def words_of(name: str) -> list[str]:
     return [w.lower() for w in _WORD.findall(bare)]
 
 
-def counts(name: str) -> bool:
+def is_counter(name: str) -> bool:
     """Whether a name says that its column counts, so its numbers are no times.
 
-    >>> counts("Packet number"), counts("sample_time"), counts("")
+    >>> is_counter("Packet number"), is_counter("sample_time"), is_counter("")
     (True, False, False)
     """
     words = words_of(name)

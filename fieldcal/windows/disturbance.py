@@ -9,9 +9,10 @@ noise of module `quiet`, l_i a robust straight line through y.
 
 The line removes the slow drift of a device that warms up, which increases the error of
 the mean but is no disturbance. A step tilts the line and may not show in (1), but it
-does in (2), where such a drift does not. A vibration after which the device is where it
-was shows in the short-lag noise q of the cells, whose cube root is nearly normal
-(Wilson and Hilferty 1931). A channel may also be stuck at one value.
+does in (2), where y is without its drift if a line describes it better than a step. A
+vibration after which the device is where it was shows in the short-lag noise q of the
+cells, whose cube root is nearly normal (Wilson and Hilferty 1931). A channel may also
+be stuck at one value.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def pushes(about: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
 
 
 def steps(means: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
-    """Changes between neighbouring running means, (2)."""
+    """Changes between neighbouring running means of `means` (m, c), (2)."""
     levels = zip(running(means), np.sqrt(2.0) * noise.allan, strict=False)
     tests = []
     for k, (u, s) in enumerate(levels):

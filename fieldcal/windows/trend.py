@@ -29,6 +29,35 @@ def lines(values: Array, step: Array | None = None) -> Array:
     return np.concatenate([_line(section, step) for section in sections])
 
 
+def drift(values: Array, laid: Array) -> Array:
+    """What drifts, (m, c), of `values` (m, c) with the lines `laid` through them.
+
+    A drift and a step look alike to two means side by side. In each section the one
+    counts of which less remains: the line, or the two means before and after the
+    instant that parts them best. The course has no step where sections meet.
+    """
+    rates = []
+    sections = max(1, -(-len(values) // SECTION))
+    for part, line in zip(
+        np.array_split(values, sections), np.array_split(laid, sections), strict=True
+    ):
+        drifts = ((part - line) ** 2).sum(axis=0) < _beside_a_step(part)
+        rate = np.where(drifts, line[-1] - line[0], 0.0) / max(1, len(line) - 1)
+        rates.append(np.broadcast_to(rate, part.shape))
+    course: Array = np.cumsum(np.concatenate(rates), axis=0)
+    return course
+
+
+def _beside_a_step(values: Array) -> Array:
+    """Sum of squares (c,) about the two means that leave the least of it."""
+    about = values - values.mean(axis=0)
+    m, total = len(values), np.cumsum(about, axis=0)[:-1]
+    first = np.arange(1, m)[:, None]
+    between = total**2 * m / (first * (m - first))
+    left: Array = (about**2).sum(axis=0) - between.max(axis=0, initial=0.0)
+    return left
+
+
 def _line(values: Array, step: Array) -> Array:
     """A straight line (m, c) through `values` (m, c): Theil 1950, of medians."""
     m = len(values)

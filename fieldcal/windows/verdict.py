@@ -22,7 +22,7 @@ from fieldcal.windows.disturbance import (
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.quiet import QuietNoise, quiet
 from fieldcal.windows.rounding import most_scatter, of_mean
-from fieldcal.windows.trend import lines
+from fieldcal.windows.trend import drift, lines
 
 THRESHOLD, LONG = 5.8, 600
 """Departure over its spread that noise alone does not reach in a window of so many
@@ -146,7 +146,7 @@ def _tests(
     m = len(means)
     return [
         *pushes(means - laid, noise, least),
-        *steps(means, noise, least),
+        *steps(means - drift(means, laid), noise, least),
         *shakes(np.nan_to_num(cells.short[:m]), cells.steps[:m], least),
     ]
 

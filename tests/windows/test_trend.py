@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import theilslopes
 
-from fieldcal.windows.trend import lines
+from fieldcal.core.samples import Array
+from fieldcal.windows.trend import drift, lines
 
 
 @pytest.mark.parametrize("m", [24, 25, 100, 600])
@@ -76,3 +77,33 @@ def test_each_section_has_the_line_of_its_own_values() -> None:
     values = np.random.default_rng(8).normal(size=(3600, 2))
     parts = [lines(values[a : a + 1200]) for a in (0, 1200, 2400)]
     np.testing.assert_array_equal(lines(values), np.concatenate(parts))
+
+
+def about_two_means(y: Array) -> float:
+    """Least sum of squares about a mean before and one after, by trying every one."""
+    parts = [(y[:i], y[i:]) for i in range(1, len(y))]
+    return min(float(sum(((p - p.mean()) ** 2).sum() for p in two)) for two in parts)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_drift_is_what_a_line_describes_better_than_a_step(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(240, 20))
+    values += rng.uniform(0, 3, 20) * (np.arange(240)[:, None] - 119.5) / 240
+    values += rng.uniform(0, 3, 20) * (np.arange(240)[:, None] > rng.integers(240))
+    laid = lines(values)
+    found, drifts = drift(values, laid), 0
+    for y, line, course in zip(values.T, laid.T, found.T, strict=True):
+        slope = (line[-1] - line[0]) / 239
+        better = ((y - line) ** 2).sum() < about_two_means(y)
+        drifts += better
+        np.testing.assert_allclose(np.diff(course), slope * better, atol=1e-12)
+    assert 2 <= drifts <= 18
+
+
+def test_a_step_between_two_sections_is_no_drift() -> None:
+    values = np.random.default_rng(9).normal(size=(2400, 1))
+    values += 1e-2 * np.arange(2400)[:, None]
+    values[1200:] -= 20.0
+    course = drift(values, lines(values))
+    np.testing.assert_allclose(np.diff(course[:, 0]), 1e-2, atol=2e-4)

@@ -10,7 +10,7 @@ from fieldcal.windows import StillnessLimits, average
 from fieldcal.windows.cells import Cells, CellTable
 from fieldcal.windows.disturbance import Least, pushes, shakes, steps
 from fieldcal.windows.quiet import QuietNoise, quiet
-from fieldcal.windows.trend import lines
+from fieldcal.windows.trend import drift, lines
 from fieldcal.windows.verdict import Departure, Verdict, judge
 from windows.signals import HOME, UNIT, block_of, white
 
@@ -88,6 +88,20 @@ def test_a_drift_is_told_by_its_change_over_the_window() -> None:
     assert worst.ratio == pytest.approx(worst.size / (0.1 + 5.8 * longest))
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_device_that_warms_up_was_not_moved(seed: int) -> None:
+    """6 mm/s^2 in half a minute, where two means of 13 s differ by a tenth of that."""
+    rng = np.random.default_rng(seed)
+    x = 0.1 * rest(seed=seed)
+    x += rng.uniform(-0.6, 0.6, 6) * np.exp(-np.arange(3000)[:, None] / 36_000) / 0.08
+    assert verdict(x).worst.ratio < 1
+    x[1800:, 2] += 0.3
+    worst = verdict(x).worst
+    assert (worst.kind, worst.channel) == ("step", 2) and worst.ratio > 1
+    assert worst.at == pytest.approx(118.0, abs=1.6)
+    assert worst.size > 0
+
+
 def test_what_no_device_at_rest_does_is_told_by_the_limit() -> None:
     t = np.arange(3000)[:, None] / 100
     x = rest() + 40 * np.sin(2 * np.pi * 0.7 * t) * (np.arange(6) == 0)
@@ -154,7 +168,7 @@ def test_the_ratio_is_the_largest_departure_over_what_is_allowed(n: int) -> None
     least = Least(np.zeros(6), np.zeros(6), np.ones(6))
     tests = [
         *pushes(means - lines(means), noise, least),
-        *steps(means, noise, least),
+        *steps(means - drift(means, lines(means)), noise, least),
         *shakes(cells.short, cells.steps, least),
     ]
     bound = allowed(len(cells))

@@ -75,6 +75,17 @@ class Posterior:
         for one in list(search.visited.values()) if best.members else ():
             if one.score > best.score - KEPT:
                 search.vary(one)
+        self._one_more()
+
+    def _one_more(self) -> None:
+        """Visit the best set with each cause more that comes near.
+
+        A cause that is a little less likely there than not is not excluded: a drift
+        that nobody would name makes what a device starts with less certain.
+        """
+        for offer in self.search.offers(self.best):
+            if offer.score > self.best.score - OTHERWISE:
+                self.search.taken(self.best, offer)
 
     @staticmethod
     def names(some: Set) -> tuple[str, ...]:

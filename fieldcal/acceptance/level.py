@@ -8,6 +8,8 @@ not known.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fieldcal.acceptance.check import Check
@@ -23,6 +25,10 @@ DOUBTED = 0.01
 """Probability of what the positions show below which a stated level is not believed. A
 bias is off by half as many of its sigmas again as the tilt is of its own, and nothing
 is lost without the statement: the tilt is then estimated."""
+
+
+OTHER = {"angle_offset": "a base off", "base_tilt": "joints off"}
+"""What may be there beside the tilt of a result."""
 
 
 def tilt_is_found(found: Calibration) -> bool:
@@ -63,8 +69,16 @@ def check_level(found: Calibration, about: Description) -> list[Check]:
         )
         return [Check("level", False, says)]
     if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return []
+        return list(_beside(found))
     if level is None:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
+
+
+def _beside(found: Calibration) -> Iterator[Check]:
+    """What the result has of the other kind of tilt."""
+    kinds = [OTHER[group] for group in found.groups if group in OTHER]
+    if kinds and (off := found.info.get("beside_tilt_sigma_deg")):
+        says = f"each ± includes {kinds[0]} by 0 ± {off:.2g}° beside the tilt found"
+        yield Check("level", None, says)

@@ -33,6 +33,7 @@ from fieldcal.core.errors import FieldcalError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.samples import Array
 from fieldcal.evaluation.observations import angle_setting, observations, rests
+from fieldcal.model import priors
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
@@ -152,6 +153,7 @@ def _at(session: Session, seconds: float) -> tuple[Calibration, Calibration] | N
             seen,
             level_sigma_deg=about.level_deg,
             angle_sigma_deg=angle_setting(about),
+            beside_tilt_sigma_deg=priors.BESIDE_TILT_DEG,
             factory=factory_errors(about),
         )
         level = None if about.level_deg is None else EXACT_DEG

@@ -41,7 +41,7 @@ from fieldcal.evaluation.rounding_mode import (
     rounding_mode,
     with_rounding,
 )
-from fieldcal.model import thresholds
+from fieldcal.model import priors, thresholds
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
@@ -206,6 +206,7 @@ def solved_as(
         asked["level_sigma_deg"] = about.level_deg
     if asked.get("angle_sigma_deg") is None:
         asked["angle_sigma_deg"] = angle_setting(about)
+    asked.setdefault("beside_tilt_sigma_deg", priors.BESIDE_TILT_DEG)
     device = replace(about, **(left or {}))
     asked["factory"] = factory_errors(device)
     printed = bool(asked.get("as_printed"))

@@ -59,6 +59,11 @@ MOST_WAVES = 80
 """Cosines of a walk or of flicker at most: one for some seconds of a session of
 minutes. What they leave of what is far above the noise is as good as white."""
 
+BESIDE_TILT_DEG = 0.05
+"""What a base is off by beside joints that are, and joints beside a base, deg: one of
+them may explain the positions, and the other one is there as well. A bubble level shows
+no less."""
+
 MISSET_DEG = 3.0
 """Typical error of a position whose angle is not the stated one, deg."""
 

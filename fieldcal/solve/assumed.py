@@ -32,6 +32,8 @@ class Asked:
     level_deg, heading_deg : how level the base is, how well z points north; None where
         nobody said
     angles_deg : how well each position's angles are set
+    beside_tilt_deg : how large a tilt of the base may be beside the offsets of joints
+        that explain the positions, and the other way round
     lot : what the unit's lot says of it; None where it is not asked
     factory : what the factory left of errors that are not estimated
     at_best : the same by the grade that the device is called, where biases show a
@@ -46,6 +48,7 @@ class Asked:
     level_deg: float | None = None
     heading_deg: float | None = None
     angles_deg: float = 0.0
+    beside_tilt_deg: float = 0.0
     lot: LotPrior | None = None
     factory: FactoryErrors = FactoryErrors()
     at_best: FactoryErrors | None = None
@@ -59,6 +62,7 @@ class Asked:
         if self.lot is not None and self.as_printed:
             raise InputError("printed formulas know of no lot: leave one of them out")
         _refuse_none((self.level_deg, self.heading_deg, self.angles_deg))
+        _refuse_none((self.beside_tilt_deg,))
 
     def method_for(self, observations: Observations) -> Method:
         """The method that suits the positions, or the one that is asked for.

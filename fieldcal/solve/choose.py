@@ -60,6 +60,7 @@ def solve(
     level_sigma_deg: float | None = None,
     heading_sigma_deg: float | None = None,
     angle_sigma_deg: float = 0.0,
+    beside_tilt_sigma_deg: float = 0.0,
     recorded: Recorded | None = None,
     lot: LotPrior | None = None,
     factory: FactoryErrors | None = None,
@@ -80,6 +81,8 @@ def solve(
     heading_sigma_deg : how well z points north; not known for tactical grade if None
     angle_sigma_deg : how well the angles of each position are set, about each level
         axis
+    beside_tilt_sigma_deg : how large a tilt of the base may be beside offsets of the
+        joints, and the other way round, where "auto" takes one of them
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
     factory : what the factory left of errors that are not estimated; nothing if None
@@ -105,7 +108,7 @@ def solve(
     """
     asked = Asked(
         method, tilt, cross, as_printed,
-        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, lot,
+        level_sigma_deg, heading_sigma_deg, angle_sigma_deg, beside_tilt_sigma_deg, lot,
         factory or FactoryErrors(), at_best,
     )  # fmt: skip
     if as_printed:
@@ -212,6 +215,11 @@ class _Session:
             return self._with(tilt, level), []
         return self._by_tilt()
 
+    @property
+    def _beside(self) -> float:
+        """How large the other kind of tilt may be; nothing where one is asked for."""
+        return self.asked.beside_tilt_deg if self.asked.tilt == "auto" else 0.0
+
     def _with(
         self, tilt: Tilt, level: float | None = None, follow: bool = True
     ) -> Estimated:
@@ -229,6 +237,7 @@ class _Session:
             gyro_cross=table or turned,
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
+            beside_tilt_deg=0.0 if level else self._beside,
             angles_deg=self.asked.angles_deg,
             factory=self.asked.factory,
             earth=self.unknown,

@@ -45,6 +45,7 @@ class Wanted:
     cross, gyro_cross : cross-coupling of the accelerometers, of the gyroscopes
     gyr_scale : whether the scale factor of the gyroscopes is
     level_deg : how level the base is, about each level axis; None if it is not stated
+    beside_tilt_deg : how large the other kind of tilt may be beside it
     angles_deg : how well each angle is set
     factory : what the factory left of errors, where they are not estimated
     earth : (3,) rad/s, what is not known of the Earth's rate in base axes
@@ -58,6 +59,7 @@ class Wanted:
     gyro_cross: bool = False
     gyr_scale: bool = False
     level_deg: float | None = None
+    beside_tilt_deg: float = 0.0
     angles_deg: float = 0.0
     factory: FactoryErrors = FactoryErrors()
     earth: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -104,8 +106,6 @@ class Given(Dictionary):
             rows.x, rows.used, since, common, unit, turns, wander, rows.alike
         )
         has = {group_of(n) for n in self.names}
-        if has & set(TILTS):
-            has |= set(TILTS)
         self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
         self.left_out = self._left_out()
 
@@ -151,6 +151,9 @@ class Given(Dictionary):
         w, oriented = self.wanted, bool(self.x.oriented.any())
         if w.tilt != "none" and oriented:
             yield self._estimated(w.tilt, known=w.level_deg)
+            if w.beside_tilt_deg:
+                (other,) = set(TILTS) - {w.tilt}
+                yield self._estimated(other, known=w.beside_tilt_deg)
         if w.cross:
             yield self._estimated("cross_coupling", turned=not oriented)
         left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))

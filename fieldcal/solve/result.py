@@ -165,6 +165,8 @@ def _info(
         out["left_out_rms"] = found.acc.left_out
     if found.given.wanted.level_deg:
         out["level_sigma_deg"] = found.given.wanted.level_deg
+    if wanted.tilt != "none" and wanted.beside_tilt_deg:
+        out["beside_tilt_sigma_deg"] = wanted.beside_tilt_deg
     if observations.has_gyr:
         gyr = found.gyr
         out["gyroscopes"] = {

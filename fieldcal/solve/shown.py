@@ -24,6 +24,7 @@ from itertools import combinations
 
 import numpy as np
 
+from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
@@ -93,8 +94,11 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     """
     total: dict[frozenset[Group], float] = {}
     own: dict[Group, Cause] = {}
+    tilts = set(TILTS) if has & set(TILTS) else set[str]()
     for one in shown:
-        kept = [m for m in one.members if _adds(m, has)]
+        # one tilt stands for the other, where there are not both
+        both = tilts <= {cause.name for cause, _ in one.members}
+        kept = [m for m in one.members if _adds(m, has if both else has | tilts)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability

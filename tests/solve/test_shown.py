@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from observed import BIAS, SCALE, observe, outputs
 
+from fieldcal.calibration.names import TILTS
 from fieldcal.core.positions import SIX_FACES, Position
 from fieldcal.model.causes.effect_causes import of_effects
 from fieldcal.model.causes.random_causes import of_chance
@@ -123,6 +124,16 @@ def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None
         rows.rows, np.ones(6), rows.since, False, Wanted("angle_offset"), shown
     )
     assert not same.explanations[0].members
+
+
+def test_a_tilt_is_carried_beside_the_other_one_where_both_are_shown() -> None:
+    d, rows = given(), recording()
+    both = {c.name: (c, c.variants[0]) for c in of_effects(d) if c.name in TILTS}
+    for names, carried in ((TILTS, ["base_tilt"]), (("base_tilt",), [])):
+        shown = [Shown(tuple(both[name] for name in names), 1.0)]
+        wanted = Wanted("angle_offset")
+        found = Given(rows.rows, np.ones(6), rows.since, False, wanted, shown)
+        assert [c.name for c, _ in found.explanations[0].members] == carried
 
 
 def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:

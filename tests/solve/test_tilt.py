@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from closed_circle import a_third
-from observed import GYR_BIAS, OMEGA, carried, observe, outputs
+from observed import BIAS, GYR_BIAS, OMEGA, carried, observe, outputs
 
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE, SIX_FACES, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 
@@ -96,3 +96,29 @@ def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> N
         bias, sigma = found.vector("gyr_bias")
         pulls.append((bias - GYR_BIAS)[[0, 2]] / sigma[[0, 2]])
     assert np.std(pulls) == pytest.approx(1, abs=0.2)
+
+
+def test_joints_are_off_and_the_base_is_not_level_either() -> None:
+    """Two faces with the axis of the joints level would know a bias to their noise."""
+    rng = np.random.default_rng(8)
+    pulls: dict[float, list[Array]] = {0.0: [], 0.05: []}
+    for _ in range(40):
+        offset, base = (rng.normal(0, s, 2).tolist() for s in (0.5, 0.05))
+        acc = outputs(SIX_FACES, offset_deg=offset, base_deg=base)
+        seen = observe(SIX_FACES, acc + 1e-3 * rng.standard_normal(acc.shape))
+        for beside, found in pulls.items():
+            one = solve(seen, beside_tilt_sigma_deg=beside)
+            value, sigma = one.vector("acc_bias")
+            found.append((value - BIAS) / sigma)
+            assert one.info.get("beside_tilt_sigma_deg", 0.0) == beside
+    rms = {beside: np.sqrt(np.mean(np.square(p))) for beside, p in pulls.items()}
+    assert rms[0.0] > 1.4
+    assert 0.7 < rms[0.05] < 1.3
+
+
+def test_a_kind_of_tilt_that_is_asked_for_is_the_only_one() -> None:
+    seen = observe(SIX_FACES, outputs(SIX_FACES, offset_deg=(0.3, -0.2)))
+    alone = solve(seen, tilt="angle_offset")
+    asked = solve(seen, tilt="angle_offset", beside_tilt_sigma_deg=0.05)
+    np.testing.assert_array_equal(asked.covariance, alone.covariance)
+    assert "beside_tilt_sigma_deg" not in asked.info

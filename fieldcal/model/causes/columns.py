@@ -64,13 +64,15 @@ class RowView:
 class Course:
     """A function of the row alone, (n, m), on every channel: 6 m columns.
 
-    `timed` says that it is known on the way between windows as well.
+    `timed` says that it is known on the way between windows as well, `standing` that it
+    is there while an output of the gyroscopes stands on its value of the windows.
     """
 
     name: str
     of: Callable[[RowView], Array]
     width: int
     timed: bool = False
+    standing: bool = False
 
 
 @dataclass(frozen=True, slots=True)

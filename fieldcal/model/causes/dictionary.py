@@ -23,7 +23,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General
+from fieldcal.model.causes.columns import Course, General
 from fieldcal.model.causes.effect_causes import at_points, of_effects
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known import KnownRows
@@ -267,10 +267,11 @@ class Dictionary(ColumnTable):
             yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed=1.0)
 
     def _alike(self, sizes: Array | None) -> Iterator[Group]:
-        """What rounding makes of all windows; on the way it averages out."""
+        """What rounding makes of all windows; where outputs change it averages out."""
         if sizes is None or not len(some := np.flatnonzero(sizes)):
             return
-        at = self.course("rounding", lambda x: np.ones((len(x.t), 1)), 1, False)
+        even = Course("rounding", lambda v: np.ones((len(v.x.t), 1)), 1, standing=True)
+        at = self.add(even, 6)
         yield Group("rounding", "", at + some, sizes[some], fixed=1.0, random=True)
 
     def _is_free(self, p: int) -> bool:

@@ -24,13 +24,13 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Channel
 
 def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
     """Deviation that rounding alone makes, from the least change, (6,)."""
-    return least(np.concatenate(_steps(block, windows)))
+    return least(np.concatenate(steps_in(block, windows)))
 
 
 def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
     """How far off the mean of each window may be for outputs rounded, (w, 6)."""
     off = []
-    steps = _steps(block, windows)
+    steps = steps_in(block, windows)
     for step, pieces in zip(steps, _pieces(block, windows), strict=True):
         differences = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
         off.append(np.maximum(of_mean(step, differences), of_few(step, differences)))
@@ -45,7 +45,7 @@ def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array
     noise does not reach across a step.
     """
     out = np.zeros(6)
-    step = _steps(block, windows)[1]
+    step = steps_in(block, windows)[1]
     _, pieces = _pieces(block, windows)
     mean = np.array([_mean_of_known(piece) for piece in pieces])
     sampled = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
@@ -69,8 +69,8 @@ def _mean_of_known(piece: Array) -> Array:
     return mean
 
 
-def _steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Steps of both triads; where nothing changes in any window, those on the way."""
+def steps_in(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Steps of both triads, (3,) each; of what stands in all windows, as on the way."""
     held = np.concatenate([steps_of(p) for p in _pieces(block, windows)])
     if not (held > 0).all():
         held = np.where(held > 0, held, grids_of(block))

@@ -57,12 +57,13 @@ class _Meeting:
         self.index.append(index)
         self.closing.append(np.zeros((3, len(index))))
 
-    def course(self, first: int, table: Array) -> None:
-        """A function of the row (m + 1, j) on each gyroscope."""
+    def course(self, first: int, table: Array, share: Array | None = None) -> None:
+        """A function of the row (m + 1, j) on each gyroscope, or some share of it."""
         width = table.shape[1]
-        for c in (3, 4, 5):
-            self.index.append(first + c * width + np.arange(width))
-            self.closing.append(self.weights[:, :, c - 3] @ table)
+        for c in range(3):
+            weight = self.weights[:, :, c] * (1.0 if share is None else share[:, c])
+            self.index.append(first + (3 + c) * width + np.arange(width))
+            self.closing.append(weight @ table)
 
     def general_form(self, index: Index, table: Array, bent: Array) -> None:
         """Columns (m + 1, 6, k) of any form, and what they bend at the ends, (3, k)."""
@@ -108,6 +109,11 @@ def met_columns(
                     found, np.split(one.of(every), cut), strict=True
                 ):
                     some.course(first, course)
+            elif one.standing:
+                for some in found:
+                    if some.turn.stands is not None:
+                        even = np.ones((len(some.view.x), 1))
+                        some.course(first, even, some.turn.stands)
             continue
         for some, (columns, table, bent) in zip(
             found, _general(first, one, found, every, cut, at_ends), strict=True

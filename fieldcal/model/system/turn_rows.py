@@ -144,12 +144,12 @@ class Turns:
         _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
         index, close, general = met.index, met.closing, met.general
         loose = dict(self._loose_ends(turn)) if d.free.any() else {}
-        ends: Array = np.zeros((3, 3))
+        ends: Array = np.zeros((3, 3)) if turn.rounded is None else turn.rounded
         for p, bent in loose.items():
             # the force there is the one that is read, which the state may not meet
             seen = seen - bent @ self.off[p]
             close = close - bent @ self.means[p][:, index]
-            ends += bent @ self._unsure(p) @ bent.T
+            ends = ends + bent @ self._unsure(p) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))

@@ -35,6 +35,7 @@ from fieldcal.model.turns.attitude import (
 )
 from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
 from fieldcal.model.turns.motion import moving
+from fieldcal.model.turns.rounded import standing
 from fieldcal.model.turns.tremor import at_ends
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
@@ -69,6 +70,9 @@ class Turn:
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
     blur : rad, what sampling leaves open of the closure, and swaying at its ends
     interval : s between samples
+    stands : (m + 1, 3) share of the time about the edges in which gyroscopes stand on
+        their values of the windows; only if those are off by the same in all windows
+    rounded : (3, 3) rad^2, covariance that rounding elsewhere leaves in the closure
 
     """
 
@@ -83,6 +87,8 @@ class Turn:
     sd: Array
     blur: float
     interval: float
+    stands: Array | None = None
+    rounded: Array | None = None
 
     @property
     def t(self) -> Array:
@@ -156,6 +162,7 @@ class Turning:
         self.legs = list(self._found())
         windows = spans(source.block, source.about)
         self.sways = {pair: at_ends(source, windows[[*pair]]) for pair, *_ in self.legs}
+        self.standing = standing(source.block, windows, rows.alike[3:])
         self.contradicted: list[tuple[int, int]] = []
 
     def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
@@ -212,10 +219,18 @@ class Turning:
         cut = steps.cut
         acc = trapezoid_means(steps.t, self.source.block.acc[samples], steps.edge[cut])
         sd = self.rows.noise[:3] / np.sqrt(np.diff(steps.edge[cut]))[:, None]
-        return Turn(
+        turn = Turn(
             pair, ends, x, felt, way.attitude, way.done, cut, acc, sd, unsure,
             1 / self.source.rate,
         )  # fmt: skip
+        if self.standing is None:
+            return turn
+        gyr, edge = self.source.block.gyr[samples], steps.edge
+        return replace(
+            turn,
+            stands=self.standing.share(gyr, edge),
+            rounded=self.standing.apart(steps.t, gyr, scale, edge, way.attitude),
+        )
 
     def after(self, t: Array, q: int) -> Array:
         """Time since the turn at some instants, by origin: before the arrival none."""

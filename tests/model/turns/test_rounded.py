@@ -1,0 +1,118 @@
+"""Rounding on the way, against rates that are known, rounded and summed sample by
+sample."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.model.turns.rounded import Standing, standing
+
+STEP, RATE, N, EACH = 0.02, 100.0, 400, 2
+SCALE = np.array([1.0, 1.02, 0.98])
+EDGE = np.arange(0, N, EACH)
+
+
+class Drawn(NamedTuple):
+    """One turn.
+
+    Attributes
+    ----------
+    gyr : (n, 3) rounded rates
+    attitude : (m + 1, 3, 3) at the edges, from device axes at the start
+    off : (3,) rad/s, what rounding makes of the means at rest
+    closure : (3,) rad, what it makes of the turn
+
+    """
+
+    gyr: Array
+    attitude: Array
+    off: Array
+    closure: Array
+
+
+def drawn(rng: np.random.Generator) -> Drawn:
+    """About x by 90 to 150 degrees, about y to and fro by few steps, not about z."""
+    t, bias = np.arange(N) / RATE, rng.uniform(-0.5, 0.5, 3) * STEP
+    w = np.zeros((N, 3))
+    w[:, 0] = rng.uniform(1.6, 2.6) * np.sin(np.pi * t / t[-1]) ** 2
+    w[:, 1] = 3 * STEP * np.sin(2 * np.pi * t / t[-1] + rng.uniform(0, 6))
+    w *= (t > 0.5)[:, None] & (t < t[-1] - 0.5)[:, None]
+    ahead = [Rotation.identity()]
+    for step in w[:-1] / RATE:
+        ahead.append(Rotation.from_rotvec(-step) * ahead[-1])
+    plain = w * SCALE + bias
+    gyr = STEP * np.round(plain / STEP)
+    back = np.array([r.inv().as_matrix() for r in ahead])
+    closure = np.einsum("nij,nj->i", back, (gyr - plain) / SCALE) / RATE
+    off = STEP * np.round(bias / STEP) - bias
+    attitude = np.array([r.as_matrix() for r in ahead])[EDGE]
+    return Drawn(gyr, attitude, off, closure)
+
+
+def stands(variance: float = STEP**2 / 12) -> Standing:
+    return Standing(np.zeros(3), np.full(3, STEP), np.full(3, variance))
+
+
+def test_what_rounding_makes_of_a_turn_is_as_large_as_is_said() -> None:
+    rng, pulls, alone = np.random.default_rng(5), [], []
+    for _ in range(300):
+        one = drawn(rng)
+        share = stands().share(one.gyr, EDGE)
+        shared = np.einsum("mci,mc,c->i", one.attitude, share, one.off / SCALE)
+        t = np.arange(N) / RATE
+        covariance = stands().apart(t, one.gyr, SCALE, EDGE, one.attitude)
+        left = one.closure - shared * EACH / RATE
+        pulls.append(left @ np.linalg.solve(covariance, left) / 3)
+        alone.append(one.closure @ np.linalg.solve(covariance, one.closure) / 3)
+    assert 0.7 < np.mean(pulls) < 1.5
+    assert np.mean(alone) > 20.0, "what is as in the windows is the most of it"
+
+
+def test_an_axis_that_is_not_turned_stands_and_one_that_is_does_not() -> None:
+    one = drawn(np.random.default_rng(1))
+    share = stands().share(one.gyr, EDGE)
+    assert share.shape == (len(EDGE), 3) and (share >= 0).all() and (share <= 1).all()
+    np.testing.assert_array_equal(share[:, 2], 1.0)
+    middle = (EDGE > 100) & (EDGE < 300)
+    assert not share[middle, 0].any()
+    assert 0.1 < share[middle, 1].mean() < 0.9
+
+
+def block(noise: float) -> tuple[Block, NDArray[np.intp]]:
+    rng = np.random.default_rng(3)
+    rates = 0.3 * STEP * np.array([1.0, -1.0, 0.5]) + noise * rng.normal(size=(1200, 3))
+    rates[400:500] += rng.uniform(0, 1, (100, 3))
+    acc = np.tile([0.0, 0.0, 9.8], (1200, 1)) + 0.01 * rng.normal(size=(1200, 3))
+    rounded = STEP * np.round(rates / STEP)
+    windows = np.array([[0, 390], [510, 800], [810, 1190]], dtype=np.intp)
+    return Block.of(np.arange(1200) / RATE, acc, rounded), windows
+
+
+def test_a_gyroscope_stands_where_its_noise_reaches_across_no_step() -> None:
+    found = standing(*block(0.02 * STEP), np.full(3, STEP / 12**0.5))
+    assert found is not None
+    np.testing.assert_array_equal(found.value, 0.0)
+    np.testing.assert_allclose(found.step, STEP)
+    np.testing.assert_allclose(found.variance, STEP**2 / 12)
+
+
+@pytest.mark.parametrize("alike", [(0.0, 0.0, 0.0), (0.0, 1e-3, 0.0)])
+def test_what_windows_do_not_share_is_not_met_again(
+    alike: tuple[float, float, float],
+) -> None:
+    found = standing(*block(0.02 * STEP), np.array(alike))
+    if not any(alike):
+        assert found is None
+        return
+    assert found is not None
+    assert (found.step > 0).tolist() == [False, True, False]
+    gyr = np.zeros((40, 3))
+    assert found.share(gyr, np.arange(0, 40, 2)).any(axis=0).tolist() == [
+        False, True, False,
+    ]  # fmt: skip

@@ -6,7 +6,8 @@ f' is the specific force at the angles asked for, with the tilt that was estimat
 position whose angles are not known only the norm says something: r = |M^-1 (<U> - b)| -
 g. Gyroscopes of tactical grade: r = <W> - b - A w, w the Earth's rate with its level
 part as these windows show it, because north is not known. What a result counts with and
-does not contain, errors of set angles and cross-coupling, is in r. m/s^2 and rad/s.
+does not contain, such as errors of set angles, a base beside its joints and
+cross-coupling, is in r. m/s^2 and rad/s.
 """
 
 from __future__ import annotations

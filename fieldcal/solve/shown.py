@@ -94,11 +94,11 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     """
     total: dict[frozenset[Group], float] = {}
     own: dict[Group, Cause] = {}
-    tilts = set(TILTS) if has & set(TILTS) else set[str]()
+    unseen = _unseen_tilts(shown, has)
     for one in shown:
         # one tilt stands for the other, where there are not both
-        both = tilts <= {cause.name for cause, _ in one.members}
-        kept = [m for m in one.members if _adds(m, has if both else has | tilts)]
+        both = bool(has & unseen) and unseen <= {cause.name for cause, _ in one.members}
+        kept = [m for m in one.members if _adds(m, has if both else has | unseen)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability
@@ -119,6 +119,22 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
         maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})
         out[same] = Shown(members, before + p / sum(likely.values()), maybe)
     return tuple(sorted(out.values(), key=lambda s: -s.probability))
+
+
+def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
+    """Tilts that a set does without: all if it has one, otherwise unlikely ones.
+
+    Of positions that do not show the tilt it is stated how level the base is, or it is
+    said that nobody did.
+    """
+    if has & set(TILTS):
+        return set(TILTS)
+    share = {
+        name: sum(one.probability for one in shown
+                  if any(cause.name == name for cause, _ in one.members))
+        for name in TILTS
+    }  # fmt: skip
+    return {name for name, p in share.items() if p < thresholds.NAMED}
 
 
 def _adds(member: Member, has: set[str]) -> bool:

@@ -72,7 +72,7 @@ def restarted(
             wait(process, lambda: len(events(session, "asked")) == 2)
             order(control, fault={"reboot_s": 3.0})
             printed, _ = process.communicate()
-        assert process.returncode == 0
+        assert process.returncode == 0, json.loads(printed)["decision"]["reasons"]
         conceals = json.loads(truth.read_text())
         yield session, url, control, {**conceals, "result": json.loads(printed)}
 

@@ -46,7 +46,7 @@ def unquantised(packed: dict[str, str]) -> Array:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = five_positions(tmp_path_factory.mktemp("report") / "bench-7")
-    given = ["--angles", "0.001", "--squareness", "1e-5"]
+    given = ["--angles=0.001", "--squareness=1e-5", "--tilt=angle_offset"]
     assert main(["solve", str(folder), *given]) == 0
     return folder
 

@@ -30,7 +30,7 @@ def fit(**known: Any) -> SimpleNamespace:
 def estimated(**known: Any) -> Estimated:
     """An estimate of which only what is asked for is known."""
     wanted = SimpleNamespace(
-        turned=False, gyr_scale=True, level_deg=None, cross=False,
+        turned=False, gyr_scale=True, level_deg=None, cross=False, tilt="none",
         factory=FactoryErrors(),
     )  # fmt: skip
     given = SimpleNamespace(

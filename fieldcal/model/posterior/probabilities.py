@@ -81,10 +81,13 @@ class Posterior:
         """Visit the best set with each cause more that comes near.
 
         A cause that is a little less likely there than not is not excluded: a drift
-        that nobody would name makes what a device starts with less certain.
+        that nobody would name makes what a device starts with less certain. What no
+        row tells from the calibration is left to what is stated.
         """
+        shown = self.search.shown_by(self.best)
         for offer in self.search.offers(self.best):
-            if offer.score > self.best.score - OTHERWISE:
+            near = offer.score > self.best.score - OTHERWISE
+            if near and shown(offer.member[1]):
                 self.search.taken(self.best, offer)
 
     @staticmethod

@@ -7,14 +7,14 @@ other triad's stays, which nothing has explained.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE
+from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.smooth import WAVES
 from fieldcal.model.evidence.gram import Eliminated, Gram, Weighed, gains
@@ -249,6 +249,27 @@ class Offers(Sets):
                 wide[some] = group.sizes(float(priors.SIZES[EVEN]))
                 cost += float(DENSITY[EVEN] - DENSITY[size])
         return wide, cost
+
+    def shown_by(self, there: Set) -> Callable[[Group], bool]:
+        """Whether rows show a group beside a set, whatever the calibration is.
+
+        Of two positions everything looks like bias and scale factor, and what these
+        usually are would tell what is there.
+        """
+        wide, first = there.state.sizes.copy(), 0
+        for group in self.dictionary.always:
+            some = slice(first, first := first + len(group.columns))
+            if group.in_state and group.fixed is None:
+                wide[some] = group.sizes(priors.FREE)
+        free = Eliminated.of(there.state.rows, there.state.columns, wide)
+
+        def shown(group: Group) -> bool:
+            at, typical = group.columns, group.typical
+            own = np.diag(free.rows.matrix(at, at)) * typical**2
+            found = gains(*free.rest(at, typical), float(own.max()))
+            return bool(found.max() >= LEAST)
+
+        return shown
 
     def _seen(self, less: Less) -> Seen:
         """What the rows say of every column at one instability."""

@@ -267,7 +267,7 @@ def test_a_cause_that_is_not_excluded_counts_though_the_search_left_it_out() -> 
     """All that come near are tried here, one after the other."""
     session, near = Session.of(ladder(), KEYS), 3.4
     near_ones = []
-    for seed in range(40):
+    for seed in range(20):
         rng = np.random.default_rng(seed)
         off = session.noise(rng)
         for cause in session.dictionary.causes:
@@ -286,4 +286,17 @@ def test_a_cause_that_is_not_excluded_counts_though_the_search_left_it_out() -> 
             if more.score > best.score - near:
                 near_ones.append(more.keys in counts)
     # beside sizes that fit it, a few are nearer than foretold
-    assert len(near_ones) > 15 and np.mean(near_ones) > 0.9
+    assert len(near_ones) > 8 and np.mean(near_ones) > 0.9
+
+
+def test_what_no_row_tells_from_the_calibration_is_not_shown() -> None:
+    """Gravity is the three scale factors; their usual size alone would tell of it."""
+    session = Session.of(ladder(), ("gravity_error", "bias_drift:acc"))
+    causes = {c.key: c for c in session.dictionary.causes}
+    there = {key: causes[key].variants[0] for key in causes}
+    off = session.noise(np.random.default_rng(2), np.zeros(7))
+    for group, size in ((there["gravity_error"], 5.0), (there["bias_drift:acc"], 1.0)):
+        off += session.design[:, :, group.columns] @ (size * group.typical)
+    search = session.search(off)
+    shown = search.shown_by(search.evaluated(()))
+    assert not shown(there["gravity_error"]) and shown(there["bias_drift:acc"])

@@ -61,7 +61,7 @@ def stands(variance: float = STEP**2 / 12) -> Standing:
 
 def test_what_rounding_makes_of_a_turn_is_as_large_as_is_said() -> None:
     rng, pulls, alone = np.random.default_rng(5), [], []
-    for _ in range(300):
+    for _ in range(120):
         one = drawn(rng)
         share = stands().share(one.gyr, EDGE)
         shared = np.einsum("mci,mc,c->i", one.attitude, share, one.off / SCALE)

@@ -118,6 +118,17 @@ class Explanation:
         """Causes that are likelier there than not."""
         return tuple(self.posterior.standing())
 
+    @cached_property
+    def lost_ways(self) -> tuple[tuple[int, int], ...]:
+        """Windows between which the gyroscopes did not follow, likelier than not."""
+        share: dict[tuple[int, ...], float] = {}
+        for some, p in self.posterior.weights:
+            for cause, group in some.members:
+                if cause.kind == "noise" and group.together:
+                    share[group.together] = share.get(group.together, 0.0) + p
+        return tuple((pair[0], pair[1]) for pair, p in sorted(share.items())
+                     if p >= thresholds.NAMED)  # fmt: skip
+
     @property
     def undecided(self) -> bool:
         """Whether something is there, likelier than not, and no cause likely enough."""

@@ -36,6 +36,9 @@ class ColumnTable:
 
     """
 
+    turns = False
+    """Whether the ways between windows were recorded."""
+
     def __init__(
         self,
         x: Experience,

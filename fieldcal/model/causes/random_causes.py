@@ -14,6 +14,7 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
+from fieldcal.model.causes.lost_way import lost_ways
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -30,6 +31,8 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     if (leans := leaning(table)) is not None:
         yield Cause(leans.cause, leans.part, priors.LEANS, (leans,), "noise")
+    if table.turns:
+        yield from lost_ways(table)
     if len(table.held) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
 

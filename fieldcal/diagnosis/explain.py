@@ -16,6 +16,7 @@ from fieldcal.diagnosis.factory_left import as_good_as_shown, left_by_factory
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.causes.sinking import NAME as SINKING
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
@@ -128,6 +129,11 @@ class Explanation:
                     share[group.together] = share.get(group.together, 0.0) + p
         return tuple((pair[0], pair[1]) for pair, p in sorted(share.items())
                      if p >= thresholds.NAMED)  # fmt: skip
+
+    @property
+    def sinks(self) -> bool:
+        """Whether the base turned while it was used, likelier than not."""
+        return self.posterior.probability([SINKING]) >= thresholds.NAMED
 
     @property
     def undecided(self) -> bool:

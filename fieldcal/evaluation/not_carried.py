@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fieldcal.calibration import Calibration
+from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import calibrated
@@ -129,6 +130,8 @@ def _carries(calibration: Calibration, standing: Standing) -> bool:
     if effect is None or isinstance(effect, Scatter):
         return True
     carrying = {standing.name, *standing.aliases, effect.carried_by}
+    if standing.name in TILTS and "beside_tilt_sigma_deg" in calibration.info:
+        carrying |= {*TILTS}  # the one that fits, with some of the other one
     with_it = calibration.info.get("carried", {}).get("causes", {})
     return bool(carrying & {*calibration.groups, *with_it})
 

@@ -21,7 +21,7 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.diagnosis.wording.paragraph import not_followed
+from fieldcal.diagnosis.wording.paragraph import of_the_setup
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
@@ -214,8 +214,8 @@ def solved_as(
     shown = None if printed else laid.explanation
     notes = [] if printed else laid.unexamined
     recorded = None if printed else laid.recorded(turns != "no", shown)
-    if shown is not None and turns != "no":
-        notes = [*notes, *not_followed(shown)]
+    if shown is not None:
+        notes = [*notes, *of_the_setup(shown)]
     found = solve(laid.observations, recorded=recorded, **asked)
     angles, note = _as_shown(asked, shown, found)
     others = angles > thresholds.NO_ANGLE

@@ -75,6 +75,10 @@ LEANS, LEANS_RAD = 0.1, 2e-4
 """Chance that what a device lies on gives way while it rests, and by how much, rad:
 tyres, foam and grass do, by tenths of a milliradian in a minute."""
 
+SINKS, SINKS_RAD = 0.02, 5e-4
+"""Chance that the base of a fixture turns while it is used, and by how much, rad: a
+tripod on soil or a table that bends."""
+
 LOST_WAY, LOST_RAD = 0.02, 0.03
 """Chance that the gyroscopes did not follow one of the turns, and the angle that they
 missed, rad: a tenth of a second of a turn by hand."""

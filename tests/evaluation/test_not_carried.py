@@ -9,12 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from observed import observe, outputs
 from session_folders import SITE, places, recorded, write_session
 
+from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
-from fieldcal.evaluation import solution
+from fieldcal.core.positions import SIX_FACES
+from fieldcal.evaluation import not_carried, solution
+from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import effect
+from fieldcal.solve import solve
 
 FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 WIDE = [*FACES, (45.0, 0.0), (-45.0, 0.0), (0.0, 45.0), (45.0, 35.0)]
@@ -279,3 +284,13 @@ def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
             found = np.array(said["parameters"]["acc_scale"]["value"])
             assert (np.abs(found - truth) < 2 * sigma).all()
     assert verdicts == {"said": "ambiguous", "unsaid": "consistent"}
+
+
+def test_a_tilt_that_a_result_has_some_of_beside_the_other_is_carried() -> None:
+    seen = observe(SIX_FACES, outputs(SIX_FACES, base_deg=(0.6, -0.4)))
+    both = solve(seen, beside_tilt_sigma_deg=0.05)
+    only = solve(seen, tilt="base_tilt", beside_tilt_sigma_deg=0.05)
+    for name in TILTS:
+        shown = Standing(name, (), 0.99, ())
+        assert not_carried._carries(both, shown)
+        assert not_carried._carries(only, shown) == (name == "base_tilt")

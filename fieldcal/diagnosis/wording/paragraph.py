@@ -190,16 +190,22 @@ def off_by(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:
     return " and ".join(f"{j} {verb} off by {with_uncertainty(a)}" for j, a in turned)
 
 
-def not_followed(explanation: Explanation) -> list[str]:
-    """What is said of each way between windows that the gyroscopes did not follow."""
+def of_the_setup(explanation: Explanation) -> list[str]:
+    """What happened to turns and base that is no effect of the device, in sentences."""
     numbered = explanation.prepared.source.about.numbered
     ways = [numbered(pair) for pair in explanation.lost_ways]
-    return [
+    said = [
         f"The turn from position {start + 1} to {end + 1} is not the one that the"
         " gyroscopes measured: samples may be lost there, or an output ran against its"
         " range; it has no weight"
         for start, end in ways
     ]
+    if explanation.sinks:
+        said.append(
+            "The base turned slowly while it was used, as what it stands on gives way:"
+            " each ± includes it; set it on firm ground"
+        )
+    return said
 
 
 def _undecided(explanation: Explanation) -> str:
@@ -222,7 +228,7 @@ def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
     out = [_undecided(explanation)] if explanation.undecided else []
     if explanation.shows_earth and not explanation.sees_earth:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
-    out += [f"{sentence}." for sentence in not_followed(explanation)]
+    out += [f"{sentence}." for sentence in of_the_setup(explanation)]
     if left:
         out.append(f"These positions do not determine {', '.join(left)}.")
     return out

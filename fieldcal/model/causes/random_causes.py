@@ -15,6 +15,7 @@ from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.lost_way import lost_ways
+from fieldcal.model.causes.sinking import sinking
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
@@ -31,6 +32,8 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     if (leans := leaning(table)) is not None:
         yield Cause(leans.cause, leans.part, priors.LEANS, (leans,), "noise")
+    if (sinks := sinking(table)) is not None:
+        yield Cause(sinks.cause, sinks.part, priors.SINKS, (sinks,), "noise")
     if table.turns:
         yield from lost_ways(table)
     if len(table.held) > 3 and len(oriented):

@@ -18,6 +18,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
+from fieldcal.model.evidence.gram import inverse_of, root_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import Turn
@@ -68,7 +69,8 @@ class WayRows:
         z = z - held @ estimate
         cov = self._covariance()
         cov += held @ found.inverse[np.ix_(at, at)] @ held.T
-        whiten = np.linalg.inv(np.linalg.cholesky(cov))
+        sd = self.turn.sd.ravel()
+        whiten = inverse_of(root_of(cov / np.outer(sd, sd))) / sd
         whole = np.zeros((len(z), len(index)))
         order = np.argsort(index)
         place = order[np.searchsorted(index[order], columns[own])]

@@ -1,0 +1,63 @@
+"""Sinking: what a fixture stands on gives way, so its base turns while it is used.
+
+A tripod sinks into soil, a table bends, a jack leaks. The base then turns about its two
+level axes, slowly and mostly one way,
+
+    theta_i(t) = sum_k a_ik P_k(u),   k = 1 .. 4,   -1 <= u <= 1 over the session,
+
+with Legendre polynomials P_k and a_ik ~ 0.2^(k - 1), as of what settles within one to
+several times the session. Every position of known angles is turned by the tilt of that
+moment. The mean is the tilt of the base; of a turn from one position to the next, what
+it sinks meanwhile is in what closures scatter by. A device that lies on something soft
+by itself leans in each stop anew (`leaning`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
+from fieldcal.model import priors
+from fieldcal.model.causes.cause import Group
+from fieldcal.model.causes.column_table import ColumnTable
+from fieldcal.model.causes.columns import General, RowView, of_effect
+from fieldcal.model.turns.turn import only
+
+NAME = "sinking"
+
+TERMS, FADES = 4, 0.2
+"""Polynomials, and how much smaller each is than the one before."""
+
+FEWEST = 4
+"""Positions of known angles that tell a base that turns from biases."""
+
+
+def sinking(table: ColumnTable) -> Group | None:
+    """The columns of all positions whose angles are known; None of too few."""
+    x = table.x
+    known = x.oriented & (x.position >= 0)
+    if len(np.unique(x.position[known])) < FEWEST:
+        return None
+    tilt = of_effect(catalogue()["base_tilt"], {}, 0)
+    begin, end = float(x.t[known].min()), float(x.t[known].max())
+
+    def columns(view: RowView) -> Array:
+        out = np.zeros((len(view.x), 6, 2 * TERMS))
+        rows = np.flatnonzero(view.plain.oriented & (view.plain.position >= 0))
+        if not len(rows):
+            return out
+        some = RowView(
+            only(view.plain, rows.tolist()), only(view.x, rows.tolist()),
+            view.since[:, rows], view.state,
+        )  # fmt: skip
+        by = tilt.of(some)  # of one degree
+        u = 2 * (view.x.t[rows] - begin) / (end - begin) - 1
+        course = legvander(u, TERMS)[:, 1:]
+        out[rows] = (by[..., None] * course[:, None, None]).reshape(len(rows), 6, -1)
+        return out
+
+    start = table.add(General(NAME, columns), 2 * TERMS)
+    size = np.tile(np.rad2deg(priors.SINKS_RAD) * FADES ** np.arange(TERMS), 2)
+    return Group(NAME, "", start + np.arange(len(size)), size, random=True)

@@ -75,6 +75,8 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     known = np.isfinite(seen).all(axis=1)
     t, six = t[known], seen[known]
     parts = max(1, int(np.ceil((t[-1] - t[0]) / WIDEST))) if len(t) > 1 else 1
+    if parts > len(t):  # samples minutes apart, or times in another unit
+        return []
     found = [
         _waves_of_stretch(t[some], six[some], scale)
         for some in np.array_split(np.arange(len(t)), parts)

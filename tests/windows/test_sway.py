@@ -178,3 +178,11 @@ def test_who_says_that_it_sways_need_not_wait() -> None:
             Block.of(t + 30 * quick, acc, six[:, 3:] + 0.3 * np.sin(5 * t)[:, None])
         )
         assert not told.still
+
+
+@pytest.mark.parametrize("unit", [1e6, 1e9])
+def test_times_in_another_unit_take_no_memory(unit: float) -> None:
+    """A window of 20 s would be cut into hundreds of millions of minutes."""
+    t = np.arange(2000) / 100.0
+    six = np.random.default_rng(1).normal(0.0, 1e-3, (2000, 6)) + [0, 0, 9.8, 0, 0, 0]
+    assert waves_of(t * unit, six, np.ones(3)) == []

@@ -27,7 +27,7 @@ bias is off by half as many of its sigmas again as the tilt is of its own, and n
 is lost without the statement: the tilt is then estimated."""
 
 
-OTHER = {"angle_offset": "a base off", "base_tilt": "joints off"}
+OTHER = {"angle_offset": "a tilt of the base", "base_tilt": "offsets of the joints"}
 """What may be there beside the tilt of a result."""
 
 
@@ -80,5 +80,5 @@ def _beside(found: Calibration) -> Iterator[Check]:
     """What the result has of the other kind of tilt."""
     kinds = [OTHER[group] for group in found.groups if group in OTHER]
     if kinds and (off := found.info.get("beside_tilt_sigma_deg")):
-        says = f"each ± includes {kinds[0]} by 0 ± {off:.2g}° beside the tilt found"
+        says = f"each ± includes {kinds[0]} of 0 ± {off:.2g}°, beside the tilt found"
         yield Check("level", None, says)

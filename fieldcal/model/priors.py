@@ -75,9 +75,10 @@ LEANS, LEANS_RAD = 0.1, 2e-4
 """Chance that what a device lies on gives way while it rests, and by how much, rad:
 tyres, foam and grass do, by tenths of a milliradian in a minute."""
 
-SINKS, SINKS_RAD = 0.02, 5e-4
-"""Chance that the base of a fixture turns while it is used, and by how much, rad: a
-tripod on soil or a table that bends."""
+SINKS, SINKS_RAD, SINKS_FADES = 0.02, 5e-4, 0.2
+"""Chance that the base of a fixture turns while it is used, by how much, rad, and how
+much smaller each polynomial of that is than the one before: a tripod on soil or a table
+that bends settles within one to several times a session."""
 
 LOST_WAY, LOST_RAD = 0.02, 0.03
 """Chance that the gyroscopes did not follow one of the turns, and the angle that they

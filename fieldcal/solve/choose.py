@@ -79,8 +79,7 @@ def solve(
     level_sigma_deg : how level the base was made, about each level axis; the tilt is
         then that of the base, within this
     heading_sigma_deg : how well z points north; not known for tactical grade if None
-    angle_sigma_deg : how well the angles of each position are set, about each level
-        axis
+    angle_sigma_deg : how well each position's angles are set, about each level axis
     beside_tilt_sigma_deg : how large a tilt of the base may be beside offsets of the
         joints, and the other way round, where "auto" takes one of them
     recorded : the rows of the recording that the observations are means of, and its
@@ -88,8 +87,7 @@ def solve(
     factory : what the factory left of errors that are not estimated; nothing if None
     at_best : the same if the device is as good as it is called, where `factory` is what
         its biases make likely: the rows tell which, for each kind of error
-    lot : what the unit's lot says of its parameters, which the result then has in it
-        unless the unit is odd
+    lot : what the unit's lot says, which the result then has unless the unit is odd
 
     Raises
     ------

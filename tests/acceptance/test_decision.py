@@ -146,6 +146,11 @@ def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
     found = solve(Observations.of(FIVE, windows, G))
     assert {"base_tilt", "angle_offset"} & set(found.groups)
     assert "level" not in [check.name for check in decided(found).checks]
+    beside = replace(found, info={**found.info, "beside_tilt_sigma_deg": 0.05})
+    (told,) = [check for check in decided(beside).checks if check.name == "level"]
+    assert told.ok is None, "it is relied on, and no reason for NO-GO"
+    other = "tilt of the base" if "angle_offset" in found.groups else "offsets of the"
+    assert other in told.says and "0 ± 0.05°" in told.says
 
 
 def test_a_position_that_does_not_fit_is_told_beside_the_decision() -> None:

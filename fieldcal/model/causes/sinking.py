@@ -27,8 +27,8 @@ from fieldcal.model.turns.turn import only
 
 NAME = "sinking"
 
-TERMS, FADES = 4, 0.2
-"""Polynomials, and how much smaller each is than the one before."""
+TERMS = 4
+"""Polynomials of each angle."""
 
 FEWEST = 4
 """Positions of known angles that tell a base that turns from biases."""
@@ -59,5 +59,6 @@ def sinking(table: ColumnTable) -> Group | None:
         return out
 
     start = table.add(General(NAME, columns), 2 * TERMS)
-    size = np.tile(np.rad2deg(priors.SINKS_RAD) * FADES ** np.arange(TERMS), 2)
+    fading = priors.SINKS_FADES ** np.arange(TERMS)
+    size = np.tile(np.rad2deg(priors.SINKS_RAD) * fading, 2)
     return Group(NAME, "", start + np.arange(len(size)), size, random=True)

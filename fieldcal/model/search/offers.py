@@ -112,9 +112,7 @@ class Offers(Sets):
         outputs = TRIAD if group.random else len(group.params)
         if not outputs or len(group.columns) <= WAVES * outputs:
             return offer
-        own = np.diag(table.state.rows.matrix(group.columns, group.columns))
-        top = float((own * group.typical**2).max())
-        profile = DENSITY + gains(*table.state.rest(group.columns, group.typical), top)
+        profile = DENSITY + gain_of(table.state, group)
         chance = self.chance([*there.members, offer.member])
         worth = float(np.logaddexp.reduce(profile)) + chance
         score = table.score + worth - self.chance(there.members)
@@ -189,12 +187,10 @@ class Offers(Sets):
         if beside is not None:
             yield from self._as_beside(there, base, beside)
             return
-        first, rows = 0, self._seen(sizes.instability).rows
-        for group, size in zip(
-            self.dictionary.always, sizes.calibration, strict=True
-        ):  # what a device has anyway, with next to no change from nominal: what one
-            # cause does to all axes, or in time, looks like it
-            some = slice(first, first := first + len(group.columns))
+        rows = self._seen(sizes.instability).rows
+        # what a device has anyway, with next to no change from nominal: what one cause
+        # does to all axes, or in time, looks like it
+        for group, some, size in self._always(there):
             if group.fixed is None and (group.in_step or not group.in_state):
                 # flicker is what few windows have instead of instability
                 down = [max(size - d, 0) for d in FLICKER if group.random]
@@ -208,11 +204,9 @@ class Offers(Sets):
 
     def _as_beside(self, there: Set, base: float, beside: Sizes) -> Iterator[Level]:
         """The set with a flicker as large as beside another one, if it has any."""
-        wide, first, less = there.state.sizes.copy(), 0, beside.instability
-        pairs = zip(there.sizes.calibration, beside.calibration, strict=True)
-        changed = False
-        for group, (size, other) in zip(self.dictionary.always, pairs, strict=True):
-            some = slice(first, first := first + len(group.columns))
+        wide, less, changed = there.state.sizes.copy(), beside.instability, False
+        pairs = zip(self._always(there), beside.calibration, strict=True)
+        for (group, some, size), other in pairs:
             if group.random and group.fixed is None and other != size:
                 wide[some] = group.sizes(float(priors.SIZES[other]))
                 base += float(DENSITY[other] - DENSITY[size])
@@ -241,10 +235,8 @@ class Offers(Sets):
         Held against an instability that makes up for everything, a calibration seems to
         stay where it was.
         """
-        wide, first, cost = there.state.sizes.copy(), 0, 0.0
-        pairs = zip(self.dictionary.always, there.sizes.calibration, strict=True)
-        for group, size in pairs:
-            some = slice(first, first := first + len(group.columns))
+        wide, cost = there.state.sizes.copy(), 0.0
+        for group, some, size in self._always(there):
             if group.fixed is None and size < EVEN:
                 wide[some] = group.sizes(float(priors.SIZES[EVEN]))
                 cost += float(DENSITY[EVEN] - DENSITY[size])
@@ -256,20 +248,19 @@ class Offers(Sets):
         Of two positions everything looks like bias and scale factor, and what these
         usually are would tell what is there.
         """
-        wide, first = there.state.sizes.copy(), 0
-        for group in self.dictionary.always:
-            some = slice(first, first := first + len(group.columns))
+        wide = there.state.sizes.copy()
+        for group, some, _ in self._always(there):
             if group.in_state and group.fixed is None:
                 wide[some] = group.sizes(priors.FREE)
         free = Eliminated.of(there.state.rows, there.state.columns, wide)
+        return lambda group: bool(gain_of(free, group).max() >= LEAST)
 
-        def shown(group: Group) -> bool:
-            at, typical = group.columns, group.typical
-            own = np.diag(free.rows.matrix(at, at)) * typical**2
-            found = gains(*free.rest(at, typical), float(own.max()))
-            return bool(found.max() >= LEAST)
-
-        return shown
+    def _always(self, there: Set) -> Iterator[tuple[Group, slice, int]]:
+        """What is in every set, its place in one, and the index of its size there."""
+        first = 0
+        groups, sizes = self.dictionary.always, there.sizes.calibration
+        for group, size in zip(groups, sizes, strict=True):
+            yield group, slice(first, first := first + len(group.columns)), size
 
     def _seen(self, less: Less) -> Seen:
         """What the rows say of every column at one instability."""
@@ -333,6 +324,13 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluated((*there.members, *(o.member for o in offers)), start)
+
+
+def gain_of(state: Eliminated, group: Group) -> Array:
+    """What a group adds to a set, ln L, over its sizes."""
+    at, typical = group.columns, group.typical
+    own = np.diag(state.rows.matrix(at, at)) * typical**2
+    return gains(*state.rest(at, typical), float(own.max()))
 
 
 def fallen(instability: Less, some: Sequence[int], down: int) -> Less:

@@ -10,11 +10,11 @@ import numpy as np
 
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.evidence.gram import Eliminated, gains
+from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import DENSITY, Member, Sizes
 from fieldcal.model.search.offer import Offer, OfferTable
-from fieldcal.model.search.offers import NEAR, Offers
+from fieldcal.model.search.offers import NEAR, Offers, gain_of
 from fieldcal.model.search.pairs import Pair, pairs
 
 SETTLED = 0.02
@@ -278,9 +278,7 @@ def _worth(rest: Eliminated, some: Iterable[Group]) -> dict[Group, float]:
     """What each of some groups adds to a set, ln, over all its sizes."""
     worth: dict[Group, float] = {}
     for one in some:
-        own = np.diag(rest.rows.matrix(one.columns, one.columns)) * one.typical**2
-        gain = gains(*rest.rest(one.columns, one.typical), float(own.max()))
-        worth[one] = float(np.logaddexp.reduce(gain + DENSITY))
+        worth[one] = float(np.logaddexp.reduce(gain_of(rest, one) + DENSITY))
     return worth
 
 

@@ -30,7 +30,7 @@ NEXT = 0.99
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StandingOutputs:
     """Where the gyroscopes stand in the windows.
 
     Attributes
@@ -90,7 +90,7 @@ class Standing:
 
 
 def _lasting(value: Array, length: Array) -> Array:
-    """C of (1) of runs on some values (r,) that last so long, (r,)."""
+    """Factor c of (1) of runs on some values (r,) that last so long, (r,)."""
     out = np.ones(len(value))
     before, after = np.diff(value)[:-1], np.diff(value)[1:]
     faster = length[1:-1] * (1 / length[2:] - 1 / length[:-2])
@@ -98,7 +98,9 @@ def _lasting(value: Array, length: Array) -> Array:
     return out
 
 
-def standing(block: Block, windows: NDArray[np.intp], alike: Array) -> Standing | None:
+def standing(
+    block: Block, windows: NDArray[np.intp], alike: Array
+) -> StandingOutputs | None:
     """Where gyroscopes stand in windows; None if none of them does.
 
     `alike` (3,) rad/s is what the errors of all windows have in common.
@@ -108,4 +110,4 @@ def standing(block: Block, windows: NDArray[np.intp], alike: Array) -> Standing 
     means = [block.gyr[a:b].mean(axis=0) for a, b in windows.tolist() if b > a]
     step = np.where(alike > 0, steps_in(block, windows)[1], 0.0)
     variance = np.mean(rounding(block, windows)[:, 3:] ** 2, axis=0)
-    return Standing(np.nanmedian(means, axis=0), step, variance)
+    return StandingOutputs(np.nanmedian(means, axis=0), step, variance)

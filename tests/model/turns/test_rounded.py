@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.turns.rounded import Standing, standing
+from fieldcal.model.turns.rounded import StandingOutputs, standing
 
 STEP, RATE, N, EACH = 0.02, 100.0, 400, 2
 SCALE = np.array([1.0, 1.02, 0.98])
@@ -55,8 +55,8 @@ def drawn(rng: np.random.Generator) -> Drawn:
     return Drawn(gyr, attitude, off, closure)
 
 
-def stands(variance: float = STEP**2 / 12) -> Standing:
-    return Standing(np.zeros(3), np.full(3, STEP), np.full(3, variance))
+def stands(variance: float = STEP**2 / 12) -> StandingOutputs:
+    return StandingOutputs(np.zeros(3), np.full(3, STEP), np.full(3, variance))
 
 
 def test_what_rounding_makes_of_a_turn_is_as_large_as_is_said() -> None:

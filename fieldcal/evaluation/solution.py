@@ -7,7 +7,7 @@ far as they were calm.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -17,7 +17,6 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.calibration.names import TILTS, group_of, sensor_of
-from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
@@ -216,12 +215,17 @@ def solved_as(
     recorded = None if printed else laid.recorded(turns != "no", shown)
     if shown is not None:
         notes = [*notes, *of_the_setup(shown)]
-    found = solve(laid.observations, recorded=recorded, **asked)
-    angles, note = _as_shown(asked, shown, found)
+    stated = float(asked["angle_sigma_deg"])
+
+    def fit(angles: float) -> Calibration:
+        widened = {**asked, "angle_sigma_deg": angles}
+        return solve(laid.observations, recorded=recorded, **widened)
+
+    found, angles = _as_shown(fit, stated, shown)
     others = angles > thresholds.NO_ANGLE
-    if note and not others:
-        asked["angle_sigma_deg"], notes = angles, [note, *notes]
-        found = solve(laid.observations, recorded=recorded, **asked)
+    if angles > stated and not others:
+        asked["angle_sigma_deg"] = angles
+        notes = [_worse_set(angles, stated), *notes]
     shows = _grade(found, about)
     if shows.because and not printed:
         asked["at_best"] = asked["factory"]
@@ -249,21 +253,32 @@ def solved_as(
 
 
 def _as_shown(
-    asked: dict[str, Any], shown: Explanation | None, found: Calibration
-) -> tuple[float, str]:
-    """How well the recording shows that angles are set, deg, and a sentence if less.
+    fit: Callable[[float], Calibration], stated: float, shown: Explanation | None
+) -> tuple[Calibration, float]:
+    """The result with angles set as stated, or as the recording shows them, and which.
 
-    What the set that was asked for explains, the tilt of the base among it, shows
-    nothing of the angles.
+    The rows are those of the set that is asked for: what this explains with the angles
+    as stated, such as a tilt of the base, shows nothing of the angles.
+
+    Parameters
+    ----------
+    fit : result with angles that are set as well as so many deg
+    stated : how well, deg
+    shown : by the recording
+
     """
-    stated = float(asked["angle_sigma_deg"])
+    found = fit(stated)
     angles = 0.0 if shown is None else angles_set(shown)
-    explained = (
-        found.dof > 0 and chi2_tail(found.chi2, found.dof) >= thresholds.BEYOND_NOISE
-    )
-    if angles <= stated or explained:
-        return stated, ""
-    return angles, (
+    if angles <= stated:
+        return found, stated
+    wider = fit(min(angles, thresholds.NO_ANGLE))
+    if wider.info["log_evidence"] <= found.info["log_evidence"]:
+        return found, stated
+    return (found if angles > thresholds.NO_ANGLE else wider), angles
+
+
+def _worse_set(angles: float, stated: float) -> str:
+    return (
         f"the recording shows that angles are set to ± {angles:.2g}° only, not"
         f" ± {stated:.2g}°: the uncertainties are for that; mend the fixture, or write"
         " down the angles that it really sets"

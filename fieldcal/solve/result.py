@@ -151,6 +151,7 @@ def _info(
         },
         "bad_position": [round(float(p), 4) for p in found.bad],
         "extra_scatter": scatter_of(found.found, (0, 1, 2)),
+        "log_evidence": found.score,
         "angle_sigma_deg": asked.angles_deg,
         "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
         "quadratic_sigma": wanted.factory.quadratic,

@@ -236,6 +236,21 @@ def test_angles_that_nobody_sets_so_are_those_of_other_positions(
     assert (solution.OTHER_ANGLES in out["warnings"]) == other
 
 
+def test_turns_bear_witness_to_angles_that_six_faces_make_up_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Biases take what the angles of six faces are off by; turns are off by it too."""
+    missed = np.random.default_rng(0).normal(0.0, 0.06, (6, 2))
+    there = (np.array(FACES) + missed).tolist()
+    site = {**SITE, "angle_setting_deg": 0.01}
+    write_session(tmp_path, recorded(CALM, places(there)), places(FACES), site=site)
+    main(["solve", str(tmp_path), "--json"])
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert "angles are set to ±" in " ".join(out["warnings"])
+    assert 0.03 < out["angle_sigma_deg"] < 0.1
+    assert (np.abs(off(out, CALM)) < 4).all()
+
+
 @pytest.mark.thorough
 def test_faces_laid_by_hand_bear_witness_to_angles_set_badly(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -38,7 +38,7 @@ def estimated(**known: Any) -> Estimated:
     )
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
-        "gyr": fit(rms=np.nan), "closures": (0.0, 0), "ended_s": None,
+        "gyr": fit(rms=np.nan), "closures": (0.0, 0), "ended_s": None, "score": -12.5,
         "found": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
     }  # fmt: skip
     return cast(Estimated, SimpleNamespace(**(nothing | known)))
@@ -94,6 +94,7 @@ def test_conditions_are_those_that_were_given() -> None:
         "temperature_degc": 23.0, "temperature_sd_k": pytest.approx(5**0.5),
         "grade": "tactical",
     }  # fmt: skip
+    assert found["log_evidence"] == -12.5
     assert found["angle_sigma_deg"] == 0.2 and "gyroscopes" not in found
     plain = solve(observed(), tilt="none").info
     assert plain["conditions"]["latitude_deg"] is None

@@ -25,7 +25,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.causes.detents import columns_of, detents, together
+from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import of_factory, whole
 from fieldcal.model.causes.wander import Wander
@@ -226,7 +226,7 @@ class Given(Dictionary):
         )
         # an angle that is set once has both parts of its error for itself
         if every := list(detents(self.x, oriented)):
-            at = columns_of(self, together(every, self.places), "detents")
+            at = columns_of(self, every)
             wide = np.full(len(at), size)
             yield _given_cause(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 

@@ -12,18 +12,15 @@ from fieldcal.diagnosis.findings.found_effects import estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.causes.random_causes import STRETCHED
 from fieldcal.model.posterior.probabilities import Standing
 
-JOINTS: tuple[str, ...] = ("α", "β")
-GAUGES = ("every α", "every β", "every angle")
-"""What a gauge sets, in the order of the columns of one."""
+JOINTS = ("α", "β")
 
 Places = tuple[int, ...]
 """Positions, from 0."""
 
 Errors = tuple[tuple[str, Quantity], ...]
-"""Joints, each with the error of its angle, deg; what a gauge sets, in % of itself."""
+"""Joints, each with the error of its angle, deg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +31,7 @@ class Unknown:
     ----------
     cause : name of the model's cause: "time", "alpha", "window", "misset" ...
     mismatch : channel, positions and time
-    turned : what was set wrongly, with the error that would explain the mismatch
+    turned : joints, each with the error of its angle that would explain the mismatch
 
     """
 
@@ -66,12 +63,10 @@ def angle_errors(explanation: Explanation, standing: Standing) -> dict[Places, E
 
 def _errors(explanation: Explanation, group: Group) -> Errors:
     values, sigmas, _ = estimates(explanation.best.set, group.columns)
-    names, one, unit = JOINTS, np.rad2deg(1.0), "deg"
-    if group.cause == STRETCHED:
-        names, one, unit = GAUGES, 100.0, "%"
+    pairs = zip(group.params, np.rad2deg(values), np.rad2deg(sigmas), strict=True)
     return tuple(
-        (names[k], Quantity(float(v * one), float(s * one), unit))
-        for k, v, s in zip(group.params, values, sigmas, strict=True)
+        (JOINTS[joint], Quantity(float(v), float(s), "deg"))
+        for joint, v, s in pairs
         if abs(v) > thresholds.STANDS_OUT * s
     )
 

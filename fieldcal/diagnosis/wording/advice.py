@@ -14,7 +14,6 @@ from fieldcal.diagnosis.result import FoundEffect, Mismatch
 from fieldcal.diagnosis.wording.deciding_position import deciding_position, extent
 from fieldcal.diagnosis.wording.paragraph import MOST, off_by
 from fieldcal.effects import catalogue
-from fieldcal.model.causes.random_causes import STRETCHED
 from fieldcal.physics.effect import Chain, Scatter
 
 LESS_THAN = 3
@@ -157,11 +156,6 @@ WAYS = {
 def _remedy(unknown: Unknown) -> tuple[str, str]:
     """What to do about a mismatch, and why, with room for the channels."""
     places = listed(unknown.mismatch.positions)
-    if unknown.turned and unknown.cause == STRETCHED:
-        return (
-            f"Check the gauge that the angles are set by, and repeat {places}",
-            f": {off_by(unknown.turned)}.",
-        )
     if unknown.turned and len(unknown.mismatch.positions) > 1:
         joints = join([joint for joint, _ in unknown.turned], "and")
         return (

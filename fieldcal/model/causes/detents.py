@@ -1,4 +1,4 @@
-"""What a fixture repeats: the error of a detent, or of the gauge of all its angles."""
+"""Detents of a fixture: an angle has the same error each time it is set."""
 
 from __future__ import annotations
 
@@ -53,28 +53,9 @@ def together(some: Sequence[Detent], places: int) -> Array:
     return out
 
 
-def in_proportion(x: Experience, oriented: Sequence[int] | Index) -> Array:
-    """Rotations of positions `oriented` where each angle is off in its own size, rad.
-
-    (2 p, 3): by a gauge of alpha, by one of beta, and by one that both come from.
-    """
-    of_joint = np.zeros((2 * (int(x.position.max()) + 1), 2))
-    for p in oriented:
-        row = int(np.argmax(x.position == p))
-        of_joint[2 * p, 0], of_joint[2 * p + 1, 1] = x.alpha[row], x.beta[row]
-    return np.column_stack([of_joint, of_joint.sum(axis=1)])
-
-
-def columns_of(table: ColumnTable, shared: Array, name: str) -> Index:
-    """Columns of errors that positions share, appended to a table, (m,).
-
-    Parameters
-    ----------
-    table : to be added to
-    shared : (2 p, m) rotations of the positions by each
-    name : of the columns
-
-    """
+def columns_of(table: ColumnTable, some: Sequence[Detent]) -> Index:
+    """Columns of the errors of detents, rad, appended to a table, (m,)."""
+    shared = together(some, table.places)
 
     def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
         """Central differences at both ends of a turn."""
@@ -85,6 +66,8 @@ def columns_of(table: ColumnTable, shared: Array, name: str) -> Index:
             up, down = (one.experienced(plain) for one in ends)
             yield up, down, columns.SMALL
 
-    basis = General(name, lambda v: columns.small_rotation(v) @ shared, sides=sides)
+    basis = General(
+        "detents", lambda v: columns.small_rotation(v) @ shared, sides=sides
+    )
     at: Index = table.add(basis, shared.shape[1]) + np.arange(shared.shape[1])
     return at

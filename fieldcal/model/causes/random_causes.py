@@ -11,15 +11,12 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.detents import columns_of, detents, in_proportion, together
+from fieldcal.model.causes.detents import columns_of, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.lost_way import lost_ways
 from fieldcal.model.causes.sinking import sinking
 from fieldcal.physics.effect import CHANCE, Scatter
-
-STRETCHED = "stretched_gauge"
-"""What a gauge is called that all angles of a joint, or of both, come from."""
 
 
 def of_chance(table: ColumnTable) -> Iterator[Cause]:
@@ -55,39 +52,18 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
         for p in oriented
     )  # fmt: skip
     yield Cause("misset", "", CHANCE, groups, "position")
-    yield from _stretched(table, oriented)
     several = [
         d for d in detents(table.x, oriented) if 1 < len(d.positions) < len(oriented)
     ]
     if not several:
         return
     wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
-    columns = columns_of(table, together(several, table.places), "detents")
     groups = tuple(
         Group("repeated_angle", "", np.array([at]), wide, params=(one.joint,),
               together=one.positions)
-        for at, one in zip(columns, several, strict=True)
+        for at, one in zip(columns_of(table, several), several, strict=True)
     )  # fmt: skip
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
-
-
-def _stretched(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
-    """A gauge that all angles come from, of one joint or of both, and that is too long.
-
-    Of one angle only it is what a detent does.
-    """
-    shared = in_proportion(table.x, oriented)
-    columns = columns_of(table, shared, "gauge")
-    groups = []
-    for k, (at, column) in enumerate(zip(columns, shared.T, strict=True)):
-        turned = np.flatnonzero(column)
-        if len(np.unique(np.round(np.abs(column[turned]), 6))) > 1:
-            own = tuple(np.unique(turned // 2).tolist())
-            size = np.full(1, priors.GAUGE)
-            groups.append(Group(STRETCHED, "", np.array([at]), size, params=(k,),
-                                together=own))  # fmt: skip
-    if groups:
-        yield Cause(STRETCHED, "", CHANCE, tuple(groups), "position")
 
 
 def _of_scatter(

@@ -8,13 +8,7 @@ from small_sessions import LADDER, G, dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.causes.detents import (
-    Detent,
-    columns_of,
-    detents,
-    in_proportion,
-    together,
-)
+from fieldcal.model.causes.detents import Detent, columns_of, detents, together
 
 ROWS = 2
 EVERY = range(len(LADDER))
@@ -62,24 +56,12 @@ def test_rotations_of_the_positions_by_each_detent() -> None:
     np.testing.assert_array_equal(table, expected.reshape(8, 2))
 
 
-def test_a_gauge_turns_each_position_by_a_part_of_its_own_angles() -> None:
-    x = ladder(ROWS)
-    known = [p for p in EVERY if p != 4]
-    found = in_proportion(x, known)
-    assert found.shape == (2 * len(EVERY), 3)
-    for p in EVERY:
-        row = int(np.argmax(x.position == p))
-        alpha, beta = (x.alpha[row], x.beta[row]) if p in known else (0.0, 0.0)
-        expected = [[alpha, 0.0, alpha], [0.0, beta, beta]]
-        np.testing.assert_array_equal(found[2 * p : 2 * p + 2], expected)
-
-
 def test_a_column_is_the_change_of_the_force_with_the_angle_of_its_positions() -> None:
     x = ladder(ROWS)
     d = dictionary(x)
     before = d.width
     some = [one for one in detents(x, EVERY) if len(one.positions) > 1]
-    at = columns_of(d, together(some, d.places), "detents")
+    at = columns_of(d, some)
     assert at.tolist() == list(range(before, before + len(some))) and len(some) > 5
     assert d.width == before + len(some)
     first, end, basis = list(d.spans())[-1]

@@ -237,7 +237,6 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
         "window",
         "misset",
         "repeated_angle",
-        "stretched_gauge",
     } < every
     few = keys_of(first(3))
     assert few == {"time", "temperature", "since turn", "random_walk", "angle_setting",

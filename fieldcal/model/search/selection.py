@@ -150,8 +150,12 @@ class Search(Offers):
             if i >= len(best.members):
                 break
             less = self.without(best, i)
-            other = self._followed(less, best.score, best.sizes)
-            best = max([best, self.on_more_outputs(less), other], key=_score)
+            more = self.on_more_outputs(less)
+            found = [best, more, self._followed(less, best.score, best.sizes)]
+            if more is not less:
+                # on more outputs, what is left does a part of what was left out
+                found.append(self._followed(more, best.score, best.sizes))
+            best = max(found, key=_score)
         return best
 
     def _wider(self, there: Set) -> Set:

@@ -64,6 +64,10 @@ BESIDE_TILT_DEG = 0.05
 them may explain the positions, and the other one is there as well. A bubble level shows
 no less."""
 
+SCALE_WARMS = 0.25
+"""How much a scale factor of an accelerometer changes with the temperature, at 1 g, as
+a part of what its bias does: 0.02 %/K beside 0.8 mg/K of an MPU-6050."""
+
 MISSET_DEG = 3.0
 """Typical error of a position whose angle is not the stated one, deg."""
 

@@ -165,8 +165,11 @@ class Sensor(Effect):
 class BiasChange(Sensor):
     """An effect that adds one course to every output, each by a parameter of its own.
 
-    Parameters are those of `six`.
+    Parameters are those of `six`. `thermal` says that it is the temperature that does
+    so, and scale factors then change as well.
     """
+
+    thermal: ClassVar[bool] = False
 
     @abstractmethod
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:

@@ -34,7 +34,7 @@ def mixed(
 
     Each window may be bad as well, unless there is no `doubt`.
     """
-    there = search.evaluated((*given.asked, *carried))
+    there = search.evaluated(given.beside(carried))
     return Mixing(given, search.gram, there, search.unstable, doubt=doubt).run()
 
 
@@ -71,7 +71,7 @@ def averaged_over(
     found = []
     for members in chance:
         there = likeliest
-        if (*given.asked, *members) != given.members:
+        if given.beside(members) != given.members:
             there = mixed(given, search, members, doubt)
         found.append(_at_the_end(given, there, nominal))
     weight = np.array(list(chance.values()))

@@ -9,7 +9,7 @@ fixture each time the same detent is set, the other is new in each position.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +33,7 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect
 from fieldcal.solve.shown import Shown, at_end, carried
+from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +108,10 @@ class Given(Dictionary):
         )
         has = {group_of(n) for n in self.names}
         self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
+        left = self._warm_scales(self.asked)
+        self.causes = [*self.causes, *(cause for cause, _ in left.values())]
+        every = [m for one in self.explanations for m in one.members]
+        self._warm = self._warm_scales(every)
         self.left_out = self._left_out()
 
     @property
@@ -117,13 +122,20 @@ class Given(Dictionary):
     @property
     def members(self) -> tuple[Member, ...]:
         """The set, with what the likeliest explanation of the recording has."""
-        return (*self.asked, *self.explanations[0].members)
+        return self.beside(self.explanations[0].members)
+
+    def beside(self, carried: Sequence[Member]) -> tuple[Member, ...]:
+        """The set with some causes, and with what these do to scale factors."""
+        warm = [self._warm[c.key] for c, _ in carried if c.key in self._warm]
+        return (*self.asked, *carried, *warm)
 
     @cached_property
     def ending(self) -> Array:
         """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        left = tuple(m for m in self.asked if m[1].part in WARMING)
-        return at_end(self, (Shown(left, 1.0), *self.explanations))
+        left = [m for m in self.asked if m[1].part in WARMING]
+        left += [m for m in self.asked if m[0].name == WARM_SCALE]
+        left += self._warm.values()
+        return at_end(self, (Shown(tuple(left), 1.0), *self.explanations))
 
     @property
     def groups(self) -> list[Group]:
@@ -168,6 +180,11 @@ class Given(Dictionary):
         if (lost := np.flatnonzero(self.cut)).size:
             at = self.add(General("cut", self._shorter), 3) + lost
             yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
+
+    def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
+        """What changes scale factors beside causes that change biases, by their key."""
+        found = {cause.key: warm_scale(self, group) for cause, group in members}
+        return {key: scale for key, scale in found.items() if scale is not None}
 
     def _left_out(self) -> Group | None:
         """Cross-coupling that the set has not, of its usual size."""

@@ -187,13 +187,17 @@ def test_an_effect_of_one_triad_may_be_on_the_other_as_well() -> None:
 
 
 def test_the_bias_is_that_at_the_end() -> None:
-    """Of a drift, what it has come to; of its scale factor nothing."""
+    """Of a drift, what it has come to, and what scale factors have beside it."""
     d = given([Shown((member("bias_drift"),), 1.0)])
     ((_, group),) = d.explanations[0].members
     bias, scale = d.ending
     for j, column in zip(group.params, group.columns, strict=True):
         assert bias[j, column] == pytest.approx(TIMES[-1])
-    assert np.count_nonzero(bias) == len(group.params) and not scale.any()
+    assert np.count_nonzero(bias) == len(group.params)
+    ((_, beside),) = set(d.members) - set(d.asked) - set(d.explanations[0].members)
+    for c, column in enumerate(beside.columns):
+        assert scale[c, column] == pytest.approx(TIMES[-1])
+    assert np.count_nonzero(scale) == 3
 
 
 def test_a_walk_ends_where_its_cosines_do() -> None:

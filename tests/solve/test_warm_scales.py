@@ -1,0 +1,134 @@
+"""What the temperature makes of scale factors while it changes the biases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from observed import SCALE, observe, outputs
+
+from fieldcal.core.factory import FactoryErrors
+from fieldcal.core.positions import SIX_FACES, Position
+from fieldcal.core.samples import Array
+from fieldcal.effects import catalogue
+from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.effect_causes import of_effects
+from fieldcal.model.evidence.sizing import Member
+from fieldcal.model.state import State
+from fieldcal.solve.estimation import Estimated, Recorded, estimated
+from fieldcal.solve.given import Given, Wanted
+from fieldcal.solve.rows import of_means
+from fieldcal.solve.shown import Shown
+from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
+
+PLACES = (*SIX_FACES, *(Position.deg(a, b) for a, b in [(45, 0), (0, 45), (0, 0)]))
+COUNT = len(PLACES)
+TIMES = 40.0 * np.arange(COUNT)
+DRIFT = np.array([3e-4, -2e-4, 4e-4])
+SIZE = float(np.sqrt(np.mean(DRIFT**2)))
+NOMINAL = State(np.zeros(6), np.ones(6), np.zeros((COUNT, 2)), np.zeros(3))
+
+
+def recording(change: Array, noise: Array, drift: Array = DRIFT) -> Recorded:
+    """Windows of a device that changes with time: biases, and scale factors."""
+    force = (outputs(PLACES, bias=np.zeros(3)) / SCALE) * TIMES[:, None]
+    acc = outputs(PLACES) + drift * TIMES[:, None] + change * force + noise
+    rows = of_means(replace(observe(PLACES, acc), time=TIMES))
+    return replace(
+        rows, rows=replace(rows.rows, x=replace(rows.rows.x, since_start=TIMES))
+    )
+
+
+CALM = recording(np.zeros(3), np.zeros((COUNT, 3)))
+
+
+def given(wanted: Wanted | None = None) -> Given:
+    return Given(CALM.rows, np.ones(6), CALM.since, False, wanted or Wanted())
+
+
+def drift(name: str = "bias_drift") -> Member:
+    """A cause on all accelerometers, as large as the biases drift."""
+    d = given()
+    cause = next(c for c in of_effects(d) if (c.name, c.part) == (name, "acc"))
+    group = next(g for g in cause.variants if len(g.params) == 3)
+    cause = replace(cause, variants=(group,)).of_size(SIZE / group.typical[0])
+    return cause, cause.variants[0]
+
+
+def fitted(recorded: Recorded) -> Estimated:
+    cause, group = drift()
+    shown = (Shown(((cause, group),), 1.0, sizes=(group.fixed or 0.0,)),)
+    return estimated(replace(recorded, shown=shown), None, NOMINAL, Wanted())
+
+
+def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> None:
+    d, (_, group) = given(), drift()
+    found = warm_scale(d, group)
+    assert found is not None
+    _, one = found
+    first, end, basis = list(d.spans())[-1]
+    assert one.columns.tolist() == list(range(first, end))
+    columns = basis.of(RowView.of(d.x, d.since, NOMINAL))
+    expected = np.zeros((COUNT, 6, 3))
+    for c in range(3):
+        expected[:, c, c] = TIMES * d.x.f[:, c]
+    np.testing.assert_allclose(columns, expected)
+    each = 0.25 * SIZE / 9.80665
+    np.testing.assert_allclose(one.sizes(one.fixed or 0.0), each, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "thermal"),
+    [
+        ("warm_up", True),
+        ("bias_drift", True),
+        ("temperature_bias", True),
+        ("thermal_hysteresis", True),
+        ("settling", False),
+        ("bias_step", False),
+    ],
+)
+def test_what_changes_scale_factors_is_the_temperature(
+    name: str, thermal: bool
+) -> None:
+    effect = catalogue()[name]
+    group = replace(drift()[1], effect=effect)
+    assert (warm_scale(given(), group) is not None) == thermal
+
+
+def test_nothing_comes_of_gyroscopes_or_of_what_is_no_bias() -> None:
+    d, (_, group) = given(), drift()
+    assert warm_scale(d, replace(group, params=(3, 4, 5))) is None
+    assert warm_scale(d, replace(group, effect=None)) is None
+
+
+def test_what_the_device_warms_up_by_unseen_is_in_its_scale_factors() -> None:
+    """0.01 m/s^2/K and 2 K of a device that nobody saw to warm up."""
+    left = FactoryErrors(acc_per_k=0.01, warming_k=2.0)
+    names = [cause.name for cause, _ in given(Wanted(factory=left)).asked]
+    assert WARM_SCALE in names
+    nothing = np.zeros((COUNT, 3))
+    still = recording(nothing[0], nothing, nothing[0])
+    before, after = (
+        estimated(still, None, NOMINAL, Wanted(factory=one))
+        for one in (FactoryErrors(), left)
+    )
+    at = before.names.index("acc_scale.x")
+    more = np.sqrt(after.covariance[at, at] - before.covariance[at, at])
+    assert 0.1 < more / (0.25 * 0.02 / 9.80665) < 1.0
+
+
+def test_scale_factors_at_the_end_are_within_their_uncertainty() -> None:
+    """Over devices whose scale factors change as the module says."""
+    pulls = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        change = rng.normal(0.0, 0.25 * SIZE / 9.80665, 3)
+        found = fitted(recording(change, rng.normal(0.0, 1e-3, (COUNT, 3))))
+        truth = SCALE + change * TIMES[-1]
+        for c, name in enumerate("xyz"):
+            at = found.names.index(f"acc_scale.{name}")
+            sigma = np.sqrt(found.covariance[at, at])
+            pulls.append((found.values[at] - truth[c]) / sigma)
+    assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < 1.15

@@ -135,9 +135,16 @@ class Bench:
     def truth(self) -> dict[str, float]:
         """Parameters of the device by full name, at the end of the last position."""
         come = self.device.come_to(float(self.windows[-1, 1]))
+        groups = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+        found = {g: getattr(self, g) + come.get(g, 0.0) for g in groups}
+        if not self.stated:
+            acc, gyr = self.device.coupled
+            axes = own_axes(np.diag(found["acc_scale"]) + acc)
+            for group, others in (("acc_scale", acc), ("gyr_scale", gyr)):
+                found[group] = np.diag((np.diag(found[group]) + others) @ axes)
         return {
-            f"{group}.{axis}": float((getattr(self, group) + come.get(group, 0.0))[i])
-            for group in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+            f"{group}.{axis}": float(values[i])
+            for group, values in found.items()
             for i, axis in enumerate("xyz")
         }
 
@@ -153,6 +160,17 @@ class Samples:
     def within(self, start: float, end: float) -> NDArray[np.bool_]:
         """Whether each sample lies in a span."""
         return (self.t >= start) & (self.t <= end)
+
+
+def own_axes(coupled: Floats) -> Floats:
+    """Axes (3, 3) in which accelerometers see no k21, k31 and k32.
+
+    Where nobody knows how the device lay, they are all the axes that it has. Others
+    change its scale factors by the square of the cross-coupling.
+    """
+    turned, _ = np.linalg.qr(coupled[::-1].T)
+    axes: Floats = turned[:, ::-1]
+    return axes * np.sign(np.diag(coupled @ axes))
 
 
 def drawn(rng: np.random.Generator) -> Bench:

@@ -29,7 +29,11 @@ from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.met_columns import Met, met_columns
 from fieldcal.model.system.way_rows import WayRows, settling
 from fieldcal.model.turns.attitude import closures, geometry, rows_of
-from fieldcal.model.turns.turn import Turn, Turning, moved
+from fieldcal.model.turns.turn import Turn, Turning, moved, only
+from fieldcal.physics.experience import Experience
+
+SMALL = 1e-3
+"""Step of the force for a derivative, m/s^2."""
 
 STEADY = 3.0
 """Squares a row on the way, with everything fitted that shows there, from which a hand
@@ -103,7 +107,7 @@ class Turns:
         say; None where that is still to be sought, and the way is not looked at.
         """
         seen = self.way and known is not None and not _strange(known)
-        self.scale, self.known = state.scale, known if seen else None
+        self.known = known if seen else None
         self.at_ends = {
             first: EndColumns.of(first, one, self.rows.x, state)
             for first, one in self.dictionary.bases
@@ -113,6 +117,8 @@ class Turns:
             self.means = _means(windows, self.dictionary)
             self.off = _off(windows, self.dictionary)
             self.spread = _spread(windows, self.dictionary)
+            x, since = only(self.rows.x, self.first), self.dictionary.since
+            self.slopes = _slopes(state, x, since[:, self.first])
         turns = list(self.turning.turns(state))
         views = [self._view(turn, state) for turn in turns]
         met = met_columns(turns, views, self.dictionary, self.at_ends, self.known)
@@ -171,8 +177,8 @@ class Turns:
     def _unsure(self, p: int) -> Array:
         """Covariance of the accelerometers of a window at the end of a turn, (3, 3)."""
         moved = turned_force(self.rows.x.f[self.first[p]], self.wander[p])
-        scale = self.scale[:3]
-        out: Array = np.diag(self.spread[p]) + np.outer(scale, scale) * moved
+        slope = self.slopes[p]
+        out: Array = np.diag(self.spread[p]) + slope @ moved @ slope.T
         return out
 
     def _closure_variance(self, turn: Turn, view: RowView) -> float:
@@ -200,14 +206,15 @@ class Turns:
         """How the closure moves with what is added to the accelerometers at its ends.
 
         Of a position of unknown orientation, that turns the force that they are taken
-        to see: df = -(1 - n n^T) dU / k. Numbers of the two windows, (3, 3) each.
+        to see: df = -(1 - n n^T) (dU/df)^-1 dU. Of the two windows, (3, 3) each.
         """
         ends = turn.ends
         rows = rows_of(ends, turn.positions)
         both, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
         for i, p in enumerate(turn.positions):
+            j = int(np.searchsorted(self.dictionary.held, p))
             up = both[i] / np.linalg.norm(both[i])
-            across = (np.eye(3) - np.outer(up, up)) / self.scale[:3]
+            across = (np.eye(3) - np.outer(up, up)) @ np.linalg.inv(self.slopes[j])
             step = 1e-4 * float(np.linalg.norm(both[i]))
             sides = []
             for sign in (1.0, -1.0):
@@ -215,7 +222,7 @@ class Turns:
                 f[:, i] += sign * step * np.eye(3)
                 sides.append(closures(f, held, turn.attitude[-1])[0])
             bent = (sides[0] - sides[1]).T / (2 * step)
-            yield int(np.searchsorted(self.dictionary.held, p)), -bent @ across
+            yield j, -bent @ across
 
 
 def _strange(known: Set) -> bool:
@@ -278,6 +285,22 @@ def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
             info = np.add.reduceat(part.weight**2, first)
             out[part.window[first], part.channel] += 1 / info
+    return out
+
+
+def _slopes(state: State, x: Experience, since: Array) -> Array:
+    """Derivative of the accelerometers' outputs by the force in each row, (p, 3, 3).
+
+    With what is seen of other axes, and with curvature.
+    """
+    seen, out = state.experienced(x), np.zeros((len(x), 3, 3))
+    for c in range(3):
+        step = SMALL * np.eye(3)[c]
+        up, down = (
+            state.output(replace(seen, f=seen.f + s * step), since)[:, :3]
+            for s in (1.0, -1.0)
+        )
+        out[:, :, c] = (up - down) / (2 * SMALL)
     return out
 
 

@@ -54,6 +54,19 @@ def test_the_state_stays_where_the_set_does() -> None:
     assert own.step(best, inferred.values, moved) < STAYED
 
 
+def test_how_a_position_lies_moves_no_closure() -> None:
+    """It is read from accelerometers, whatever they couple, bend or are biased by."""
+    inferred = explained(88_000_036).inferred
+    own = inferred.inference
+    own.gram(inferred.state, inferred.values, None)
+    coupled = [t for t in inferred.state.terms if t.effect.id == "cross_coupling"]
+    assert np.abs(np.concatenate([t.values for t in coupled])).max() > 4e-3
+    lies = np.arange(own.dictionary.width)[own.dictionary.rotations]
+    moved = [t.design[:, np.isin(t.columns, lies)] for t in own.turned]
+    assert len(moved) > 5
+    assert max(np.abs(m).max(initial=0.0) for m in moved) < 1e-6
+
+
 @pytest.mark.thorough
 def test_sizes_do_not_hang_on_where_they_begin() -> None:
     """Of |f| each axis alone may do without its scatter, all three together not."""

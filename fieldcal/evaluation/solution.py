@@ -7,7 +7,7 @@ far as they were calm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -201,80 +201,87 @@ def solved_as(
     **asked: Any,
 ) -> Calibration:
     """The same of windows that were laid out already; raises as `solved` does."""
-    session, still, about = laid.session, laid.still, laid.session.about
-    if asked.get("level_sigma_deg") is None:
-        asked["level_sigma_deg"] = about.level_deg
-    if asked.get("angle_sigma_deg") is None:
-        asked["angle_sigma_deg"] = angle_setting(about)
-    asked.setdefault("beside_tilt_sigma_deg", priors.BESIDE_TILT_DEG)
-    device = replace(about, **(left or {}))
+    asked = _filled_in(laid, asked)
+    device = replace(laid.session.about, **(left or {}))
     asked["factory"] = factory_errors(device)
-    printed = bool(asked.get("as_printed"))
-    shown = None if printed else laid.explanation
-    notes = [] if printed else laid.unexamined
-    recorded = None if printed else laid.recorded(turns != "no", shown)
-    if shown is not None:
-        notes = [*notes, *of_the_setup(shown)]
-    stated = float(asked["angle_sigma_deg"])
+    if asked.get("as_printed"):
+        return _told(solve(laid.observations, **asked), laid, turns, [])
+    shown = laid.explanation
+    recorded = laid.recorded(turns != "no", shown)
 
-    def fit(angles: float) -> Calibration:
-        widened = {**asked, "angle_sigma_deg": angles}
-        return solve(laid.observations, recorded=recorded, **widened)
+    def fit() -> Calibration:
+        return solve(laid.observations, recorded=recorded, **asked)
 
-    found, angles = _as_shown(fit, stated, shown)
-    others = angles > thresholds.NO_ANGLE
-    if angles > stated and not others:
-        asked["angle_sigma_deg"] = angles
-        notes = [_worse_set(angles, stated), *notes]
-    shows = _grade(found, about)
-    if shows.because and not printed:
+    found, notes = _with_angles_shown(fit, asked, shown)
+    shows = _grade(found, laid.session.about)
+    if shows.because:
         asked["at_best"] = asked["factory"]
         asked["factory"] = factory_errors(device, shows.grade)
-        found = solve(laid.observations, recorded=recorded, **asked)
+        found = fit()
         found = replace(found, info={**found.info, "grade_shown": asdict(shows)})
-    if not printed:
-        found = with_tilt_shown(found, laid.observations, recorded, asked)
-    if turns == "yes":
-        _insist(found, session, still)
-    # why it is bad comes first
-    ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
-    found = replace(found, warnings=(*ahead, *still.warnings, *notes, *behind))
-    found = _listed(with_provenance(found, about), laid.order)
-    if not printed:
-        found = with_rounding(found, laid.rounding)
-    if laid.examined[1] and not printed:
-        found = replace(found, info={**found.info, "unexamined": laid.examined[1]})
+    found = with_tilt_shown(found, laid.observations, recorded, asked)
+    found = _told(found, laid, turns, [*notes, *laid.unexamined])
+    found = with_rounding(found, laid.rounding)
     if shown is None:
-        return found
-    if others:
-        found = replace(found, warnings=(OTHER_ANGLES, *found.warnings), good=False)
+        return replace(found, info={**found.info, "unexamined": laid.examined[1]})
     found = with_not_carried(with_jump(found, shown), uncarried(shown, found))
     return misread(shown.prepared, found)
 
 
-def _as_shown(
-    fit: Callable[[float], Calibration], stated: float, shown: Explanation | None
-) -> tuple[Calibration, float]:
-    """The result with angles set as stated, or as the recording shows them, and which.
+def _filled_in(laid: Laid, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """What is asked for, and what session.toml or the grade says where it is not."""
+    about = laid.session.about
+    own = {
+        "level_sigma_deg": about.level_deg,
+        "angle_sigma_deg": angle_setting(about),
+        "beside_tilt_sigma_deg": priors.BESIDE_TILT_DEG,
+    }
+    return own | {name: value for name, value in asked.items() if value is not None}
+
+
+def _told(
+    found: Calibration, laid: Laid, turns: Turns, notes: Sequence[str]
+) -> Calibration:
+    """With what is to be said of the windows; why it is bad comes first."""
+    if turns == "yes":
+        _insist(found, laid.session, laid.still)
+    ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
+    warnings = (*ahead, *laid.still.warnings, *notes, *behind)
+    found = with_provenance(replace(found, warnings=warnings), laid.session.about)
+    return _listed(found, laid.order)
+
+
+def _with_angles_shown(
+    fit: Callable[[], Calibration], asked: dict[str, Any], shown: Explanation | None
+) -> tuple[Calibration, list[str]]:
+    """The result with angles set as stated, or as the recording shows, and sentences.
 
     The rows are those of the set that is asked for: what this explains with the angles
     as stated, such as a tilt of the base, shows nothing of the angles.
 
     Parameters
     ----------
-    fit : result with angles that are set as well as so many deg
-    stated : how well, deg
+    fit : result of what is asked for
+    asked : what is; how well angles are set in the end
     shown : by the recording
 
     """
-    found = fit(stated)
-    angles = 0.0 if shown is None else angles_set(shown)
+    found = fit()
+    if shown is None:
+        return found, []
+    notes, stated = of_the_setup(shown), float(asked["angle_sigma_deg"])
+    angles = angles_set(shown)
     if angles <= stated:
-        return found, stated
-    wider = fit(min(angles, thresholds.NO_ANGLE))
-    if wider.info["log_evidence"] <= found.info["log_evidence"]:
-        return found, stated
-    return (found if angles > thresholds.NO_ANGLE else wider), angles
+        return found, notes
+    asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
+    wider = fit()
+    if wider.info["log_evidence"] > found.info["log_evidence"]:
+        if angles <= thresholds.NO_ANGLE:
+            return wider, [_worse_set(angles, stated), *notes]
+        warnings = (OTHER_ANGLES, *found.warnings)
+        found = replace(found, warnings=warnings, good=False)
+    asked["angle_sigma_deg"] = stated
+    return found, notes
 
 
 def _worse_set(angles: float, stated: float) -> str:

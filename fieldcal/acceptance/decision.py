@@ -258,7 +258,9 @@ def _angles(
     if not stated(found, about, limits):
         return [Check(ANGLES, False, f"{unseen}; {REMEDY}")]
     said = found.info.get("angle_sigma_deg") or 0.0
-    relied = f"the result relies on angles set to ± {said:.2g}°, as stated: {unseen}"
+    shown = "angles_stated_deg" in found.info
+    how = "as the recording shows" if shown else "as stated"
+    relied = f"the result relies on angles set to ± {said:.2g}°, {how}: {unseen}"
     return [Check(ANGLES, None, relied)]
 
 

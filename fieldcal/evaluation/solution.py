@@ -212,6 +212,7 @@ def solved_as(
     def fit() -> Calibration:
         return solve(laid.observations, recorded=recorded, **asked)
 
+    stated = asked["angle_sigma_deg"]
     found, notes = _with_angles_shown(fit, asked, shown)
     shows = _grade(found, laid.session.about)
     if shows.because:
@@ -222,6 +223,8 @@ def solved_as(
     found = with_tilt_shown(found, laid.observations, recorded, asked)
     found = _told(found, laid, turns, [*notes, *laid.unexamined])
     found = with_rounding(found, laid.rounding)
+    if asked["angle_sigma_deg"] > stated:
+        found = replace(found, info={**found.info, "angles_stated_deg": stated})
     if shown is None:
         return replace(found, info={**found.info, "unexamined": laid.examined[1]})
     found = with_not_carried(with_jump(found, shown), uncarried(shown, found))

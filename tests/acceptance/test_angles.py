@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -104,11 +105,14 @@ def test_who_is_told_before_a_run_that_nobody_vouches_for_the_angles(
 def test_a_word_on_the_angles_is_relied_on_and_repeated(site: dict[str, Any]) -> None:
     """Said to `solve` or in the session."""
     said = parse({"site": {"gravity": G, **site}})
-    made = decided(calibrated(five(), used=0.003), said)
-    (check,) = [c for c in made.checks if c.name == ANGLES]
+    found = calibrated(five(), used=0.003)
+    (check,) = [c for c in decided(found, said).checks if c.name == ANGLES]
     assert check.ok is None
-    assert "relies on angles set to ± 0.003°" in check.says
+    assert "relies on angles set to ± 0.003°, as stated" in check.says
     assert "could move" in check.says
+    shown = replace(found, info={**found.info, "angles_stated_deg": 0.001})
+    (check,) = [c for c in decided(shown, said).checks if c.name == ANGLES]
+    assert "relies on angles set to ± 0.003°, as the recording shows" in check.says
 
 
 @pytest.mark.parametrize("more", [FACES[1:4] + FACES[4:5], FACES[1:]])

@@ -247,7 +247,7 @@ def test_turns_bear_witness_to_angles_that_six_faces_make_up_for(
     main(["solve", str(tmp_path), "--json"])
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert "angles are set to ±" in " ".join(out["warnings"])
-    assert 0.03 < out["angle_sigma_deg"] < 0.1
+    assert 0.03 < out["angle_sigma_deg"] < 0.1 and out["angles_stated_deg"] == 0.01
     assert (np.abs(off(out, CALM)) < 4).all()
 
 

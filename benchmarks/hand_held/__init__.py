@@ -22,6 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks._own_axes import own_axes
 from benchmarks._words import how_many, option, ran
 from benchmarks.hand_held.draws import GRAVITY, Device, Log, log
 from fieldcal.core.samples import Array
@@ -93,7 +94,7 @@ def pulls(told: dict[str, Any], device: Device) -> Array:
     with the y accelerometer (an upper triangle of cross-coupling). Where biases change
     nobody knows at what instant they are the true ones: those are left out.
     """
-    upper, turn = _upper(device.acc)
+    upper, turn = own_axes(device.acc)
     gyr = device.gyr @ turn.T
     truth = {
         "acc_bias": device.acc_bias, "acc_scale": np.diag(upper),
@@ -117,14 +118,6 @@ def pulls(told: dict[str, Any], device: Device) -> Array:
             out.append(off / np.array(one["sigma"], float))
     pulled: Array = np.concatenate([np.zeros(0), *out])
     return pulled[np.isfinite(pulled)]
-
-
-def _upper(mixed: Array) -> tuple[Array, Array]:
-    """An upper triangle and a rotation whose product a matrix is."""
-    flipped = np.linalg.qr(mixed[::-1].T)
-    turn, upper = flipped[0].T[::-1], flipped[1].T[::-1, ::-1]
-    sign = np.sign(np.diag(upper))
-    return upper * sign, turn * sign[:, None]
 
 
 def _may_be(device: Device) -> set[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks._own_axes import own_axes
 from benchmarks.never_wrong.acting import Acting
 from benchmarks.never_wrong.device import Device
 
@@ -139,9 +140,9 @@ class Bench:
         found = {g: getattr(self, g) + come.get(g, 0.0) for g in groups}
         if not self.stated:
             acc, gyr = self.device.coupled
-            axes = own_axes(np.diag(found["acc_scale"]) + acc)
-            for group, others in (("acc_scale", acc), ("gyr_scale", gyr)):
-                found[group] = np.diag((np.diag(found[group]) + others) @ axes)
+            upper, axes = own_axes(np.diag(found["acc_scale"]) + acc)
+            seen = (np.diag(found["gyr_scale"]) + gyr) @ axes.T
+            found |= {"acc_scale": np.diag(upper), "gyr_scale": np.diag(seen)}
         return {
             f"{group}.{axis}": float(values[i])
             for group, values in found.items()
@@ -160,17 +161,6 @@ class Samples:
     def within(self, start: float, end: float) -> NDArray[np.bool_]:
         """Whether each sample lies in a span."""
         return (self.t >= start) & (self.t <= end)
-
-
-def own_axes(coupled: Floats) -> Floats:
-    """Axes (3, 3) in which accelerometers see no k21, k31 and k32.
-
-    Where nobody knows how the device lay, they are all the axes that it has. Others
-    change its scale factors by the square of the cross-coupling.
-    """
-    turned, _ = np.linalg.qr(coupled[::-1].T)
-    axes: Floats = turned[:, ::-1]
-    return axes * np.sign(np.diag(coupled @ axes))
 
 
 def drawn(rng: np.random.Generator) -> Bench:

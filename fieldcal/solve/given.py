@@ -132,10 +132,13 @@ class Given(Dictionary):
     @cached_property
     def ending(self) -> Array:
         """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        left = [m for m in self.asked if m[1].part in WARMING]
-        left += [m for m in self.asked if m[0].name == WARM_SCALE]
-        left += self._warm.values()
-        return at_end(self, (Shown(tuple(left), 1.0), *self.explanations))
+        known = (*self.asked, *self._warm.values())
+        left = tuple(
+            (cause, group)
+            for cause, group in known
+            if cause.name == WARM_SCALE or group.part in WARMING
+        )
+        return at_end(self, (Shown(left, 1.0), *self.explanations))
 
     @property
     def groups(self) -> list[Group]:

@@ -38,11 +38,12 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import only
 from fieldcal.physics.effect import Motion, Scatter, Sensor
+from fieldcal.solve.warm_scales import WARM_SCALE
 
 AXES = 3
 """Parameters from which on an effect is not taken on some of them alone."""
 
-CHANGING = ("time", "temperature", "force and time", "flicker")
+CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
 """Functions without physics whose value at the end is part of what the device has come
 to; those of angles and forces have no zero."""
 

@@ -1,12 +1,13 @@
 """Scale factors of accelerometers that change while their biases do.
 
-    U_i += s_i c(t) f_i,   s_i = N(0, (r b / g)^2)                                 (1)
+    U_i += sum_k s_ik c_k(t) f_i,   s_ik = N(0, (r b_k / g)^2)                     (1)
 
-c(t) is the course by which the temperature changes the biases, b how large the changes
-of the biases are, and r the part of that which a scale factor changes by at 1 g. A
-position that is taken once cannot tell (1) from other scale factors, and the next
-flight starts with what they have become. The MPU-6050 states 0.02 %/K beside 35 mg from
-25 to 70 degC, which is r = 0.25.
+c_k(t) are the courses by which the temperature changes the biases, b_k how large the
+change of the biases by each is, and r the part of that which a scale factor changes by
+at 1 g. A position that is taken once cannot tell (1) from other scale factors, and the
+next flight starts with what they have become. The MPU-6050 states 0.02 %/K beside 35 mg
+from 25 to 70 degC, which is r = 0.25. A smooth course of biases that no effect
+describes counts as made by the temperature: it is what changes most of them.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView
+from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 
@@ -28,6 +29,9 @@ ACC = 3
 WARM_SCALE = "warm_scale"
 """What these groups are called."""
 
+COURSES = ("time", "temperature")
+"""Functions without physics that may be the temperature's."""
+
 
 def warm_scale(table: ColumnTable, group: Group) -> Member | None:
     """What changes the scale factors beside a group that changes the biases.
@@ -35,29 +39,59 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
     Parameters
     ----------
     table : to which the columns are added
-    group : none comes back unless it follows the temperature and is on accelerometers
+    group : none comes back unless it may follow the temperature and is on
+        accelerometers
 
     """
-    effect = group.effect
-    if not isinstance(effect, BiasChange) or not effect.thermal:
+    if not _thermal(group):
         return None
-    some = [i for i, j in enumerate(group.params) if j < ACC]
-    if not some:
+    course, which, size = _courses(table, group)
+    if not len(which):
         return None
 
     def columns(view: RowView) -> Array:
-        seen, out = view.counting_from(group.origin), np.zeros((len(view.x), 6, ACC))
-        course = effect.course(seen, group.shape)
+        c_of_t = course.of(view)[:, which]
+        out = np.zeros((len(view.x), 6, ACC, len(which)))
         for c in range(ACC):
-            out[:, c, c] = course * seen.f[:, c]  # (1)
-        return out
+            out[:, c, c] = c_of_t * view.x.f[:, [c]]  # (1)
+        return out.reshape(len(out), 6, -1)
 
-    wide = group.sizes(1.0 if group.fixed is None else group.fixed)[some]
-    bias = np.abs(wide / table.unit[[group.params[i] for i in some]])
-    size = priors.SCALE_WARMS * float(np.sqrt(np.mean(bias**2))) / G0
-    at = table.add(General(WARM_SCALE, columns), ACC) + np.arange(ACC)
+    count = ACC * len(which)
+    at = table.add(General(WARM_SCALE, columns), count) + np.arange(count)
+    wide = np.abs(np.outer(table.unit[:ACC], priors.SCALE_WARMS * size / G0))
     one = Group(
-        WARM_SCALE, "", at, size * np.abs(table.unit[:ACC]), effect, group.shape,
-        group.origin, (0, 1, 2), fixed=1.0,
+        WARM_SCALE, "", at, wide.ravel(), group.effect, group.shape, group.origin,
+        tuple(np.repeat(range(ACC), len(which)).tolist()), fixed=1.0,
     )  # fmt: skip
     return Cause(WARM_SCALE, "", 1.0, (one,), "noise"), one
+
+
+def _thermal(group: Group) -> bool:
+    """Whether it may be the temperature that makes a group."""
+    effect = group.effect
+    if effect is None:
+        return group.cause in COURSES
+    return isinstance(effect, BiasChange) and effect.thermal
+
+
+def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
+    """Courses of a group's columns, which of them, and how large biases are by each.
+
+    Those on accelerometers alone, m/s^2.
+    """
+    first, basis = next(
+        (first, basis)
+        for first, end, basis in table.spans()
+        if first <= group.columns[0] < end
+    )
+    if not isinstance(basis, Course):
+        raise TypeError(f"{group.cause} is no course of biases")
+    channel, number = np.divmod(group.columns - first, basis.width)
+    on_acc = channel < ACC
+    wide = (
+        group.sizes(1.0 if group.fixed is None else group.fixed) / table.unit[channel]
+    )
+    which, at = np.unique(number[on_acc], return_inverse=True)
+    count = np.bincount(at, minlength=len(which))
+    size = np.sqrt(np.bincount(at, wide[on_acc] ** 2, len(which)) / count)
+    return basis, which, size

@@ -12,8 +12,10 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import SIX_FACES, Position
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.effect_causes import of_effects
+from fieldcal.model.causes.unknown_causes import of_no_effect
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.solve.estimation import Estimated, Recorded, estimated
@@ -47,23 +49,29 @@ def given(wanted: Wanted | None = None) -> Given:
     return Given(CALM.rows, np.ones(6), CALM.since, False, wanted or Wanted())
 
 
-def drift(name: str = "bias_drift") -> Member:
+def with_gyroscopes() -> Given:
+    seen = observe(PLACES, outputs(PLACES), gyr=np.zeros((COUNT, 3)))
+    rows = of_means(replace(seen, time=TIMES))
+    return Given(rows.rows, np.ones(6), rows.since, False, Wanted())
+
+
+def drift(d: Given) -> Member:
     """A cause on all accelerometers, as large as the biases drift."""
-    d = given()
-    cause = next(c for c in of_effects(d) if (c.name, c.part) == (name, "acc"))
+    cause = next(c for c in of_effects(d) if c.key == "bias_drift:acc")
     group = next(g for g in cause.variants if len(g.params) == 3)
     cause = replace(cause, variants=(group,)).of_size(SIZE / group.typical[0])
     return cause, cause.variants[0]
 
 
 def fitted(recorded: Recorded) -> Estimated:
-    cause, group = drift()
+    cause, group = drift(given())
     shown = (Shown(((cause, group),), 1.0, sizes=(group.fixed or 0.0,)),)
     return estimated(replace(recorded, shown=shown), None, NOMINAL, Wanted())
 
 
 def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> None:
-    d, (_, group) = given(), drift()
+    d = given()
+    _, group = drift(d)
     found = warm_scale(d, group)
     assert found is not None
     _, one = found
@@ -93,14 +101,76 @@ def test_what_changes_scale_factors_is_the_temperature(
     name: str, thermal: bool
 ) -> None:
     effect = catalogue()[name]
-    group = replace(drift()[1], effect=effect)
-    assert (warm_scale(given(), group) is not None) == thermal
+    d = given()
+    group = replace(drift(d)[1], effect=effect)
+    assert (warm_scale(d, group) is not None) == thermal
 
 
 def test_nothing_comes_of_gyroscopes_or_of_what_is_no_bias() -> None:
-    d, (_, group) = given(), drift()
-    assert warm_scale(d, replace(group, params=(3, 4, 5))) is None
+    d = with_gyroscopes()
+    _, group = drift(d)
+    cause = next(c for c in of_effects(d) if c.key == "bias_drift:gyr")
+    assert warm_scale(d, cause.variants[0]) is None
     assert warm_scale(d, replace(group, effect=None)) is None
+
+
+def unknown(d: Given, name: str, part: str) -> Group:
+    """A function without physics."""
+    causes = of_no_effect(d)
+    return next(c for c in causes if (c.name, c.part) == (name, part)).variants[0]
+
+
+@pytest.mark.parametrize(("part", "axes"), [("acc", 3), ("ay", 1)])
+def test_a_course_without_physics_may_be_the_temperatures(part: str, axes: int) -> None:
+    """All scale factors by each of its cosines, however many biases follow it."""
+    d = given()
+    group = replace(unknown(d, "time", part), fixed=2.0)
+    found = warm_scale(d, group)
+    assert found is not None
+    _, one = found
+    count = len(group.columns) // axes
+    sizes = 0.25 * group.sizes(2.0)[:count] / 9.80665
+    np.testing.assert_allclose(one.sizes(1.0), np.tile(sizes, 3))
+    first, _, basis = list(d.spans())[-1]
+    assert one.columns[0] == first
+    columns = basis.of(RowView.of(d.x, d.since, NOMINAL))
+    expected = d.span.waves(d.x)[:, None, :count] * d.x.f[:, :, None]
+    for c in range(3):
+        own = columns[:, :, c * count : (c + 1) * count]
+        np.testing.assert_allclose(own[:, c], expected[:, c])
+        assert not np.delete(own, c, axis=1).any()
+
+
+def test_other_functions_without_physics_change_no_scale_factor() -> None:
+    d = with_gyroscopes()
+    assert warm_scale(d, unknown(d, "time", "gyr")) is None
+    for name in ("window", "position", "alpha", "force and time"):
+        assert warm_scale(d, unknown(d, name, "ax")) is None
+
+
+def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() -> None:
+    """Drawn from the prior, all of what is said of the end is as far off as stated."""
+    rng = np.random.default_rng(20)
+    d, pulls = given(), []
+    cause = next(c for c in of_no_effect(d) if c.key == "time:acc")
+    group = cause.variants[0]
+    count = len(group.columns) // 3
+    size = group.sizes(1.0)[:count]
+    shown = (Shown(((cause, group),), 1.0, sizes=(1.0,)),)
+    waves, force = d.span.waves(d.x)[:, :count], outputs(PLACES, bias=np.zeros(3))
+    end = np.cos(np.pi * np.arange(1, count + 1))
+    for _ in range(40):
+        bias, scales = rng.normal(size=(2, 3, count)) * size
+        scales *= 0.25 / 9.80665
+        noise = 1e-4 * rng.standard_normal((COUNT, 3))
+        acc = outputs(PLACES) + waves @ bias.T + waves @ scales.T * force / SCALE
+        rows = of_means(replace(observe(PLACES, acc + noise, sigma=1e-4), time=TIMES))
+        one = estimated(replace(rows, shown=shown), None, NOMINAL, Wanted())
+        at = [one.names.index(f"acc_scale.{a}") for a in "xyz"]
+        truth = SCALE + scales @ end
+        sigma = np.sqrt(np.diag(one.covariance)[at])
+        pulls.append((np.array(one.values)[at] - truth) / sigma)
+    assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.2
 
 
 def test_what_the_device_warms_up_by_unseen_is_in_its_scale_factors() -> None:

@@ -181,7 +181,7 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
         if better.score <= found.best.score + SETTLED:
             break
         # what may stand in the place of a cause does so better than the cause itself
-        found = found.inference.resumed(better)
+        found = found.inference.resumed(better, found)
         posterior = _posterior(found)
     inference = found.inference
     windows = inference.system.linearised(found.state)

@@ -34,6 +34,9 @@ SCATTERED = 4.0
 """Instability, in that of a typical device, behind which causes may be that nothing but
 each other shows."""
 
+Key = tuple[tuple[str, int], ...]
+"""Of a set: the keys of its causes with their variants."""
+
 AFAR = 0.05
 """An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
 
@@ -51,6 +54,7 @@ class Inferred:
     values : (k,) of the dictionary's columns in that state
     turned : rows of the turns about it
     contradicted : windows between which the gyroscopes lead elsewhere about it
+    been : sets that a state of their own was found for, by their keys
 
     """
 
@@ -61,6 +65,7 @@ class Inferred:
     values: Array
     turned: Sequence[TurnRows]
     contradicted: tuple[tuple[int, int], ...]
+    been: frozenset[Key]
 
 
 class Inference(Refinement):
@@ -87,21 +92,31 @@ class Inference(Refinement):
         self.dictionary.joined(in_proportion(self.dictionary, list(about)))
         return self._until_it_stays(state, values, found, thorough=begin is None)
 
-    def resumed(self, better: Set) -> Inferred:
-        """Go on with a set that is better than what was found."""
+    def resumed(self, better: Set, before: Inferred) -> Inferred:
+        """Go on with a set that is better than what was found before.
+
+        What leads back to a set that was gone through before would lead to all that
+        followed it: of several that are about as likely, each leads to the next one.
+        """
         start: Array = np.zeros(self.dictionary.width)
         state, values, _ = self.settled(self.nominal, start, ())
-        return self._until_it_stays(state, values, better, thorough=False)
+        return self._until_it_stays(state, values, better, False, before.been)
 
     def _until_it_stays(
-        self, state: State, values: Array, found: Set, thorough: bool
+        self,
+        state: State,
+        values: Array,
+        found: Set,
+        thorough: bool,
+        been: frozenset[Key] = frozenset(),
     ) -> Inferred:
         """Settle and search in turn, from a set, about a state that has no members.
 
-        What costs much is tried if it is to be `thorough`, where the rest stays.
+        What costs much is tried if it is to be `thorough`, where the rest stays. A set
+        that has `been` gone through ends it.
         """
         members: tuple[Member, ...] = ()
-        seen: set[tuple[tuple[str, int], ...]] = set()
+        seen = set(been)
         passed: dict[tuple[Member, ...], None] = {}
         for _ in range(PASSES):
             seen.add(Search.key(found.members))
@@ -134,8 +149,9 @@ class Inference(Refinement):
                 break
         astray = self.turns.turning.contradicted if self.turns is not None else ()
         return Inferred(
-            self, search, found, state, self.padded(values), self.turned, tuple(astray)
-        )
+            self, search, found, state, self.padded(values), self.turned, tuple(astray),
+            frozenset(seen),
+        )  # fmt: skip
 
     def _from_nothing(
         self, state: State, values: Array, search: Search

@@ -22,7 +22,6 @@ from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import calibrated
-from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, listed
 from fieldcal.diagnosis.prepare import Prepared
 from fieldcal.diagnosis.signal.chain import found_first
@@ -84,17 +83,6 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     return right, tuple(sentences)
 
 
-def angles_set(explanation: Explanation) -> float:
-    """How well a recording shows that angles are set, deg; 0 if it shows nothing."""
-    found = [0.0]
-    for one in explanation.standing:
-        effect = catalogue().get(one.name)
-        if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
-            told = sizes(explanation, one).values()
-            found += [q.value for q in told if isinstance(q.value, float)]
-    return max(found)
-
-
 def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
     """What a recording shows that a calibration of it does not carry."""
     out = [s for s in explanation.standing if not _carries(calibration, s)]
@@ -105,6 +93,16 @@ def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
         _moved(explanation, out),
         {s.name: _wrong_angles(explanation, s) for s in out if s.kind == "position"},
     )
+
+
+def repeated_angles(explanation: Explanation) -> list[str]:
+    """Sentences about angles that were wrong wherever they were set."""
+    return [
+        f"the recording shows {_wrong_angles(explanation, s)}: the result is for the"
+        " angle that was found; mend it before the next recording"
+        for s in explanation.standing
+        if s.kind == "position" and any(group.together for _, group in s.members)
+    ]
 
 
 def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
@@ -121,18 +119,18 @@ def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
 def _carries(calibration: Calibration, standing: Standing) -> bool:
     """Whether a cause is no effect, is random, or is in the calibration itself.
 
-    A fault of the fixture that several positions share is no effect, and in none: one
-    position by itself is left out by the fit, these are not.
+    A fault of the fixture that several positions share is no effect, and none of them
+    is left out by the fit as one position by itself is.
     """
+    with_it = calibration.info.get("carried", {}).get("causes", {})
     if any(group.together for _, group in standing.members):
-        return False
+        return standing.name in with_it
     effect = catalogue().get(standing.name)
     if effect is None or isinstance(effect, Scatter):
         return True
     carrying = {standing.name, *standing.aliases, effect.carried_by}
     if standing.name in TILTS and "beside_tilt_sigma_deg" in calibration.info:
         carrying |= {*TILTS}  # the one that fits, with some of the other one
-    with_it = calibration.info.get("carried", {}).get("causes", {})
     return bool(carrying & {*calibration.groups, *with_it})
 
 

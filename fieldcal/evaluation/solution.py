@@ -21,11 +21,12 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
 from fieldcal.diagnosis.wording.paragraph import of_the_setup
+from fieldcal.evaluation.angles_shown import angles_of_offsets, angles_set
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
-    angles_set,
     misread,
+    repeated_angles,
     uncarried,
     with_not_carried,
 )
@@ -272,19 +273,31 @@ def _with_angles_shown(
     found = fit()
     if shown is None:
         return found, []
-    notes, stated = of_the_setup(shown), float(asked["angle_sigma_deg"])
-    angles = angles_set(shown)
-    if angles <= stated:
-        return found, notes
-    asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
-    wider = fit()
-    if wider.info["log_evidence"] > found.info["log_evidence"]:
-        if angles <= thresholds.NO_ANGLE:
-            return wider, [_worse_set(angles, stated), *notes]
-        warnings = (OTHER_ANGLES, *found.warnings)
-        found = replace(found, warnings=warnings, good=False)
-    asked["angle_sigma_deg"] = stated
+    notes = [*repeated_angles(shown), *of_the_setup(shown)]
+    stated, angles = float(asked["angle_sigma_deg"]), angles_set(shown)
+    if angles > stated:
+        asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
+        wider = fit()
+        if wider.info["log_evidence"] <= found.info["log_evidence"]:
+            asked["angle_sigma_deg"] = stated
+        elif angles <= thresholds.NO_ANGLE:
+            found, notes = wider, [_worse_set(angles, stated), *notes]
+        else:
+            asked["angle_sigma_deg"] = stated
+            warnings = (OTHER_ANGLES, *found.warnings)
+            return replace(found, warnings=warnings, good=False), notes
+    if (unknown := angles_of_offsets(shown)) > asked["angle_sigma_deg"]:
+        asked["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
+        found, notes = fit(), [_may_be_angles(unknown), *notes]
     return found, notes
+
+
+def _may_be_angles(angles: float) -> str:
+    return (
+        "accelerometers are off in some positions for no reason that is known, by as"
+        f" much as angles set to ± {angles:.2g}° would make them: the uncertainties are"
+        " for that; fieldcal diagnose says where"
+    )
 
 
 def _worse_set(angles: float, stated: float) -> str:

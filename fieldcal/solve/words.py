@@ -22,6 +22,10 @@ NO_SCALE = (
 FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
 
 
+IN_WORDS = {"repeated_angle": "an angle that is wrong wherever it is set"}
+"""What is no effect, by its id."""
+
+
 def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> str:
     """Name parameters that the data leave open, and what would fix it."""
     verb = "are" if len(missing) > 1 else "is"
@@ -74,7 +78,7 @@ def carried(
         return ""
     listed = join(
         [
-            f"{i} (probability {p:.2f})"
+            f"{IN_WORDS.get(i, i)} (probability {p:.2f})"
             for i, p in causes.items()
             if p >= thresholds.MENTIONED
         ]

@@ -309,3 +309,28 @@ def test_a_tilt_that_a_result_has_some_of_beside_the_other_is_carried() -> None:
         shown = Standing(name, (), 0.99, ())
         assert not_carried._carries(both, shown)
         assert not_carried._carries(only, shown) == (name == "base_tilt")
+
+
+def test_offsets_without_a_cause_may_be_angles_by_which_turns_are_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of one output in one position: nothing there tells it from an angle."""
+    held, odd, size = places(WIDE), 6, 0.02
+    block = recorded(CALM, held)
+    inside = (block.t >= held[odd]["start_s"]) & (block.t <= held[odd]["end_s"])
+    acc = block.acc + np.outer(inside, [0.0, 0.0, size])
+    found = {}
+    for name, six in (("as it was", block.acc), ("off", acc)):
+        site = {**SITE, "angle_setting_deg": 0.003}
+        write_session(tmp_path / name, replace(block, acc=six), held, site=site)
+        main(["solve", str(tmp_path / name), "--json"])
+        found[name] = json.loads(capsys.readouterr().out)
+    assert found["as it was"]["angle_sigma_deg"] == 0.003
+    out = found["off"]
+    as_angle = np.rad2deg(size / 9.81) / np.sqrt(len(WIDE))
+    assert out["angles_stated_deg"] == 0.003
+    assert 0.8 < out["angle_sigma_deg"] / as_angle < 1.2
+    assert any("no reason that is known" in w for w in out["warnings"])
+    before, after = (found[n]["parameters"]["gyr_scale"] for n in found)
+    assert (np.array(after["sigma"]) > 1.2 * np.array(before["sigma"])).all()
+    assert (np.abs(off(out, CALM)) < 4).all()

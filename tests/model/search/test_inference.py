@@ -1,5 +1,8 @@
 """Sessions of the virtual device, and what the state that was found leaves of them."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,8 @@ from benchmarks.concealed.draws import sized
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare
+from fieldcal.model.evidence.sets import Set
+from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import whole
 
 FADING = {
@@ -55,3 +60,30 @@ def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
     assert not session.angles
     found = explain(prepare(session.record(32_002_000), session.about))
     assert [one.name for one in found.standing] == ["cross_coupling"]
+
+
+def test_what_was_gone_through_is_not_gone_through_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first set that is found ends it, where what follows from that is known."""
+    rng = np.random.default_rng(1)
+    session = plain(rng, ("wide",)).having({"cross_coupling": {"k12": 0.006}})
+    found = explain(prepare(session.record(1), session.about)).inferred
+    assert found.best.keys == {"cross_coupling"}
+    assert found.search.key(found.best.members) in found.been
+    runs: list[Set] = []
+    run = Search.run
+
+    def kept(self: Search, *known: Any, **more: Any) -> Set:
+        runs.append(run(self, *known, **more))
+        return runs[-1]
+
+    monkeypatch.setattr(Search, "run", kept)
+    nothing = found.search.evaluated(())
+    again = found.inference.resumed(nothing, found)
+    assert again.best.keys == found.best.keys and len(runs) > 1
+    first = Search.key(runs[0].members)
+    runs.clear()
+    ended = found.inference.resumed(nothing, replace(found, been=frozenset({first})))
+    assert [Search.key(one.members) for one in runs] == [first]
+    assert Search.key(ended.best.members) == first

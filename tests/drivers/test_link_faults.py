@@ -181,7 +181,8 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
 def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
     with Run(tmp_path, "serial --with dropped:fraction=0.05", 4.0) as run:
         code, result, said = run.end()
-    assert code == 1 and "samples missing" in result["decision"]["reasons"][0], said
+    reasons = result["decision"]["reasons"]  # windows of 4 s may miss a limit as well
+    assert code == 1 and any("samples missing" in one for one in reasons), said
     marks, block = run.marks("link"), Session.open(run.folder).block
     lost = sum(mark["missing"] for mark in marks)
     share = lost / (lost + len(block))

@@ -7,7 +7,7 @@ far as they were calm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -20,13 +20,11 @@ from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.diagnosis.wording.paragraph import of_the_setup
-from fieldcal.evaluation.angles_shown import angles_of_offsets, angles_set
+from fieldcal.evaluation.angles_shown import with_angles_shown
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
     misread,
-    repeated_angles,
     uncarried,
     with_not_carried,
 )
@@ -42,7 +40,7 @@ from fieldcal.evaluation.rounding_mode import (
     rounding_mode,
     with_rounding,
 )
-from fieldcal.model import priors, thresholds
+from fieldcal.model import priors
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
@@ -52,13 +50,6 @@ from fieldcal.solve.rows import variances, widened
 from fieldcal.solve.shown import Shown
 
 Turns = Literal["auto", "yes", "no"]
-
-OTHER_ANGLES = (
-    "the positions are not those of session.toml: most of them lie elsewhere than its"
-    " angles say, by more than anybody sets an angle wrong; look for positions in"
-    " another order, a sign, or axes that are named wrongly, and solve again"
-)
-"""Said where angles say nothing."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +205,7 @@ def solved_as(
         return solve(laid.observations, recorded=recorded, **asked)
 
     stated = asked["angle_sigma_deg"]
-    found, notes = _with_angles_shown(fit, asked, shown)
+    found, notes = with_angles_shown(fit, asked, shown)
     shows = _grade(found, laid.session.about)
     if shows.because:
         asked["at_best"] = asked["factory"]
@@ -253,59 +244,6 @@ def _told(
     warnings = (*ahead, *laid.still.warnings, *notes, *behind)
     found = with_provenance(replace(found, warnings=warnings), laid.session.about)
     return _listed(found, laid.order)
-
-
-def _with_angles_shown(
-    fit: Callable[[], Calibration], asked: dict[str, Any], shown: Explanation | None
-) -> tuple[Calibration, list[str]]:
-    """The result with angles set as stated, or as the recording shows, and sentences.
-
-    The rows are those of the set that is asked for: what this explains with the angles
-    as stated, such as a tilt of the base, shows nothing of the angles.
-
-    Parameters
-    ----------
-    fit : result of what is asked for
-    asked : what is; how well angles are set in the end
-    shown : by the recording
-
-    """
-    found = fit()
-    if shown is None:
-        return found, []
-    notes = [*repeated_angles(shown), *of_the_setup(shown)]
-    stated, angles = float(asked["angle_sigma_deg"]), angles_set(shown)
-    if angles > stated:
-        asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
-        wider = fit()
-        if wider.info["log_evidence"] <= found.info["log_evidence"]:
-            asked["angle_sigma_deg"] = stated
-        elif angles <= thresholds.NO_ANGLE:
-            found, notes = wider, [_worse_set(angles, stated), *notes]
-        else:
-            asked["angle_sigma_deg"] = stated
-            warnings = (OTHER_ANGLES, *found.warnings)
-            return replace(found, warnings=warnings, good=False), notes
-    if (unknown := angles_of_offsets(shown)) > asked["angle_sigma_deg"]:
-        asked["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
-        found, notes = fit(), [_may_be_angles(unknown), *notes]
-    return found, notes
-
-
-def _may_be_angles(angles: float) -> str:
-    return (
-        "accelerometers are off in some positions for no reason that is known, by as"
-        f" much as angles set to ± {angles:.2g}° would make them: the uncertainties are"
-        " for that; fieldcal diagnose says where"
-    )
-
-
-def _worse_set(angles: float, stated: float) -> str:
-    return (
-        f"the recording shows that angles are set to ± {angles:.2g}° only, not"
-        f" ± {stated:.2g}°: the uncertainties are for that; mend the fixture, or write"
-        " down the angles that it really sets"
-    )
 
 
 def _grade(found: Calibration, about: Description) -> GradeShown:

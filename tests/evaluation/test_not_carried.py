@@ -15,7 +15,7 @@ from session_folders import SITE, places, recorded, write_session
 from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
-from fieldcal.evaluation import not_carried, solution
+from fieldcal.evaluation import angles_shown, not_carried
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import effect
@@ -227,13 +227,13 @@ def test_angles_that_nobody_sets_so_are_those_of_other_positions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Their size was refused as an option that nobody had given."""
-    monkeypatch.setattr(solution, "angles_set", lambda _: size)
+    monkeypatch.setattr(angles_shown, "angles_set", lambda _: size)
     said = places([FACES[i] for i in (0, 2, 1, 3, 4, 5)])
     write_session(tmp_path, recorded(CALM, places(FACES)), said, site=SITE)
     assert main(["solve", str(tmp_path), "--json"]) == 1
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert out["verdict"] == "bad" or not other
-    assert (solution.OTHER_ANGLES in out["warnings"]) == other
+    assert (angles_shown.OTHER_ANGLES in out["warnings"]) == other
 
 
 def test_turns_bear_witness_to_angles_that_six_faces_make_up_for(

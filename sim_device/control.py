@@ -4,7 +4,8 @@ Requests, one key each:
 
     {"turn": {"alpha_deg": 45, "beta_deg": 5}}      also "gamma_deg", "seconds", "at_s"
     {"spin": {"rate_deg_s": [0, 30, 0]}}            a rate table; also the keys of turn
-    {"bump": {}}                                    "push", "tilt_deg", "seconds"
+    {"bump": {}}                                    "push", "tilt_deg", "seconds",
+                                                    "at_s"
     {"fault": {"silence_s": 2}}                     "hangup_s", "garbage_bytes",
                                                     "flip_bits", "lose_bytes",
                                                     "double_bytes", "reboot_s",

@@ -117,12 +117,25 @@ class VirtualDevice:
         return end * self.sensing.pace
 
     def bump(
-        self, push: float = 2.0, tilt_deg: float = 0.5, seconds: float = 0.5
+        self,
+        push: float = 2.0,
+        tilt_deg: float = 0.5,
+        seconds: float = 0.5,
+        at: float | None = None,
     ) -> float:
-        """Bump the base now: peaks in m/s^2 and degrees, s; returns when it is over."""
+        """Bump the base: peaks in m/s^2 and degrees, s; returns when it is over.
+
+        It begins with the next sample, or at a device time `at` still to come.
+
+        Raises
+        ------
+        InputError
+            If a number is not finite, the duration not above 0, or the time past.
+
+        """
         if not (seconds > 0 and np.isfinite([push, tilt_deg, seconds]).all()):
             raise InputError(f"a bump lasts more than 0 s, not {seconds:g} s")
-        start = self.time / self.sensing.pace
+        start = self._start(at)
         given = {"at_s": start, "for_s": seconds, "push": push, "tilt_deg": tilt_deg}
         self.body.disturb(effect("bump", given))
         return (start + seconds) * self.sensing.pace

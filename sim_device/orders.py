@@ -69,9 +69,9 @@ def _spin(stream: DeviceStream, given: dict[str, Any]) -> Reply:
 
 def _bump(stream: DeviceStream, given: dict[str, Any]) -> Reply:
     push, tilt_deg = _number(given, "push", 2.0), _number(given, "tilt_deg", 0.5)
-    seconds = _number(given, "seconds", 0.5)
-    _nothing_else("bump", given, ("push", "tilt_deg", "seconds"))
-    return {"until_s": stream.device.bump(push, tilt_deg, seconds)}
+    seconds, at = _number(given, "seconds", 0.5), _optional(given, "at_s")
+    _nothing_else("bump", given, ("push", "tilt_deg", "seconds", "at_s"))
+    return {"until_s": stream.device.bump(push, tilt_deg, seconds, at)}
 
 
 def _fault(stream: DeviceStream, given: dict[str, Any]) -> Reply:

@@ -85,6 +85,8 @@ def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:
     peak = np.linalg.norm(bump.push(t), axis=0).max()
     assert peak == pytest.approx(1.5, rel=1e-5)
     assert np.rad2deg(bump.angle(t).x).max() == pytest.approx(2.0)
+    assert carry_out(stream, {"bump": {"at_s": 7.0}})["until_s"] == 7.5
+    assert (stream.device.body.moves[-1].start, stream.device.time) == (7.0, 0.0)
     carry_out(stream, {"turn": {"alpha_deg": 10.0}})
     carry_out(stream, {"turn": {"beta_deg": 2.0}})
     np.testing.assert_allclose(np.rad2deg(stream.device.angles), [10, 2, 0])

@@ -250,6 +250,7 @@ def test_orders_that_are_none_are_refused_and_do_nothing(sims: list[Sim]) -> Non
             ({"fault": {"silence_s": -1}}, "0 or more"),
             ({"fault": {"flip_bits": 0}}, "whole number"),
             ({"bump": {"seconds": 0}}, "more than 0 s"),
+            ({"bump": {"at_s": -1}}, "nothing can begin"),
             ({"turn": {}, "stop": True}, "one key"),
         ):
             with pytest.raises(InputError, match=says):

@@ -23,7 +23,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.wording.paragraph import of_the_setup
 from fieldcal.effects import catalogue
-from fieldcal.evaluation.not_carried import repeated_angles
+from fieldcal.evaluation.not_carried import wrong_angles
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
@@ -88,7 +88,7 @@ def with_angles_shown(
     found = fit()
     if shown is None:
         return found, []
-    notes = [*repeated_angles(shown), *of_the_setup(shown)]
+    notes = [*wrong_angles(shown), *of_the_setup(shown)]
     stated, angles = float(asked["angle_sigma_deg"]), angles_set(shown)
     if angles > stated:
         asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)

@@ -95,14 +95,21 @@ def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
     )
 
 
-def repeated_angles(explanation: Explanation) -> list[str]:
-    """Sentences about angles that were wrong wherever they were set."""
-    return [
-        f"the recording shows {_wrong_angles(explanation, s)}: the result is for the"
-        " angle that was found; mend it before the next recording"
-        for s in explanation.standing
-        if s.kind == "position" and any(group.together for _, group in s.members)
-    ]
+def wrong_angles(explanation: Explanation) -> list[str]:
+    """Sentences about angles that were wrong, in one position or wherever set."""
+    out = []
+    for s in explanation.standing:
+        if s.kind == "position":
+            cure = (
+                "mend it before the next recording"
+                if any(group.together for _, group in s.members)
+                else "set it again and repeat it, and this is known better"
+            )
+            out.append(
+                f"the recording shows {_wrong_angles(explanation, s)}: the result is"
+                f" for the angle that was found; {cure}"
+            )
+    return out
 
 
 def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
@@ -119,11 +126,11 @@ def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
 def _carries(calibration: Calibration, standing: Standing) -> bool:
     """Whether a cause is no effect, is random, or is in the calibration itself.
 
-    A fault of the fixture that several positions share is no effect, and none of them
-    is left out by the fit as one position by itself is.
+    An angle that was wrong is no effect; the squareness that a grade has may hide it
+    from the fit, and no position is then left out.
     """
     with_it = calibration.info.get("carried", {}).get("causes", {})
-    if any(group.together for _, group in standing.members):
+    if any(cause.kind == "position" for cause, _ in standing.members):
         return standing.name in with_it
     effect = catalogue().get(standing.name)
     if effect is None or isinstance(effect, Scatter):

@@ -141,7 +141,7 @@ def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
 def _adds(member: Member, has: set[str]) -> bool:
     """Whether a given set lacks a cause."""
     cause, group = member
-    if cause.by_window and not group.together:
+    if cause.by_window and cause.kind != "position":
         return False  # it has those already, as windows that scatter or have no weight
     effect = group.effect
     if isinstance(effect, Scatter) and not {p.name for p in effect.params} <= set(

@@ -22,7 +22,10 @@ NO_SCALE = (
 FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
 
 
-IN_WORDS = {"repeated_angle": "an angle that is wrong wherever it is set"}
+IN_WORDS = {
+    "misset": "a position that was set at another angle",
+    "repeated_angle": "an angle that is wrong wherever it is set",
+}
 """What is no effect, by its id."""
 
 

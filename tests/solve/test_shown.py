@@ -140,7 +140,7 @@ def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
     """It has those already, as windows that scatter or may be bad."""
     d = given()
     every = [*of_chance(d), *of_no_effect(d)]
-    for name in ("misset", "window", "position"):
+    for name in ("window", "position"):
         cause = next(c for c in every if c.name == name)
         shown = given([Shown(((cause, cause.variants[0]),), 0.9), Shown((), 0.1)])
         assert [s.members for s in shown.explanations] == [()]
@@ -149,6 +149,15 @@ def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
     shown = given([Shown(((angles, angles.variants[0]),), 1.0)])
     assert shown.explanations == (Shown((), 1.0),), "how well they are set is in"
     assert given().explanations == (Shown((), 1.0),)
+
+
+def test_a_position_that_was_set_wrongly_is_carried() -> None:
+    """Axes that may be out of square hide it from a set of six faces."""
+    cause = next(c for c in of_chance(given()) if c.name == "misset")
+    shown = given([Shown(((cause, cause.variants[3]),), 0.9), Shown((), 0.1)])
+    assert [s.probability for s in shown.explanations] == pytest.approx([0.9, 0.1])
+    ((same, group),) = shown.explanations[0].members
+    assert (same.name, group.position) == ("misset", 3)
 
 
 def test_functions_without_physics_are_carried_by_their_place() -> None:

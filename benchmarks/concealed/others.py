@@ -24,7 +24,10 @@ SPECIAL = ("gravity_error", "earth_rate", "bandwidth", "vibration_rectification"
 APART = (
     {"base_tilt", "angle_offset", "cross_coupling", "angle_scale"},
     {"quadratic", "scale_asymmetry", "cubic", "pendulous_products"},
-    {"temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift", "bias_step"},
+    {
+        *("temperature_bias", "thermal_hysteresis", "warm_up", "bias_drift"),
+        *("bias_step", "base_step"),
+    },
     {"temperature_bias", "temperature_scale"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},

@@ -249,6 +249,21 @@ def test_a_bias_step_comes_at_its_instant() -> None:
     np.testing.assert_array_equal(with_.t[more != 0][0], 60.0)
 
 
+def test_a_base_that_is_knocked_stays_as_it_then_stands() -> None:
+    knocked = told("base_step:about_x_deg=0.3,about_z_deg=-0.4,at_s=60")
+    more = at_rest(knocked).six - at_rest(PLAIN).six
+    tilt = np.deg2rad(0.5) * np.array([0.6, 0.0, -0.8])
+    # the base turns by the tilt: what does not move in space goes by the other way
+    up = np.array([0.0, -10.0, 0.0])
+    held = frames.turn(np.array([A]), np.array([A]))[0]
+    goes = held @ (up - np.cross(tilt, up)) - held @ up
+    after = more[6100:, :3]
+    np.testing.assert_allclose(after, np.tile(goes, (len(after), 1)), atol=5e-4)
+    assert not more[:6000].any() and not more[6100:, 3:].any()
+    turned = more[:, 3:].sum(axis=0) / 100  # at 100 Hz
+    np.testing.assert_allclose(turned, held @ tilt, atol=1e-5)
+
+
 def test_gyroscopes_that_are_late_show_what_was() -> None:
     moving = []
     for text in ("time_delay:seconds=0.02", "time_delay:seconds=-0.02", ""):

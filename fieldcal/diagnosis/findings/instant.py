@@ -1,9 +1,9 @@
 """The instant of a change, from the samples around it.
 
-With z the samples less the output of the model before the change, and A the change of
-each channel, the instant k is that at which
+With z the samples less the output of the model before the change, and A_i the change of
+each channel as the device then lies, the instant k is that at which
 
-    S(k) = sum_{i<k} z_i^2 + sum_{i>=k} (z_i - A)^2
+    S(k) = sum_{i<k} z_i^2 + sum_{i>=k} (z_i - A_i)^2
 
 is smallest, in units of the noise; its uncertainty is the spread of exp(-S / 2). S is
 first calculated from the means in the rows, to find the samples between which the
@@ -12,15 +12,18 @@ instant can be.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import Sensor
+from fieldcal.physics.experience import Experience
 
 
 def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
@@ -28,9 +31,9 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     _, group = member
     (at,) = group.shape.values()
     rows, block = explanation.rows, explanation.prepared.source.block
-    changes = _changes(explanation, member)
-    plain = _without_change(explanation, changes)
-    change: Array = np.sum([c for _, c in changes], axis=0)
+    known = _known(explanation, member)
+    plain = rows.y - explanation.best.residual() - _outputs(rows.x, known)
+    change = _outputs(rows.x, known, dict.fromkeys(group.shape, -np.inf))
     seen = np.where(rows.used, rows.y - plain, np.nan)
     low, high = _possible(explanation, _squares(seen, change, rows.sd), at)
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
@@ -39,7 +42,7 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     held = _held(explanation, t)[:, None] & explanation.prepared.source.usable[part]
     z = np.where(held, six - plain[row], np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
-    squares, edges = _squares(z, change, noise), np.concatenate([t, [high]])
+    squares, edges = _squares(z, change[row], noise), np.concatenate([t, [high]])
     weight = np.exp(-0.5 * (squares - squares.min()))
     width = np.gradient(edges)
     weight = weight * width / (weight * width).sum()
@@ -55,7 +58,7 @@ def _squares(z: Array, change: Array, noise: Array) -> Array:
     Parameters
     ----------
     z : (n, 6) what is seen without the change, nan where nothing is
-    change : (6,)
+    change : (n, 6)
     noise : (6,) or (n, 6) standard deviations
 
     """
@@ -84,27 +87,25 @@ def _held(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
     return inside
 
 
-def _changes(explanation: Explanation, member: Member) -> list[tuple[Group, Array]]:
-    """By how much each channel changes, (6,), as each triad has it."""
-    out: list[tuple[Group, Array]] = []
+def _known(explanation: Explanation, member: Member) -> list[tuple[Group, Array]]:
+    """The change as each triad has it, and its parameters, (k,)."""
     estimate = explanation.best.estimate
-    for cause, group in explanation.best.set.members:
-        if cause.name == member[0].name and group.effect is not None:
-            change = np.zeros(6)
-            for j, column in zip(group.params, group.columns, strict=True):
-                c = CHANNELS.index(group.effect.params[j].name)
-                change[c] = estimate[column]
-            out.append((group, change))
-    return out
+    return [
+        (group, np.array([estimate[column] for column in group.columns]))
+        for cause, group in explanation.best.set.members
+        if cause.name == member[0].name and isinstance(group.effect, Sensor)
+    ]
 
 
-def _without_change(
-    explanation: Explanation, changes: list[tuple[Group, Array]]
+def _outputs(
+    x: Experience,
+    known: list[tuple[Group, Array]],
+    shape: Mapping[str, float] | None = None,
 ) -> Array:
-    """What the model makes of rows, without the change, (n, 6)."""
-    rows = explanation.rows
-    fitted: Array = rows.y - explanation.best.residual()
-    for group, change in changes:
+    """What the change makes of rows, (n, 6), from its own instant on or another one."""
+    out = np.zeros((len(x), 6))
+    for group, values in known:
         if isinstance(group.effect, Sensor):
-            fitted = fitted - group.effect.design(rows.x, group.shape) @ change
-    return fitted
+            design = group.effect.design(x, shape or group.shape)
+            out += design[:, :, list(group.params)] @ values
+    return out

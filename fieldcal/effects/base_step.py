@@ -1,0 +1,73 @@
+"""The base is knocked: from an instant on it stands otherwise.
+
+    f' = f - theta e x f,    w' = w - theta e x w    (t >= t_0)
+
+t_0 = at_s, device time, s; theta is small, about x or z of the base, e that axis in
+those of the device, so that this is a `base_tilt` from an instant on. A mean over the
+instant has its part. To one position it is a jump of the biases; each further one shows
+it along other axes of the device. The knock itself is left out as a bump, and a turn
+during which the base goes over closes less well. Source: kinematics of a small rotation
+(Titterton and Weston 2004, 3.6); a table that is pushed, a tripod that is kicked.
+
+>>> import numpy as np
+>>> x = Experience.at_rest(np.zeros(2), np.zeros(2), 10.0, t=np.array([9.0, 11.0]))
+>>> by = BaseStep().design(x, {"at_s": 10.0})  # of one degree each
+>>> np.round(by[:, [0, 2]], 4) + 0.0
+array([[[ 0.    ,  0.    ],
+        [ 0.    ,  0.    ]],
+<BLANKLINE>
+       [[ 0.    , -0.1745],
+        [ 0.1745,  0.    ]]])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldcal.core.samples import Array
+from fieldcal.effects.bias_step import BiasStep
+from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
+from fieldcal.physics.experience import Experience
+from fieldcal.physics.shape import Shape
+
+
+class BaseStep(Sensor):
+    """Jump of the tilt of the base."""
+
+    params = (Param("about_x_deg", "deg", 0.3), Param("about_z_deg", "deg", 0.3))
+    shapes = (Shape("at_s", "s", -np.inf, np.inf, "instant"),)
+    covariate = "time, along what a tilt of the base does in each position"
+    seen_in = "time"
+    decided_by = "a position from before the knock once more"
+    cure = (
+        "Fix the base, and take the positions from before the knock again: what a "
+        "tilt and a bias are is then known from one base."
+    )
+    source = "a table that is pushed, a tripod that is kicked; 0.02 to 1 deg"
+
+    def applies(self, x: Experience) -> bool:
+        """Where the angles of more than one position are known."""
+        return len(np.unique(x.position[_held(x)])) > 1
+
+    def chance(self, x: Experience) -> float:
+        """Of three hundred sessions one has a knock that nobody noticed."""
+        return 3e-3
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """What a degree about each axis does at rest, from the instant on."""
+        held = _held(x)
+        after = BiasStep().course(x, shape) * held
+        axes = x.to_device[:, :, [0, 2]]
+        # what a rate table adds is tilted with the base
+        rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
+        turned = [-np.cross(axes, v[:, :, None], axis=1) for v in (x.f, rate)]
+        out: Array = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
+        return np.where(held[:, None, None], out, 0.0) * after[:, None, None]
+
+
+def _held(x: Experience) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Rows at rest in a known position."""
+    held: np.ndarray[tuple[int], np.dtype[np.bool_]] = x.oriented & (x.position >= 0)
+    return held

@@ -28,12 +28,12 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.effects.bias_step import BiasStep
-from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
+from fieldcal.physics.effect import NO_SHAPE, Coming, Param
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 
-class BaseStep(Sensor):
+class BaseStep(Coming):
     """Jump of the tilt of the base."""
 
     params = (Param("about_x_deg", "deg", 0.3), Param("about_z_deg", "deg", 0.3))
@@ -55,16 +55,22 @@ class BaseStep(Sensor):
         """Of three hundred sessions one has a knock that nobody noticed."""
         return 3e-3
 
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """What a degree about each axis does at rest, from the instant on."""
-        held = _held(x)
-        after = BiasStep().course(x, shape) * held
-        axes = x.to_device[:, :, [0, 2]]
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """One from the instant on."""
+        return BiasStep().course(x, shape)
+
+    def pattern(self, x: Experience) -> Array:
+        """What a degree about each axis does at rest."""
+        rows = np.flatnonzero(_held(x))
+        out = np.zeros((len(x), 6, 2))
+        if not len(rows):
+            return out
+        axes = x.to_device[rows][:, :, [0, 2]]
         # what a rate table adds is tilted with the base
         rate = np.where(x.rate.any(axis=1, keepdims=True), 0.0, x.w)
-        turned = [-np.cross(axes, v[:, :, None], axis=1) for v in (x.f, rate)]
-        out: Array = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
-        return np.where(held[:, None, None], out, 0.0) * after[:, None, None]
+        turned = [-np.cross(axes, v[rows, :, None], axis=1) for v in (x.f, rate)]
+        out[rows] = np.deg2rad(1.0) * np.concatenate(turned, axis=1)
+        return out
 
 
 def _held(x: Experience) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

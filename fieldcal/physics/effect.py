@@ -181,6 +181,26 @@ class BiasChange(Sensor):
         return out
 
 
+class Coming(Sensor):
+    """An effect that does the same to the outputs at rest all along, as far as it came.
+
+    Its columns are a pattern times a course, so that all courses share the pattern.
+    """
+
+    @abstractmethod
+    def pattern(self, x: Experience) -> Array:
+        """Derivative of the outputs by the parameters, once all is there, (n, 6, k)."""
+
+    @abstractmethod
+    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """Part of it that is there, (n,)."""
+
+    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
+        """The pattern as far as it has come."""
+        out: Array = self.pattern(x) * self.course(x, shape)[:, None, None]
+        return out
+
+
 class Scatter(Effect):
     """A random effect: no equation but a size, which its parameters are.
 

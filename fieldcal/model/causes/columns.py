@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State, Term, across
-from fieldcal.physics.effect import NO_SHAPE, BiasChange, Effect, Motion, Sensor
+from fieldcal.physics.effect import NO_SHAPE, BiasChange, Coming, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
 STEP = 1e-3
@@ -142,6 +142,22 @@ def of_channels(
         return np.stack(courses, axis=1)
 
     return Course(effect.id, of, len(grid), True)
+
+
+def of_courses(
+    effect: Coming, grid: Sequence[tuple[Mapping[str, float], int]]
+) -> General:
+    """Columns of an effect that comes by each of several courses, point by point."""
+
+    def of(view: RowView) -> Array:
+        patterns = {o: effect.pattern(view.counting_from(o)) for _, o in grid}
+        parts = []
+        for shape, origin in grid:
+            course = effect.course(view.counting_from(origin), shape or NO_SHAPE)
+            parts.append(patterns[origin] * course[:, None, None])
+        return np.concatenate(parts, axis=2)
+
+    return General(effect.id, of)
 
 
 def _of_sides(sides: Sides) -> Callable[[RowView], Array]:

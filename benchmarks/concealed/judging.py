@@ -16,6 +16,9 @@ from fieldcal.physics.effect import Line
 ALWAYS = frozenset({"earth_rate"})
 """True of every session, so never a false alarm."""
 
+AS_WELL = {"base_step": frozenset({"bump"})}
+"""What else is there with an effect: a base that is knocked bumps what stands on it."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -80,10 +83,16 @@ def judged(session: Session, seed: int, told: Diagnosis, seconds: float) -> Outc
 
 def _claims(session: Session, told: Diagnosis) -> Iterator[tuple[float, bool]]:
     """Probability of each effect that is named by evidence, and whether it is there."""
-    truth = set(session.concealed) | ALWAYS
+    truth = set(session.concealed) | _anyway(session)
     for one in told.effects:
         if one.id not in ALWAYS:
             yield one.probability, bool(truth & {one.id, *one.aliases})
+
+
+def _anyway(session: Session) -> frozenset[str]:
+    """Effects that are true of a session and not asked for."""
+    more = (AS_WELL.get(name, frozenset()) for name in session.concealed)
+    return ALWAYS.union(*more)
 
 
 def _right(
@@ -110,7 +119,7 @@ def _extra(session: Session, named: dict[str, tuple[str, ...]]) -> tuple[str, ..
     return tuple(
         name
         for name, others in named.items()
-        if name not in truth | ALWAYS and not truth & set(others)
+        if name not in truth | _anyway(session) and not truth & set(others)
     )
 
 

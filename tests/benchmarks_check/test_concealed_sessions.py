@@ -85,6 +85,8 @@ def test_a_bump_is_judged_by_name_and_by_number() -> None:
     assert "100.0 %" in groups([one])
     other = judged(session.having({"stuck": _stuck()}), 2, told, 0.0)
     assert not other.right and other.extra == ("bump",)
+    knock = {"base_step": {"about_x_deg": 0.1, "about_z_deg": 0.0, "at_s": 60.0}}
+    assert not judged(session.having(knock), 2, told, 0.0).extra
     assert sum(belongs(one) for belongs in GROUPS.values()) == 1
 
 

@@ -19,7 +19,7 @@ from filelock import FileLock
 if TYPE_CHECKING:
     from fieldcal.run.movers import RunningDevice
 
-HANGS = 600.0
+HANGS = 300.0
 """No machine is so busy that what is waited for takes longer, s: it hangs."""
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import fsum
 
 import numpy as np
 
@@ -172,7 +173,8 @@ class Posterior:
         """Sets visited, with their probabilities."""
         sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
         score: Array = np.array([s.score for s in sets])
-        share = np.exp(score - np.logaddexp.reduce(score))
+        share = np.exp(score - score.max())
+        share /= share.sum()
         return list(zip(sets, share.tolist(), strict=True))
 
     @cached_property
@@ -187,7 +189,7 @@ class Posterior:
     @property
     def nothing(self) -> float:
         """Probability that there is nothing but noise."""
-        return sum(w for s, w in self.weights if not self.names(s))
+        return _total(w for s, w in self.weights if not self.names(s))
 
     def suspects(self) -> list[tuple[str, float]]:
         """Every cause with its probability, the likeliest first."""
@@ -201,7 +203,7 @@ class Posterior:
         What stands on the gyroscopes does not stand for what is on accelerometers.
         """
         wanted = set(names)
-        return sum(
+        return _total(
             w
             for s, w in self.weights
             if any(
@@ -223,6 +225,11 @@ class Posterior:
             if probability >= thresholds.NAMED:
                 out.append(replace(one, probability=probability))
         return out
+
+
+def _total(shares: Iterable[float]) -> float:
+    """Sum of some shares, rounded to no more than all."""
+    return min(fsum(shares), 1.0)
 
 
 def _fades(group: Group) -> bool:

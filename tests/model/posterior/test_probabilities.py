@@ -6,6 +6,7 @@ of columns by what the model has of them.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
@@ -248,6 +249,19 @@ def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
         assert np.log(part / share) == pytest.approx(other.score - best.score, abs=1e-6)
     with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.names(s)]
     assert posterior.probability([KEYS[0]]) == pytest.approx(sum(with_one))
+
+
+def test_no_probability_is_above_one_however_large_the_evidence() -> None:
+    one = next(d for d in draws() if d.best.members)
+    posterior = Posterior(one.search, one.best)
+    sets = one.search.visited
+    far = {k: replace(s, score=s.score - 123_456.7) for k, s in sets.items()}
+    posterior.search = copy(one.search)
+    posterior.search.visited = far
+    every = {c.name for s in far.values() for c, _ in s.members}
+    said = [posterior.probability([name]) for name in every]
+    assert max(said) <= 1.0 and posterior.nothing <= 1.0
+    assert sum(w for _, w in posterior.weights) == pytest.approx(1.0, abs=1e-14)
 
 
 def test_what_accelerometers_show_stands_for_nothing_on_gyroscopes() -> None:

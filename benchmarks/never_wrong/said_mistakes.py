@@ -16,6 +16,11 @@ ANGLES = ("alpha_deg", "beta_deg")
 # -- the positions
 
 
+def _stated(rows: list[dict[str, float]], bench: Bench) -> list[dict[str, float]]:
+    """Those with angles, of which another mistake may have forgotten one."""
+    return [row for row in rows[: bench.stated] if ANGLES[0] in row]
+
+
 def _rows(written: Written) -> list[dict[str, float]]:
     return [dict(row) for row in written.about["position"]]
 
@@ -92,7 +97,7 @@ def gravity_said(written: Written, bench: Bench, rng: Rng) -> Written:
 def angles_exchanged(written: Written, bench: Bench, rng: Rng) -> Written:
     """Alpha is written where beta belongs, and the other way round."""
     rows = _rows(written)
-    for row in rows[: bench.stated]:
+    for row in _stated(rows, bench):
         row["alpha_deg"], row["beta_deg"] = row["beta_deg"], row["alpha_deg"]
     return _saying(written, rows)
 
@@ -100,7 +105,7 @@ def angles_exchanged(written: Written, bench: Bench, rng: Rng) -> Written:
 def angle_reversed(written: Written, bench: Bench, rng: Rng) -> Written:
     """One of the two angles is counted the other way."""
     rows, key = _rows(written), ANGLES[int(rng.integers(2))]
-    for row in rows[: bench.stated]:
+    for row in _stated(rows, bench):
         row[key] *= -1.0
     return _saying(written, rows)
 
@@ -108,7 +113,7 @@ def angle_reversed(written: Written, bench: Bench, rng: Rng) -> Written:
 def angles_in_radians(written: Written, bench: Bench, rng: Rng) -> Written:
     """Angles are written in radians."""
     rows = _rows(written)
-    for row in rows[: bench.stated]:
+    for row in _stated(rows, bench):
         row |= {key: float(np.deg2rad(row[key])) for key in ANGLES}
     return _saying(written, rows)
 
@@ -117,7 +122,7 @@ def angles_in_other_units(written: Written, bench: Bench, rng: Rng) -> Written:
     """Angles are written in gon, in mil (6400 to a turn) or in mrad."""
     rows = _rows(written)
     turn = float(rng.choice([400.0, 6400.0, 2e3 * np.pi]))
-    for row in rows[: bench.stated]:
+    for row in _stated(rows, bench):
         row |= {key: row[key] * turn / 360 for key in ANGLES}
     return _saying(written, rows)
 
@@ -125,7 +130,7 @@ def angles_in_other_units(written: Written, bench: Bench, rng: Rng) -> Written:
 def sign_forgotten(written: Written, bench: Bench, rng: Rng) -> Written:
     """An angle of one position is written with the other sign."""
     rows = _rows(written)
-    places = [(row, k) for row in rows[: bench.stated] for k in ANGLES if row[k]]
+    places = [(row, k) for row in _stated(rows, bench) for k in ANGLES if row[k]]
     if places:
         row, key = places[int(rng.integers(len(places)))]
         row[key] *= -1.0

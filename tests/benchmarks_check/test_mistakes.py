@@ -116,6 +116,19 @@ def test_a_position_that_was_not_taken_is_the_one_before() -> None:
     assert np.count_nonzero(moves < 1e-9) == 1
 
 
+@pytest.mark.parametrize(
+    "said", ["angles exchanged", "an angle counted the other way", "angles in radians",
+             "angles in gon, mil or mrad", "a sign forgotten"],
+)  # fmt: skip
+def test_angles_that_are_said_wrongly_may_be_of_fewer_positions(said: str) -> None:
+    bench = _ideal("five")
+    both = session(bench, ("a position forgotten", said), np.random.default_rng(1))
+    alone = _made("a position forgotten", bench, 1)
+    rows, before = both.about["position"], alone.about["position"]
+    assert len(rows) == len(before) == len(_made(said, bench).about["position"]) - 1
+    assert rows != before
+
+
 def test_play_is_on_the_side_that_a_joint_comes_from() -> None:
     bench = spoilt(_ideal("wide"), ("play of the joints",), np.random.default_rng(3))
     size = np.abs(bench.off).max()

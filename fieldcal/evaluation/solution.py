@@ -1,8 +1,8 @@
 """A recorded session, solved: its windows, the turns between them, and what they show.
 
 The rows are those that `diagnose` sees: block means with the noise that is measured in
-the recording, samples put right, lines taken out. Windows that were disturbed count as
-far as they were calm.
+the recording, samples put right, lines taken out. Of windows that were disturbed what
+is calm counts, before and after it if the device was held on.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
 from fieldcal.evaluation.angles_shown import with_angles_shown
+from fieldcal.evaluation.held_on import held_on
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
 from fieldcal.evaluation.not_carried import (
@@ -79,7 +80,11 @@ class Laid:
         """What is known of these windows, and where they were calm."""
         about, still = self.session.about, self.still
         rows = [still.rows[i] for i in self.order]
-        ends = [(still.averages[i].start, still.averages[i].end) for i in self.order]
+        averages = [still.averages[i] for i in self.order]
+        ends = [
+            held_on(self.session.block, about.windows[r], average)
+            for r, average in zip(rows, averages, strict=True)
+        ]
         return replace(
             about,
             positions=tuple(about.positions[r] for r in rows),

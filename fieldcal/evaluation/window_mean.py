@@ -1,8 +1,8 @@
 """Average of one window of a recorded session.
 
-A window that somebody else marked may hold a disturbance: then the longest calm part of
-it is used, and that is said. On a rate table gravity goes round and nothing is asked of
-the accelerometers.
+A window that somebody else marked may hold a disturbance: then its mean is that of its
+longest calm part, and that is said. On a rate table gravity goes round and nothing is
+asked of the accelerometers.
 """
 
 from __future__ import annotations
@@ -61,9 +61,10 @@ def take(
         if calm is None:
             raise
         remark = (
-            f"{moved}; only the calm part from {calm.start:.1f} to {calm.end:.1f} s"
+            f"{moved}; its mean is that of the calm part from {calm.start:.1f} to"
+            f" {calm.end:.1f} s"
         )
-        return calm, noise, f"{remark} is used"
+        return calm, noise, remark
 
 
 def _given(span: tuple[float, float] | None) -> tuple[float, float]:

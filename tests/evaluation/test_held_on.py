@@ -49,23 +49,24 @@ def test_a_window_goes_on_where_the_force_stays(
     assert held_on(block, (0.0, 30.0), blind) == calm, "without accelerometers"
 
 
-WIDE = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
-WIDE += [(45.0, 0.0), (-45.0, 0.0), (0.0, 45.0)]
+FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
 
 
 def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After it all other positions agree: a part alone would be one that is off."""
+    """One part alone is a position that is off, whose bias nothing else contradicts."""
     profile = Profile(
         noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
         temperature=Climate(self_heating_k=0.0),
         effects=(
             effect("earth_rate", {}),
-            effect("base_step", {"about_x_deg": 0.0, "about_z_deg": 0.1, "at_s": 17.0}),
+            effect(
+                "base_step", {"about_x_deg": 0.0, "about_z_deg": 0.05, "at_s": 17.0}
+            ),
         ),
     )
-    held = places(WIDE)
+    held = places(FACES)
     assert held[0]["start_s"] < 17.0 < held[0]["end_s"] - 2
     write_session(tmp_path / "s", recorded(profile, held, 7), held)
     main(["solve", str(tmp_path / "s"), "--json", "--angles", "0.002"])
@@ -75,4 +76,4 @@ def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(
     for name in ("acc_bias", "acc_scale", "gyr_bias"):
         found = said["parameters"][name]
         off = np.array(found["value"]) - getattr(profile.truth, name)
-        assert (np.abs(off) < 4 * np.array(found["sigma"])).all(), name
+        assert (np.abs(off) < 2.5 * np.array(found["sigma"])).all(), name

@@ -158,6 +158,10 @@ def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> 
     np.testing.assert_allclose(both[:-1][~there], usual)
     assert DRIFT.expecting([(0.0, 1e3)]) is DRIFT, "it has no instant"
     assert ACC.expecting([]) is ACC
+    (knock,) = Session.of(ladder(), ("base_step",)).dictionary.causes
+    anew = knock.expecting([(at - 1e-3, at + 1e-3)])
+    assert len(anew.expected) == 1, "set up anew meanwhile"
+    assert chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTARTED))
 
 
 @pytest.mark.parametrize("off", [True, False], ids=["off", "on"])

@@ -28,12 +28,12 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.effects.bias_step import BiasStep
-from fieldcal.physics.effect import NO_SHAPE, Coming, Param
+from fieldcal.physics.effect import NO_SHAPE, Param, Separable
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 
-class BaseStep(Coming):
+class BaseStep(Separable):
     """Jump of the tilt of the base."""
 
     params = (Param("about_x_deg", "deg", 0.3), Param("about_z_deg", "deg", 0.3))

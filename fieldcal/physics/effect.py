@@ -162,29 +162,10 @@ class Sensor(Effect):
         """
 
 
-class BiasChange(Sensor):
-    """An effect that adds one course to every output, each by a parameter of its own.
+class Separable(Sensor):
+    """An effect that does the same to the outputs all along, as far as it has come.
 
-    Parameters are those of `six`. `thermal` says that it is the temperature that does
-    so, and scale factors then change as well.
-    """
-
-    thermal: ClassVar[bool] = False
-
-    @abstractmethod
-    def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Derivative of each output by its own parameter, (n,)."""
-
-    def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """The course on every output."""
-        out: Array = np.eye(6) * self.course(x, shape)[:, None, None]
-        return out
-
-
-class Coming(Sensor):
-    """An effect that does the same to the outputs at rest all along, as far as it came.
-
-    Its columns are a pattern times a course, so that all courses share the pattern.
+    Its columns are a pattern times a course; all courses share the pattern.
     """
 
     @abstractmethod
@@ -199,6 +180,20 @@ class Coming(Sensor):
         """The pattern as far as it has come."""
         out: Array = self.pattern(x) * self.course(x, shape)[:, None, None]
         return out
+
+
+class BiasChange(Separable):
+    """An effect that adds one course to every output, each by a parameter of its own.
+
+    Parameters are those of `six`. `thermal` says that it is the temperature that does
+    so, and scale factors then change as well.
+    """
+
+    thermal: ClassVar[bool] = False
+
+    def pattern(self, x: Experience) -> Array:
+        """One on each output, by its own parameter."""
+        return np.broadcast_to(np.eye(6), (len(x), 6, 6))
 
 
 class Scatter(Effect):

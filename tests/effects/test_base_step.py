@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from session_folders import places, recorded, write_session
+from session_folders import CALM, FACES, WIDE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.frames import earth_rate_home
@@ -16,16 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
-from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import effect
-
-FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
-WIDE = [*FACES, (45.0, 0.0), (-45.0, 0.0), (0.0, 45.0), (45.0, 35.0)]
-CALM = Profile(
-    noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
-    temperature=Climate(self_heating_k=0.0),
-    effects=(effect("earth_rate", {}),),
-)
 
 
 def rows(**known: object) -> Experience:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from session_folders import places, recorded, write_session
+from session_folders import CALM, FACES, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.held_on import held_on
-from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.vocabulary import effect
 from fieldcal.windows import Average
 
@@ -49,23 +48,12 @@ def test_a_window_goes_on_where_the_force_stays(
     assert held_on(block, (0.0, 30.0), blind) == calm, "without accelerometers"
 
 
-FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
-
-
 def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One part alone is a position that is off, whose bias nothing else contradicts."""
-    profile = Profile(
-        noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
-        temperature=Climate(self_heating_k=0.0),
-        effects=(
-            effect("earth_rate", {}),
-            effect(
-                "base_step", {"about_x_deg": 0.0, "about_z_deg": 0.05, "at_s": 17.0}
-            ),
-        ),
-    )
+    knock = effect("base_step", {"about_x_deg": 0.0, "about_z_deg": 0.05, "at_s": 17.0})
+    profile = replace(CALM, effects=(*CALM.effects, knock))
     held = places(FACES)
     assert held[0]["start_s"] < 17.0 < held[0]["end_s"] - 2
     write_session(tmp_path / "s", recorded(profile, held, 7), held)

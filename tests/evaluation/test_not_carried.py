@@ -10,24 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 from observed import observe, outputs
-from session_folders import SITE, places, recorded, write_session
+from session_folders import CALM, FACES, SITE, WIDE, places, recorded, write_session
 
 from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
 from fieldcal.evaluation import angles_shown, not_carried
 from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
+from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import effect
 from fieldcal.solve import solve
-
-FACES = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 90.0), (0.0, -90.0)]
-WIDE = [*FACES, (45.0, 0.0), (-45.0, 0.0), (0.0, 45.0), (45.0, 35.0)]
-CALM = Profile(
-    noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
-    temperature=Climate(self_heating_k=0.0),
-    effects=(effect("earth_rate", {}),),
-)
 
 
 def device(*effects: Any) -> Profile:

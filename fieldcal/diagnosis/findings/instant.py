@@ -91,7 +91,7 @@ def _known(explanation: Explanation, member: Member) -> list[tuple[Group, Array]
     """The change as each triad has it, and its parameters, (k,)."""
     estimate = explanation.best.estimate
     return [
-        (group, np.array([estimate[column] for column in group.columns]))
+        (group, estimate[group.columns])
         for cause, group in explanation.best.set.members
         if cause.name == member[0].name and isinstance(group.effect, Sensor)
     ]

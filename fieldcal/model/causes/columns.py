@@ -15,7 +15,14 @@ import numpy as np
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.model.state import State, Term, across
-from fieldcal.physics.effect import NO_SHAPE, BiasChange, Coming, Effect, Motion, Sensor
+from fieldcal.physics.effect import (
+    NO_SHAPE,
+    BiasChange,
+    Effect,
+    Motion,
+    Sensor,
+    Separable,
+)
 from fieldcal.physics.experience import Experience
 
 STEP = 1e-3
@@ -145,7 +152,7 @@ def of_channels(
 
 
 def of_courses(
-    effect: Coming, grid: Sequence[tuple[Mapping[str, float], int]]
+    effect: Separable, grid: Sequence[tuple[Mapping[str, float], int]]
 ) -> General:
     """Columns of an effect that comes by each of several courses, point by point."""
 

@@ -15,7 +15,14 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group, Point
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.hysteresis import hysteresis
-from fieldcal.physics.effect import NO_SHAPE, BiasChange, Coming, Effect, Motion, Sensor
+from fieldcal.physics.effect import (
+    NO_SHAPE,
+    BiasChange,
+    Effect,
+    Motion,
+    Sensor,
+    Separable,
+)
 from fieldcal.physics.experience import Experience
 
 NOWHERE: Point = (NO_SHAPE, 0)
@@ -146,7 +153,7 @@ def effect_columns(
         start = table.add(course, 6 * len(grid))
         channel = np.array([CHANNELS.index(p.name) for p in effect.params])
         return [start + channel * len(grid) + i for i in range(len(grid))]
-    if isinstance(effect, Coming):
+    if isinstance(effect, Separable):
         start = table.add(columns.of_courses(effect, grid), count * len(grid))
         return [start + i * count + np.arange(count) for i in range(len(grid))]
     return [

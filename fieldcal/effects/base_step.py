@@ -42,8 +42,8 @@ class BaseStep(Separable):
     seen_in = "time"
     decided_by = "a position from before the knock once more"
     cure = (
-        "Fix the base, and take the positions from before the knock again: what a "
-        "tilt and a bias are is then known from one base."
+        "Fix the base, and repeat the positions from before the knock: tilt and "
+        "biases are then those of one base."
     )
     source = "a table that is pushed, a tripod that is kicked; 0.02 to 1 deg"
 

@@ -163,21 +163,22 @@ class Sensor(Effect):
 
 
 class Separable(Sensor):
-    """An effect that does the same to the outputs all along, as far as it has come.
+    """An effect whose columns are a pattern on the outputs times a course.
 
-    Its columns are a pattern times a course; all courses share the pattern.
+    The course is a function of time or temperature by the shape parameters; the pattern
+    is the same for all of them.
     """
 
     @abstractmethod
     def pattern(self, x: Experience) -> Array:
-        """Derivative of the outputs by the parameters, once all is there, (n, 6, k)."""
+        """Derivative of the outputs by the parameters at a course of 1, (n, 6, k)."""
 
     @abstractmethod
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """Part of it that is there, (n,)."""
+        """Value of the course in each row, (n,)."""
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """The pattern as far as it has come."""
+        """The pattern times the course."""
         out: Array = self.pattern(x) * self.course(x, shape)[:, None, None]
         return out
 

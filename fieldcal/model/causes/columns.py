@@ -154,7 +154,7 @@ def of_channels(
 def of_courses(
     effect: Separable, grid: Sequence[tuple[Mapping[str, float], int]]
 ) -> General:
-    """Columns of an effect that comes by each of several courses, point by point."""
+    """Columns of a pattern times each of several courses, point by point."""
 
     def of(view: RowView) -> Array:
         patterns = {o: effect.pattern(view.counting_from(o)) for _, o in grid}

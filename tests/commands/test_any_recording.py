@@ -215,6 +215,7 @@ def test_gravity_that_turns_hides_no_line(
     assert abs(found["value"] - 5e-4) < 4 * found["sigma"]
 
 
+@pytest.mark.thorough
 def test_the_length_of_the_force_foretells_positions_not_seen(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -291,6 +292,7 @@ def walked(
     return said
 
 
+@pytest.mark.thorough
 def test_a_walk_foretells_what_comes_soon(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

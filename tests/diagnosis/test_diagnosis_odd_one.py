@@ -54,7 +54,7 @@ def misset(monkeypatch: pytest.MonkeyPatch, window: int, *degrees: float) -> Non
 
 def worn(monkeypatch: pytest.MonkeyPatch, joint: int, angle: float, off: float) -> None:
     """Turn the device otherwise wherever one angle of a joint is set."""
-    way = [list(a) for a in LADDER]
+    way = [list(a) for a in ladder.LADDER]
     for each in way:
         each[joint] += off * (each[joint] == angle)
     monkeypatch.setattr(ladder, "LADDER", tuple(map(tuple, way)))
@@ -107,6 +107,7 @@ def test_angles_that_were_set_otherwise_are_said(
     ("joint", "angle", "off"),
     [(0, 45.0, 0.15), pytest.param(1, 5.0, -0.2, marks=pytest.mark.thorough)],
 )
+@pytest.mark.thorough
 def test_an_angle_that_is_wrong_each_time_is_said(
     joint: int,
     angle: float,
@@ -140,6 +141,27 @@ def test_an_angle_that_is_wrong_each_time_is_said(
     (warning,) = (w for w in result["warnings"] if "the angle that was found" in w)
     size = f"{'αβ'[joint]} was off by {value} ± {sigma} deg in positions {numbers}:"
     assert f"a wrong angle, as {size}" in warning
+    for name in ("acc_bias", "acc_scale", "gyr_bias"):
+        found = result["parameters"][name]
+        far = np.array(found["value"]) - getattr(TACTICAL, name)
+        assert (np.abs(far) < 4 * np.array(found["sigma"])).all()
+
+
+def test_of_two_worn_angles_both_are_said_and_the_second_is_in_every_sigma(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The second by itself stands out of nothing: rows show it beside the first."""
+    worn(monkeypatch, 0, 45.0, 0.03)
+    worn(monkeypatch, 1, 5.0, 0.08)
+    said = diagnosed(tmp_path / "s", TACTICAL, seed=3)
+    assert said.verdict == "unexplained" and not named(said)
+    assert "α was off by" in " ".join(said.next)
+    assert "β was off by" in " ".join(said.next)
+    main(["solve", str(tmp_path / "s"), "--json"])
+    result = json.loads(capsys.readouterr().out)
+    assert result["carried"]["causes"]["repeated_angle"] > 0.99
     for name in ("acc_bias", "acc_scale", "gyr_bias"):
         found = result["parameters"][name]
         far = np.array(found["value"]) - getattr(TACTICAL, name)

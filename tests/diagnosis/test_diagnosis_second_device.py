@@ -122,6 +122,7 @@ def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "fault", [play, pytest.param(course, marks=pytest.mark.thorough)]
 )
+@pytest.mark.thorough
 def test_axes_that_go_together_do_not_wander(tmp_path: Path, fault: Fault) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, fault)
     assert said.verdict == "unexplained" and "random_walk" not in named(said)

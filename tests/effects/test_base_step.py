@@ -56,7 +56,10 @@ def test_it_is_nothing_of_the_device() -> None:
     assert not catalogue()["base_step"].applies(replace(x, position=0 * x.position))
 
 
-@pytest.mark.parametrize(("held", "last"), [(WIDE, False), (FACES[::-1], True)])
+@pytest.mark.parametrize(
+    ("held", "last"),
+    [(WIDE, False), pytest.param(FACES[::-1], True, marks=pytest.mark.thorough)],
+)
 def test_a_calibration_on_a_base_that_is_knocked_is_right(
     held: list[tuple[float, float]],
     last: bool,

@@ -41,7 +41,9 @@ def test_of_a_true_statement_it_is_that_of_two_degrees_of_freedom() -> None:
     assert max(chi2) < 18
 
 
-@pytest.mark.parametrize("tilt_deg", [0.0, 0.5])
+@pytest.mark.parametrize(
+    "tilt_deg", [pytest.param(0.0, marks=pytest.mark.thorough), 0.5]
+)
 def test_a_base_that_is_not_as_level_as_stated_is_no_go(
     tilt_deg: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -48,6 +48,7 @@ def found(folder: Path, *effects: str, **how: Any) -> NestedWindows:
     return out
 
 
+@pytest.mark.thorough
 def test_white_noise_falls_with_the_root_of_the_time(tmp_path: Path) -> None:
     made = found(tmp_path)
     k = [made.names.index(f"acc_bias.{axis}") for axis in "xyz"]

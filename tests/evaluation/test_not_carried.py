@@ -146,6 +146,7 @@ def test_nothing_is_said_of_a_device_that_has_nothing_more(
     assert all(abs(m) < 0.1 for m in moved)
 
 
+@pytest.mark.thorough
 def test_cross_coupling_that_was_asked_for_is_carried(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -266,6 +267,7 @@ def test_faces_laid_by_hand_bear_witness_to_angles_set_badly(
     assert abs(found["parameters"]["sigma_deg"]["value"] - 0.15) < 0.05
 
 
+@pytest.mark.thorough
 def test_gravity_that_nobody_said_is_in_the_uncertainty_and_no_finding(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -303,6 +305,7 @@ def test_a_tilt_that_a_result_has_some_of_beside_the_other_is_carried() -> None:
         assert not_carried._carries(only, shown) == (name == "base_tilt")
 
 
+@pytest.mark.thorough
 def test_offsets_without_a_cause_may_be_angles_by_which_turns_are_off(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

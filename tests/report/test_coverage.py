@@ -53,7 +53,9 @@ def test_the_uncertainty_is_that_of_drawn_calibrations() -> None:
     np.testing.assert_allclose(uncertainty(found, force), spread, rtol=0.03)
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(
+    "known", [pytest.param(True, marks=pytest.mark.thorough), False]
+)
 def test_a_report_says_it_of_positions_without_angles(
     known: bool, tmp_path: Path
 ) -> None:

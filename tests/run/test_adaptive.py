@@ -152,6 +152,7 @@ class Content(Hand):
         return "skip" if self.told and self.told[-1].startswith("GO so far") else None
 
 
+@pytest.mark.thorough
 def test_at_go_it_ends_if_a_further_position_is_left_out(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -60,6 +60,7 @@ def plain(coupled: Block) -> Diagnosis:
     ],
     ids=["later", "axes by other names", "axes the other way"],
 )
+@pytest.mark.thorough
 def test_neither_the_names_of_axes_nor_the_origin_of_time_matter(
     later: float,
     axes: tuple[str, ...],

@@ -148,6 +148,7 @@ def test_the_device_file_has_the_device_as_it_is(
     assert again == pytest.approx(plain, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_a_session_may_begin_at_any_time_of_the_device(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -207,6 +208,7 @@ def test_what_settles_counts_from_one_instant() -> None:
         ),
     ],
 )
+@pytest.mark.thorough
 def test_of_a_line_the_replay_leaves_little(
     concealed: str, triad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -269,6 +271,7 @@ def test_a_twin_without_what_turns_show_is_as_far_off_as_before(
     assert "Turns come out" not in said["says"]
 
 
+@pytest.mark.thorough
 def test_what_is_random_gives_spread_and_not_the_same_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

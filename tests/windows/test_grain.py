@@ -40,7 +40,15 @@ def pulls(noise: float, centre: float, grain: Grain) -> tuple[Array, int]:
 @pytest.mark.statistical
 @pytest.mark.parametrize("grain", [CUT, ROUNDED], ids=["cut", "rounded"])
 @pytest.mark.parametrize("centre", [0.0, 1000.0])
-@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 0.6, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "noise",
+    [
+        0.0,
+        0.3,
+        1.0,
+        *(pytest.param(s, marks=pytest.mark.thorough) for s in (0.1, 0.6, 3.0)),
+    ],
+)
 def test_the_error_of_a_mean_holds_however_little_noise(
     noise: float, centre: float, grain: Grain
 ) -> None:

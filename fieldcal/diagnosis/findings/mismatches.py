@@ -17,10 +17,11 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.correlates import courses
 from fieldcal.diagnosis.findings.found_effects import Removed, in_turns
 from fieldcal.diagnosis.findings.stretch_means import averages
+from fieldcal.diagnosis.findings.unknown_mismatch import mistakes
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
-from fieldcal.model.causes.cause import Cause
+from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import Fault
@@ -149,23 +150,29 @@ def of_unknown(
     explanation: Explanation, standing: Standing, lost: Removed
 ) -> Iterator[Mismatch]:
     """Mismatches that no effect in the catalogue accounts for."""
-    for cause, group in standing.members:
-        positions = (group.position,) if group.position >= 0 else group.together
-        triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
-        squares = np.nan_to_num(lost.squares[triad])
-        channels = (
-            [CHANNELS.index(group.part)]
-            if group.part in CHANNELS
-            else triad[squares > thresholds.IN_CHANNEL].tolist()
-            or [int(triad[squares.argmax()])]
-        )
-        for c in channels:
-            kind = KINDS.get(cause.name, "position")
-            covariate, correlation, share = followed(
-                explanation, cause, c, lost.residual
-            )
-            one = _in_windows(explanation, lost, c, positions, kind, covariate)
-            yield replace(one, correlation=correlation, share=share)
+    for member in standing.members:
+        for group in mistakes(explanation, member):
+            yield from _of_group(explanation, member[0], group, lost)
+
+
+def _of_group(
+    explanation: Explanation, cause: Cause, group: Group, lost: Removed
+) -> Iterator[Mismatch]:
+    """Mismatches that a group accounts for, on its channels, in its positions."""
+    positions = (group.position,) if group.position >= 0 else group.together
+    triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
+    squares = np.nan_to_num(lost.squares[triad])
+    channels = (
+        [CHANNELS.index(group.part)]
+        if group.part in CHANNELS
+        else triad[squares > thresholds.IN_CHANNEL].tolist()
+        or [int(triad[squares.argmax()])]
+    )
+    for c in channels:
+        kind = KINDS.get(cause.name, "position")
+        covariate, correlation, share = followed(explanation, cause, c, lost.residual)
+        one = _in_windows(explanation, lost, c, positions, kind, covariate)
+        yield replace(one, correlation=correlation, share=share)
 
 
 KINDS: dict[str, Kind] = {

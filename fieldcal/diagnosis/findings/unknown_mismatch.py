@@ -12,6 +12,7 @@ from fieldcal.diagnosis.findings.found_effects import estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
+from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.probabilities import Standing
 
 JOINTS = ("α", "β")
@@ -56,9 +57,19 @@ def angle_errors(explanation: Explanation, standing: Standing) -> dict[Places, E
     if standing.kind != "position":
         return {}
     return {
-        group.together or (group.position,): _errors(explanation, group)
-        for _, group in standing.members
+        one.together or (one.position,): _errors(explanation, one)
+        for member in standing.members
+        for one in mistakes(explanation, member)
     }
+
+
+def mistakes(explanation: Explanation, member: Member) -> list[Group]:
+    """Each mistake of a member by itself: of several, those that stand out."""
+    cause, group = member
+    parts = [*cause.parts_of(group)]
+    if len(parts) == 1:
+        return parts
+    return [one for one in parts if _errors(explanation, one)] or parts
 
 
 def _errors(explanation: Explanation, group: Group) -> Errors:

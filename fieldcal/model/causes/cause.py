@@ -164,6 +164,12 @@ class Cause:
             self._nearest[other] = tuple(g for g, d in each if d == least)
         return self._nearest[other]
 
+    def parts_of(self, group: Group) -> tuple[Group, ...]:
+        """Variants that a variant is several of at once; itself if it is one alone."""
+        own = {*group.columns.tolist()}
+        parts = tuple(g for g in self.variants if own > {*g.columns.tolist()})
+        return parts or (group,)
+
     def of_size(self, v: float | None) -> Cause:
         """The same with variants of size v; itself where that is not known."""
         if v is None:

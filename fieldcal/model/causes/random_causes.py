@@ -43,7 +43,9 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
 def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     """A position set at other angles, and an angle that is wrong wherever it is set.
 
-    Only positions with known angles can have either; the others help to show them.
+    Only positions with known angles can have either; the others help to show them. A
+    fixture with one worn detent may have more that are worn as much, which rows do not
+    show by themselves.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
     groups = tuple(
@@ -58,11 +60,16 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     if not several:
         return
     wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
+    at = columns_of(table, several)
     groups = tuple(
-        Group("repeated_angle", "", np.array([at]), wide, params=(one.joint,),
+        Group("repeated_angle", "", at[i : i + 1], wide, params=(one.joint,),
               together=one.positions)
-        for at, one in zip(columns_of(table, several), several, strict=True)
+        for i, one in enumerate(several)
     )  # fmt: skip
+    if len(several) > 1:
+        some = tuple(sorted({p for one in several for p in one.positions}))
+        every = np.repeat(wide, len(several))
+        groups += (Group("repeated_angle", "", at, every, together=some),)
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 

@@ -253,7 +253,14 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     causes = {c.key: c for c in witnessed.causes}
     others = [0, 1, 3, 4, 5, 6, 7, 8]
     assert [g.position for g in causes["misset"].variants] == others
-    assert all(2 not in g.together for g in causes["repeated_angle"].variants)
+    worn = causes["repeated_angle"]
+    assert all(2 not in g.together for g in worn.variants)
+    *each, all_of_them = worn.variants  # a fixture may be worn throughout
+    assert worn.parts_of(all_of_them) == tuple(each)
+    assert all(worn.parts_of(one) == (one,) for one in each)
+    np.testing.assert_array_equal(
+        all_of_them.columns, np.concatenate([g.columns for g in each])
+    )
     (scatter,) = causes["angle_setting"].variants  # where angles are set, not beside
     set_ = witnessed.small_rotation + np.arange(18).reshape(9, 2)[others].ravel()
     np.testing.assert_array_equal(scatter.columns, set_)

@@ -139,7 +139,9 @@ def explained(block: Block) -> Explanation:
     return explain(prepare(block, parse(about)))
 
 
-@pytest.mark.parametrize(("seed", "lean"), [(0, 2e-4), (2, 3e-4)])
+@pytest.mark.parametrize(
+    ("seed", "lean"), [(0, 2e-4), pytest.param(2, 3e-4, marks=pytest.mark.thorough)]
+)
 def test_what_leans_is_no_change_of_a_bias(seed: int, lean: float) -> None:
     """Sun and clouds warm the device as well, and that alone is named."""
     found = explained(stops(np.random.default_rng(seed), lean))
@@ -153,7 +155,9 @@ def test_what_leans_is_no_change_of_a_bias(seed: int, lean: float) -> None:
         assert one.value == pytest.approx(true, abs=4 * one.sigma)
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4])
+@pytest.mark.parametrize(
+    "seed", [2, *(pytest.param(s, marks=pytest.mark.thorough) for s in (3, 4))]
+)
 def test_on_firm_ground_nothing_leans(seed: int) -> None:
     """Nor is one window off for itself: turns end at the force that is read."""
     found = explained(stops(np.random.default_rng(seed), 0.0))

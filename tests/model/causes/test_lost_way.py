@@ -61,7 +61,9 @@ def explained(seed: int, way: int | None) -> Explanation:
     return explain(prepare(lossy(seed, way), parse(tables)))
 
 
-@pytest.mark.parametrize(("seed", "way"), [(1, 0), (2, 4), (3, None)])
+@pytest.mark.parametrize(
+    ("seed", "way"), [(1, 0), pytest.param(2, 4, marks=pytest.mark.thorough), (3, None)]
+)
 def test_the_turn_that_was_not_followed_is_told_and_no_other(
     seed: int, way: int | None
 ) -> None:
@@ -80,7 +82,7 @@ def calibrated(folder: Path, seed: int, way: int | None) -> Calibration:
     return solved(session, rests(session))
 
 
-@pytest.mark.parametrize("way", [0, 4])
+@pytest.mark.parametrize("way", [0, pytest.param(4, marks=pytest.mark.thorough)])
 def test_scale_factors_are_those_of_the_turns_that_were_followed(
     tmp_path: Path, way: int
 ) -> None:

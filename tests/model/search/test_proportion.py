@@ -48,7 +48,10 @@ def test_one_proportion_needs_fewer_numbers_than_axes_that_scatter(
     assert risen(off, "gyr") < 0.0
 
 
-@pytest.mark.parametrize("scatter", [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize(
+    "scatter",
+    [1e-3, *(pytest.param(s, marks=pytest.mark.thorough) for s in (0.0, 1e-2))],
+)
 def test_axes_that_scatter_each_for_itself_have_no_proportion(scatter: float) -> None:
     for seed in range(10):
         off, rng = noisy(seed)

@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks._words import how_many, option
 from benchmarks.concealed import Draw, draws, kinds
+from benchmarks.concealed.judging import AS_WELL
 from benchmarks.concealed.sessions import Session
 from fieldcal.against import Match, compare
 from fieldcal.effects import catalogue
@@ -88,6 +89,8 @@ def pair(session: Session, relation: str) -> tuple[Session, Session] | None:
 def judged(relation: str, name: str, found: Match, seconds: float) -> Outcome:
     """Hold what is said against what was drawn."""
     said = [d for d in found.differences if name in (d.id, *d.aliases)]
+    also = AS_WELL.get(name, frozenset())
+    more = [d for d in found.differences if d not in said and d.id not in also]
     return Outcome(
         relation,
         name,
@@ -96,7 +99,7 @@ def judged(relation: str, name: str, found: Match, seconds: float) -> Outcome:
         else not found.differences,
         bool(said) and all(d.id != name for d in said),
         any(d.direction == relation for d in said),
-        len(said) < len(found.differences) or relation == "equal" and bool(said),
+        bool(more) or relation == "equal" and bool(said),
         found.before.chi2_per_dof,
         found.after.chi2_per_dof,
         seconds,

@@ -57,6 +57,9 @@ def test_what_is_said_is_judged_by_name_direction_and_what_is_too_much() -> None
     tied = match(said("cubic", "left_out", "quadratic"), said("noise", "resized"))
     alias = judged("added", "quadratic", tied, 1.0)
     assert alias.aliased and alias.false and not (alias.named or alias.directed)
+    knocked = match(said("base_step", "added"), said("bump", "added"))
+    assert not judged("added", "base_step", knocked, 1.0).false
+    assert judged("added", "quadratic", knocked, 1.0).false
     quiet = judged("equal", "quadratic", match(), 1.0)
     assert quiet.named and not quiet.false
     loud = judged("equal", "quadratic", match(said("quadratic", "added")), 1.0)

@@ -84,7 +84,7 @@ def three() -> ExpectedGain:
     "place",
     [
         (-45.0, -5.0),
-        *(pytest.param(0.0, b, marks=pytest.mark.thorough) for b in (0.0, -5.0)),
+        *(pytest.param((0.0, b), marks=pytest.mark.thorough) for b in (0.0, -5.0)),
     ],
 )
 def test_a_window_tells_what_was_expected_of_it(

@@ -68,7 +68,7 @@ def mistakes(explanation: Explanation, member: Member) -> list[Group]:
     cause, group = member
     parts = [*cause.parts_of(group)]
     if len(parts) == 1:
-        return parts
+        return parts  # whatever it is: only angles have errors
     return [one for one in parts if _errors(explanation, one)] or parts
 
 

@@ -165,7 +165,9 @@ class Cause:
         return self._nearest[other]
 
     def parts_of(self, group: Group) -> tuple[Group, ...]:
-        """Variants that a variant is several of at once; itself if it is one alone."""
+        """Mistakes that a variant is several of at once; itself if it is one alone."""
+        if self.kind != "position":
+            return (group,)  # some of its columns alone are the same with less
         own = {*group.columns.tolist()}
         parts = tuple(g for g in self.variants if own > {*g.columns.tolist()})
         return parts or (group,)

@@ -258,6 +258,10 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     *each, all_of_them = worn.variants  # a fixture may be worn throughout
     assert worn.parts_of(all_of_them) == tuple(each)
     assert all(worn.parts_of(one) == (one,) for one in each)
+    changes = causes["force and time:ax"]  # a scale factor that changes, and more
+    wide, narrow = changes.variants
+    assert {*wide.columns} > {*narrow.columns}
+    assert changes.parts_of(wide) == (wide,)
     np.testing.assert_array_equal(
         all_of_them.columns, np.concatenate([g.columns for g in each])
     )

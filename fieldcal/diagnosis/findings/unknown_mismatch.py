@@ -64,11 +64,11 @@ def angle_errors(explanation: Explanation, standing: Standing) -> dict[Places, E
 
 
 def mistakes(explanation: Explanation, member: Member) -> list[Group]:
-    """Each mistake of a member by itself: of several, those that stand out."""
+    """The single mistakes of a member; of several, those that stand out of their ±."""
     cause, group = member
     parts = [*cause.parts_of(group)]
     if len(parts) == 1:
-        return parts  # whatever it is: only angles have errors
+        return parts  # which need not be of angles
     return [one for one in parts if _errors(explanation, one)] or parts
 
 

@@ -165,9 +165,9 @@ class Cause:
         return self._nearest[other]
 
     def parts_of(self, group: Group) -> tuple[Group, ...]:
-        """Mistakes that a variant is several of at once; itself if it is one alone."""
+        """The single mistakes that a variant combines; the variant itself if one."""
         if self.kind != "position":
-            return (group,)  # some of its columns alone are the same with less
+            return (group,)  # fewer columns are a weaker form of it, and no part
         own = {*group.columns.tolist()}
         parts = tuple(g for g in self.variants if own > {*g.columns.tolist()})
         return parts or (group,)

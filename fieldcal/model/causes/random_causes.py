@@ -44,8 +44,7 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     """A position set at other angles, and an angle that is wrong wherever it is set.
 
     Only positions with known angles can have either; the others help to show them. A
-    fixture with one worn detent may have more that are worn as much, which rows do not
-    show by themselves.
+    fixture with one worn detent may have others as worn, even where rows show only one.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
     groups = tuple(

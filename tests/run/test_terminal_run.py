@@ -120,6 +120,15 @@ def take(console: Console, number: int, alpha: float, beta: float) -> None:
     console.averaging()
 
 
+def in_window(console: Console, alpha: float, beta: float) -> float:
+    """Turn the device so slowly that it can be told in time what comes next.
+
+    Returns:
+        Device time amid the window that begins then, s, on the busiest machine as well.
+    """
+    return console.turn(alpha, beta, seconds=60.0) + 7.0
+
+
 def wrong_angle(console: Console) -> None:
     asked(console, 2)
     console.turn(10.0, 0.0)
@@ -135,9 +144,7 @@ def forgets_a_position(console: Console) -> None:
 
 def bump(console: Console) -> None:
     asked(console, 3)
-    # the turn is slow, so that the bump is told in time on the busiest machine
-    there = console.turn(22.5, 2.5, seconds=60.0)
-    console.device.ask(bump={"at_s": there + 7.0})
+    console.device.ask(bump={"at_s": in_window(console, 22.5, 2.5)})
     console.wait("hold still,")  # what was calm before is kept, or it starts again
 
 
@@ -145,11 +152,10 @@ def wrong_direction(console: Console) -> None:
     asked(console, 4)
     console.turn(-45.0, 2.5)
     console.wait("α is turned the wrong way")
-    take(console, 4, 45.0, 2.5)
 
 
 def too_early(console: Console) -> None:
-    console.turn(45.0, 5.0)
+    console.turn(45.0, 5.0, at_s=in_window(console, 45.0, 2.5))
     console.wait("turned too early, position 4 is not done")
     console.turn(45.0, 2.5)
 

@@ -138,6 +138,7 @@ def averaged_once(
     return windows, block
 
 
+@pytest.mark.thorough
 def test_an_autopilot_that_averaged_once_keeps_its_bias() -> None:
     """Where it tells the offset; one that tracks its bias all the time has none.
 
@@ -278,7 +279,8 @@ def test_the_odds_of_gyroscopes_at_zero_are_those_of_two_normal_laws(seed: int) 
     assert chance == pytest.approx(expected, rel=0.15, abs=0.02)
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("count", [100, 300])
 def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device(
     count: int,
 ) -> None:

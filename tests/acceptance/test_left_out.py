@@ -62,7 +62,8 @@ def leaning(full_scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.arange(len(acc)) / 50, np.clip(acc, -full_scale, full_scale), gyr
 
 
-@pytest.mark.parametrize("sides", [7, pytest.param(2, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("sides", [7, 2])
 def test_what_was_not_recorded_is_not_left_out(tmp_path: Path, sides: int) -> None:
     code, found = solved(tmp_path, sides, 80.0)
     assert (code, found["verdict"]) == (0, "good")

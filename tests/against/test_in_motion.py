@@ -91,6 +91,7 @@ def test_clock_and_axes_are_told_with_their_uncertainty(true: Block) -> None:
     assert where.compared_s > 50
 
 
+@pytest.mark.thorough
 def test_several_at_once_with_late_gyroscopes_off_the_centre(true: Block) -> None:
     device = {"arm": (0.2, -0.15, 0.1), "late": 0.02, "g": 2e-4 * np.eye(3), **NOISE}
     found = held(device, true)
@@ -155,6 +156,7 @@ def test_one_filter_of_both_triads_is_a_time_constant_of_both(true: Block) -> No
         assert abs(tau - 0.004) < 4 * sigma < 0.003
 
 
+@pytest.mark.thorough
 def test_the_low_pass_of_a_simulator_is_a_time_constant_below_nothing() -> None:
     slow = block_of(recorded(DRIVE, {"lag": (0.02, 0.02)}, 80.0, 25.0))
     found = held(NOISE, slow, seconds=30.0)

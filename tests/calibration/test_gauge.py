@@ -67,13 +67,8 @@ def solved(folders: dict[str, Path]) -> dict[str, dict[str, Any]]:
     return {unit: solved_in(folders[unit]) for unit in ("SI", "count")}
 
 
-@pytest.mark.parametrize(
-    ("unit", "acc", "gyr"),
-    [
-        ("count", ACC, GYR),
-        pytest.param("V", 0.2, 3.0, marks=pytest.mark.thorough),
-    ],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize(("unit", "acc", "gyr"), [("count", ACC, GYR), ("V", 0.2, 3.0)])
 def test_what_is_solved_is_the_same_in_another_unit(
     solved: dict[str, dict[str, Any]],
     folders: dict[str, Path],

@@ -488,6 +488,7 @@ def test_gyroscopes_along_other_axes_than_the_ladder_are_named(
     assert said["twin"]["twin"]["chi2_per_dof"] < 1.5
 
 
+@pytest.mark.thorough
 def test_a_mirrored_device_is_mirrored_and_its_gyroscopes_do_not_turn_back(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -84,6 +84,7 @@ def test_a_level_base_is_enough_for_two_positions(
     assert (np.abs(off) < 4.5 * np.array(found["sigma"])).all()
 
 
+@pytest.mark.thorough
 def test_a_tilt_that_two_positions_cannot_see_is_never_go(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,6 +64,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return five_positions(tmp_path_factory.mktemp("bare") / "s")
 
 
+@pytest.mark.thorough
 def test_what_needs_no_terminal_runs_without_posix(session: Path) -> None:
     code, out, err = without_posix(
         ["solve", str(session), "--as-printed"],

@@ -168,6 +168,7 @@ def test_practice_sessions_are_solved_within_the_stated_uncertainty(
     assert np.sqrt(np.mean(np.concatenate(pulls) ** 2)) < 1.8
 
 
+@pytest.mark.thorough
 def test_ten_short_intervals_have_next_to_no_freedom_and_that_is_said(
     shared: Path, tmp_path: Path
 ) -> None:

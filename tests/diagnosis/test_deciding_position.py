@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from session_folders import places, recorded, write_session
 
 from fieldcal.diagnosis import Diagnosis, diagnose
@@ -41,6 +42,7 @@ def test_the_position_that_is_asked_for_is_on_the_ladder_and_decides(
     assert [(e.id, e.aliases) for e in then.effects] == [("cross_coupling", ())]
 
 
+@pytest.mark.thorough
 def test_what_an_effect_does_is_the_change_of_the_calibration(tmp_path: Path) -> None:
     """The model's numbers with and without it differ by what is stated."""
     found = found_in(tmp_path, (*FIVE, (-45.0, 0.0)))

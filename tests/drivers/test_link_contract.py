@@ -171,6 +171,7 @@ def test_a_minute_at_1_khz_without_a_loss_and_the_truth_in_it(
     assert_whole_and_true(block, health, tmp_path / "truth.json", reference, datagrams)
 
 
+@pytest.mark.thorough
 def test_the_same_on_a_bus_of_datagrams(
     namespace: tuple[str, ...], tmp_path: Path, reference: Calibration
 ) -> None:

@@ -58,7 +58,7 @@ def test_it_is_nothing_of_the_device() -> None:
 
 @pytest.mark.parametrize(
     ("held", "last"),
-    [(WIDE, False), pytest.param(FACES[::-1], True, marks=pytest.mark.thorough)],
+    [pytest.param(WIDE, False, marks=pytest.mark.thorough), (FACES[::-1], True)],
 )
 def test_a_calibration_on_a_base_that_is_knocked_is_right(
     held: list[tuple[float, float]],

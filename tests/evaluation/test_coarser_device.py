@@ -73,6 +73,7 @@ def pulls(said: dict[str, Any], profile: Profile) -> np.ndarray[Any, np.dtype[An
     )
 
 
+@pytest.mark.thorough
 def test_a_low_cost_device_is_one_whatever_it_is_called(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,6 +34,7 @@ def shown(tilt_deg: float, angles_deg: float, rng: np.random.Generator) -> float
     return float(told["chi2"])
 
 
+@pytest.mark.thorough
 def test_of_a_true_statement_it_is_that_of_two_degrees_of_freedom() -> None:
     rng = np.random.default_rng(4)
     chi2 = [shown(0.0, 1e-3, rng) for _ in range(40)]

@@ -101,6 +101,7 @@ def test_windows_that_cannot_be_cut_say_so(tmp_path: Path) -> None:
     assert nested(one.with_windows(())) is None
 
 
+@pytest.mark.thorough
 def test_console_result_and_report_have_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -208,10 +208,8 @@ BY_HAND = [(181.3, 0.8), (88.9, -1.6), (1.1, 91.4), (-92.0, 0.7)]
 """Faces on which the device is laid: about these angles, and nobody knows which."""
 
 
-@pytest.mark.parametrize(
-    ("size", "other"),
-    [pytest.param(44.0, False, marks=pytest.mark.thorough), (231.0, True)],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize(("size", "other"), [(44.0, False), (231.0, True)])
 def test_angles_that_nobody_sets_so_are_those_of_other_positions(
     size: float,
     other: bool,
@@ -229,6 +227,7 @@ def test_angles_that_nobody_sets_so_are_those_of_other_positions(
     assert (angles_shown.OTHER_ANGLES in out["warnings"]) == other
 
 
+@pytest.mark.thorough
 def test_turns_bear_witness_to_angles_that_six_faces_make_up_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

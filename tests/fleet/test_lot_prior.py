@@ -80,6 +80,7 @@ def test_what_goes_together_in_a_lot_is_told_from_errors_that_do(lot: float) -> 
     assert abs(few.covariance[0, 1]) < 0.75 * few.sigma[0] * few.sigma[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_few_units_leave_as_much_open_as_is_said() -> None:
     rng = np.random.default_rng(4)

@@ -152,6 +152,7 @@ def ended(some: list[ForkServerProcess]) -> list[int | None]:
     return [one.exitcode for one in some]
 
 
+@pytest.mark.thorough
 def test_eight_writers_at_once_lose_nothing(tmp_path: Path) -> None:
     some = writers(tmp_path / "h", 8)
     assert ended(some) == [0] * 8

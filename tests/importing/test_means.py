@@ -94,6 +94,7 @@ def test_too_few_positions_are_asked_about(
     assert (sigma == [1e-3] * 3 + [1e-4] * 3).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_what_remains_of_gravity_is_the_error_of_the_means() -> None:
     found = [
@@ -103,6 +104,7 @@ def test_what_remains_of_gravity_is_the_error_of_the_means() -> None:
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.1)
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_a_position_that_was_moved_is_no_part_of_the_scatter() -> None:
     found = []

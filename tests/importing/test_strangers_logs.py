@@ -398,7 +398,9 @@ def test_a_workbook_is_read(tmp_path: Path) -> None:
     assert_same(imported(path))
 
 
-@pytest.mark.parametrize("version", ["v7", "v7.3"])
+@pytest.mark.parametrize(
+    "version", ["v7", pytest.param("v7.3", marks=pytest.mark.thorough)]
+)
 def test_a_timetable_is_read(tmp_path: Path, version: str) -> None:
     pandas, matio = pytest.importorskip("pandas"), pytest.importorskip("matio")
     frame = pandas.DataFrame({"Acceleration": list(A), "AngularVelocity": list(W)},

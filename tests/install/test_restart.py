@@ -93,6 +93,7 @@ def test_what_it_averaged_when_it_started_is_composed_with(
         assert abs(said["value"] - right) < 4.5 * said["sigma"]
 
 
+@pytest.mark.thorough
 def test_written_after_another_start_and_once_more(
     restarted: tuple[Path, str, str, dict[str, Any]],
     capsys: pytest.CaptureFixture[str],

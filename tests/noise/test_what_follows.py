@@ -48,6 +48,7 @@ def test_a_ramp_ends_averaging() -> None:
     assert found.best[0] == pytest.approx(100.0, rel=0.2)
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_the_stated_walk_is_not_exceeded_in_95_of_100() -> None:
     """Where walk is too small to be seen, the bound lies above it nearly always."""

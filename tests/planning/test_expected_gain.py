@@ -191,6 +191,7 @@ def test_a_cause_is_told_where_it_differs_from_what_stands_in_its_place() -> Non
     assert other < 0.85 * same and worth.gain[1] > worth.gain[0]
 
 
+@pytest.mark.thorough
 def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None:
     """Columns that a refined shape has are in no dictionary of the search."""
     settling = {"gx": 3e-3, "gy": -2e-3, "gz": 2e-3, "tau_s": 3.0}
@@ -209,6 +210,7 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     assert np.isfinite(gain_of(found).of(LADDER[:2]).gain).all()
 
 
+@pytest.mark.thorough
 def test_what_a_part_showed_may_be_contradicted_without_a_search_from_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -126,6 +126,7 @@ def test_a_short_recording_is_packed_sample_by_sample() -> None:
     assert "dt" not in packed["base"] and packed["details"] == []
 
 
+@pytest.mark.thorough
 def test_residuals_are_those_of_the_fit(material: Material) -> None:
     found = residuals(material)
     assert found is not None and material.calibration is not None

@@ -136,6 +136,7 @@ def check(
             assert key == written["parameters"]
 
 
+@pytest.mark.thorough
 def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) -> None:
     with ExitStack() as stack:
         devices, urls = started(stack, tmp_path)

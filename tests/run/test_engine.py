@@ -316,6 +316,7 @@ class Slow(Turner):
         return "wait" if time < self.due else None
 
 
+@pytest.mark.thorough
 def test_nobody_gives_up_on_a_mover_that_is_at_work(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         turner = Slow(InProcess(VirtualDevice(seed=3)))

@@ -229,6 +229,7 @@ def test_runs_that_are_broken_end_with_right_numbers(kind: str, runs: int) -> No
         assert len(one.pulls) >= 11 and np.abs(one.pulls).max() < 4.5
 
 
+@pytest.mark.thorough
 def test_a_laptop_that_fell_asleep_goes_on_with_right_numbers(tmp_path: Path) -> None:
     bench = Bench(tmp_path, 3, speed="20")
     try:

@@ -45,7 +45,10 @@ def test_times_and_windows_go_on(tmp_path: Path) -> None:
     assert "to 2023-11-14" in session.warnings[-1]
 
 
-@pytest.mark.parametrize(("jump", "windows"), [(86400.0, 4), (JUMP, 0)])
+@pytest.mark.parametrize(
+    ("jump", "windows"),
+    [pytest.param(86400.0, 4, marks=pytest.mark.thorough), (JUMP, 0)],
+)
 def test_memory_is_that_of_the_rows_whatever_the_clock_says(
     tmp_path: Path, jump: float, windows: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

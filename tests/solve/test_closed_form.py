@@ -174,6 +174,7 @@ def test_gravity_that_is_none_is_refused(g: float) -> None:
         observe(TWO, outputs(TWO), gravity=g)
 
 
+@pytest.mark.thorough
 def test_how_level_the_base_is_enters_the_uncertainty() -> None:
     rng = np.random.default_rng(0)
     level = np.deg2rad(0.5)

@@ -171,6 +171,7 @@ def test_one_bad_position_is_doubted_and_never_spoils_the_interval(
         assert 0.85 < pulls.std() < 1.15
 
 
+@pytest.mark.thorough
 def test_good_positions_are_not_doubted() -> None:
     found, _ = run(Model("angle_offset"), NINE, 40, 3)
     doubt = np.array([f.info["bad_position"] for f in found])

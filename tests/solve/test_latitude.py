@@ -160,6 +160,7 @@ def mixture(means: np.ndarray, noise: float, said: float) -> tuple[np.ndarray, .
     return weight, mean, np.sqrt(spread)
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_decided_of_the_latitude_is_in_the_uncertainty() -> None:
     """As averaged densely over the three possibilities."""
     seen_open = 0

@@ -104,6 +104,7 @@ def test_a_bias_as_large_as_the_rate_bends_nothing(tmp_path: Path) -> None:
     assert np.abs(every).max() < 4
 
 
+@pytest.mark.thorough
 def test_what_the_speed_is_off_by_is_in_every_scale_factor(tmp_path: Path) -> None:
     sigma, rng, every = 0.05, np.random.default_rng(5), []
     for seed in range(8):

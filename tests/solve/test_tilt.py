@@ -98,6 +98,7 @@ def test_a_base_known_to_be_nearly_level_is_in_the_gyroscopes_uncertainty() -> N
     assert np.std(pulls) == pytest.approx(1, abs=0.2)
 
 
+@pytest.mark.thorough
 def test_joints_are_off_and_the_base_is_not_level_either() -> None:
     """Two faces with the axis of the joints level would know a bias to their noise."""
     rng = np.random.default_rng(8)

@@ -44,6 +44,7 @@ def points(
     ]
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_what_is_stated_holds_over_many_devices() -> None:
     """Orders, what sessions have in common and what changes from run to run drawn."""

@@ -85,6 +85,7 @@ def test_the_replay_with_what_was_found_agrees_with_the_recording(
     assert [p["position"] for p in replays["positions"]] == list(range(9))
 
 
+@pytest.mark.thorough
 def test_a_position_set_otherwise_is_replayed_where_it_was(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

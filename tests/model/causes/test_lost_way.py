@@ -82,7 +82,8 @@ def calibrated(folder: Path, seed: int, way: int | None) -> Calibration:
     return solved(session, rests(session))
 
 
-@pytest.mark.parametrize("way", [0, pytest.param(4, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("way", [0, 4])
 def test_scale_factors_are_those_of_the_turns_that_were_followed(
     tmp_path: Path, way: int
 ) -> None:

@@ -57,6 +57,7 @@ def test_a_base_that_gives_way_is_told_and_is_no_effect(seed: int, by: float) ->
     assert len(said) == one.sinks
 
 
+@pytest.mark.thorough
 def test_biases_are_right_and_as_uncertain_as_is_said(tmp_path: Path) -> None:
     pulls = []
     for seed in range(3, 5):

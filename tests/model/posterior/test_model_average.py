@@ -183,6 +183,7 @@ def pulls() -> tuple[Array, Array]:
     return np.array(mean), np.array(alone)
 
 
+@pytest.mark.thorough
 def test_biases_are_as_near_as_they_say_whatever_was_chosen() -> None:
     mean, alone = pulls()
     assert np.mean(np.abs(mean) < 1.96) > 0.9

@@ -277,6 +277,7 @@ def test_what_accelerometers_show_stands_for_nothing_on_gyroscopes() -> None:
     assert posterior.probability(["bias_drift"], frozenset({"gyr"})) < 0.05
 
 
+@pytest.mark.thorough
 def test_a_cause_that_is_not_excluded_counts_though_the_search_left_it_out() -> None:
     """All that come near are tried here, one after the other."""
     session, near = Session.of(ladder(), KEYS), 3.4

@@ -201,6 +201,7 @@ def test_means_of_windows_pull_right(tmp_path: Path) -> None:
     assert np.sqrt((np.array(pulls) ** 2).mean()) < 0.9
 
 
+@pytest.mark.thorough
 def test_a_window_too_short_to_show_it_is_as_uncertain_as_its_ends(
     tmp_path: Path,
 ) -> None:

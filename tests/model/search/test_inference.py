@@ -62,6 +62,7 @@ def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
     assert [one.name for one in found.standing] == ["cross_coupling"]
 
 
+@pytest.mark.thorough
 def test_what_was_gone_through_is_not_gone_through_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

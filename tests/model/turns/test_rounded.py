@@ -59,6 +59,7 @@ def stands(variance: float = STEP**2 / 12) -> StandingOutputs:
     return StandingOutputs(np.zeros(3), np.full(3, STEP), np.full(3, variance))
 
 
+@pytest.mark.thorough
 def test_what_rounding_makes_of_a_turn_is_as_large_as_is_said() -> None:
     rng, pulls, alone = np.random.default_rng(5), [], []
     for _ in range(120):

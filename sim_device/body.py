@@ -52,7 +52,10 @@ class Body:
         effects = profile.in_order
         settings = (e.setting(stream(seed, e.id)) for e in effects)
         self._settings = [setting for setting in settings if setting is not None]
-        self.joints = Joints(self._set(self.asked))
+        creeps = (e.creep() for e in effects)
+        self.joints = Joints(
+            self._set(self.asked), tuple(c for c in creeps if c is not None)
+        )
         self.moves: list[BaseMotion] = []
         for effect in effects:
             self.disturb(effect)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
+from fieldcal.sim_device.joints import Creep
 from fieldcal.sim_device.life import Life
 from fieldcal.sim_device.motion import BaseMotion, Stand
 from fieldcal.sim_device.random_process import RandomProcess
@@ -169,6 +170,10 @@ class SimulatedEffect:
 
     def base_motion(self) -> BaseMotion | None:
         """Motion of the base, if it makes it move."""
+        return None
+
+    def creep(self) -> Creep | None:
+        """How its joints go too far and come back, if they do."""
         return None
 
     def setting(self, rng: np.random.Generator) -> Callable[[Array], Array] | None:

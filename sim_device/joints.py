@@ -27,6 +27,9 @@ from fieldcal.core.samples import Array
 JOINTS = 4
 ALPHA, BETA, GAMMA, SPIN = range(JOINTS)
 
+NOTHING = 1e-12
+"""Share of a creep from which on the joint rests."""
+
 Angles = tuple[float, float, float]
 """Alpha, beta and gamma, rad."""
 
@@ -54,6 +57,49 @@ class Swing:
     position: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Creep:
+    """How joints go too far in a turn, and come back afterwards.
+
+    Attributes
+    ----------
+    by : (joints,) rad, of a turn in which the angle rises
+    tau : time constant of the way back, s
+
+    """
+
+    by: Array
+    tau: float
+
+    def at(self, t: Array, turn: tuple[float, float], side: Array) -> Array:
+        """What a turn from one instant to another adds, with its two derivatives.
+
+        Parameters
+        ----------
+        t : (n,) s
+        turn : start and end, s
+        side : (joints,) 1 if the angle rises, -1 if it falls, 0 if it stays
+
+        Returns
+        -------
+        array, (3, joints, n), rad, rad/s and rad/s^2
+
+        """
+        (start, end), length = turn, turn[1] - turn[0]
+        u = np.clip((t - start) / length, 0.0, 1.0)
+        going = (
+            u**3 * (10 - 15 * u + 6 * u**2),
+            30 * u**2 * (1 - u) ** 2 / length,
+            60 * u * (1 - u) * (1 - 2 * u) / length**2,
+        )
+        left = np.exp(-np.maximum(t - end, 0.0) / self.tau)
+        left[left < NOTHING] = 0.0
+        back = (left, -left / self.tau, left / self.tau**2)
+        course = [np.where(t < end, g, b) for g, b in zip(going, back, strict=True)]
+        out: Array = np.array(course)[:, None] * (self.by * side)[:, None]
+        return out
+
+
 @dataclass(slots=True)
 class _Segment:
     start: float
@@ -66,9 +112,11 @@ class Joints:
     """Segments of motion, appended as the device is told to move."""
 
     angles: Angles
+    creeps: tuple[Creep, ...] = ()
     turns: list[tuple[float, float]] = field(default_factory=list)
     spins: bool = False
     _segments: list[_Segment] = field(default_factory=list)
+    _sides: list[Array] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         rest = _polynomial(np.array([*self.angles, 0.0]), np.zeros(JOINTS))
@@ -103,11 +151,11 @@ class Joints:
         along = float(np.dot(old.axis, wanted))
         same = along >= 0 and np.allclose(wanted, along * old.axis)
         if old.coefficients[1, SPIN] and not same:
-            half = seconds / 2
+            half, before = seconds / 2, old.coefficients[0]
             _, rested = self._move(start, half, angles, np.zeros(3), counts=False)
             began = max(start, self.busy_until)
             _, end = self._move(rested, half, angles, wanted, counts=False)
-            self.turns.append((began, end))
+            self._turned(began, end, before)
             return began, end
         return self._move(start, seconds, angles, wanted)
 
@@ -133,8 +181,14 @@ class Joints:
         self._segments.append(_Segment(end, axis, _polynomial(target, final)))
         self.spins = self.spins or bool(magnitude)
         if counts:
-            self.turns.append((start, end))
+            self._turned(start, end, place)
         return start, end
+
+    def _turned(self, start: float, end: float, before: Array) -> None:
+        """Keep a turn from where the joints were, and from which side it came."""
+        self.turns.append((start, end))
+        side = np.sign(self._segments[-1].coefficients[0] - before)
+        self._sides.append(np.where(np.arange(JOINTS) == SPIN, 0.0, side))
 
     def _state(self, t: float) -> tuple[Array, Array]:
         """Angles and rates of the joints at rest or in steady spin at `t`, (4,)."""
@@ -152,6 +206,10 @@ class Joints:
             x, v, a = _evaluate(segment.coefficients, s)
             angle[:, rows], rate[:, rows], acceleration[:, rows] = x, v, a
             axis[:, rows] = segment.axis[:, None]
+        for creep in self.creeps:
+            for turn, side in zip(self.turns, self._sides, strict=True):
+                x, v, a = creep.at(t, turn, side)
+                angle, rate, acceleration = angle + x, rate + v, acceleration + a
         since, progress, position = self._last_turn(t)
         return Swing(angle, rate, acceleration, axis, since, progress, position)
 

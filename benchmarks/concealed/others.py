@@ -31,6 +31,7 @@ APART = (
     {"temperature_bias", "temperature_scale"},
     {"gyro_scale", "gyro_cross_coupling", "angle_scale", "angle_offset", "sway"},
     {"lever_arm", "time_delay", "sway", "hum"},
+    {"settling", "joint_creep"},
     {"heading_error", "g_sensitivity", "g2_sensitivity", "base_tilt", "angle_offset"},
 )
 """Effects that are much alike: those at once are drawn from different sets."""

@@ -95,7 +95,8 @@ def _joints(bench: Bench, t: Floats) -> tuple[Floats, Floats]:
         joints = np.where((s > 0)[:, None], held[i - 1] + way[:, None] * moved, joints)
         rate = (1 - np.cos(2 * np.pi * s)) / (b - a) * ((s > 0) & (s < 1))
         speed += rate[:, None] * moved
-        far = bench.creep * np.sign(moved)
+        # a joint that is not turned does not creep, however its detents scatter
+        far = bench.creep * np.sign(bench.angles[i] - bench.angles[i - 1])
         left = np.exp(-np.maximum(t - b, 0) / bench.creeps_s)
         creeping += (way * left)[:, None] * far
         speed += ((rate - way * (t > b) / bench.creeps_s) * left)[:, None] * far

@@ -12,13 +12,14 @@ Avrutov and Pozniak 2023, (3), (4), (39); signs as in `fieldcal.core.frames`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
 
 from fieldcal.core.frames import force_home, in_turned_axes, mean_rotation, turn
 from fieldcal.core.samples import Array
+from fieldcal.physics.joint_turns import JointTurns
 
 STEADY = 1e-3
 """Sine of the angle between rate and force up to which a turn leaves the force."""
@@ -55,6 +56,7 @@ class Experience:
     base_force : (3,) m/s^2, specific force in base axes
     base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
     transport : (3,) rad/s, what a base that moves over the Earth adds to it
+    joint_turns : when the joints that hold the device were turned, as far as is known
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
     gravity_sigma : m/s^2, what is not known of gravity, 1 sigma
@@ -91,6 +93,7 @@ class Experience:
     gamma: Array
     attitude_sigma: Array
     transport: Array
+    joint_turns: JointTurns = field(default_factory=JointTurns.none)
 
     @classmethod
     def at_rest(cls, alpha: Array, beta: Array, gravity: float, **known: Any) -> Self:

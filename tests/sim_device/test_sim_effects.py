@@ -264,6 +264,32 @@ def test_a_base_that_is_knocked_stays_as_it_then_stands() -> None:
     np.testing.assert_allclose(turned, held @ tilt, atol=1e-5)
 
 
+def test_joints_that_creep_go_too_far_and_come_back() -> None:
+    """By where the device is held: gyroscopes and accelerometers tell the same."""
+    crept = told("joint_creep:alpha_deg=0.3,beta_deg=-0.2,tau_s=5")
+    step, seen = 0.01, []
+    for profile in (crept, PLAIN):
+        device = VirtualDevice(profile, 9)
+        device.take(100)
+        for alpha, beta in ((A, 0.0), (A, A), (0.0, A)):
+            device.turn(alpha, beta, 2.0)
+            seen.append(device.take(1000))
+    more = [a.six - b.six for a, b in zip(seen[:3], seen[3:], strict=True)]
+    far = np.deg2rad([[0.3, 0.0], [0.0, -0.2], [-0.3, 0.0]])
+    for k, (alpha, beta) in enumerate(((A, 0.0), (A, A), (0.0, A))):
+        for at in (300, 700):  # samples since the turn began, which took 2 s
+            since = step * at - 2.0 + 10.0 * np.arange(k, -1, -1)
+            there = (far[: k + 1] * np.exp(-since / 5.0)[:, None]).sum(axis=0)
+            up = np.array([0.0, -10.0, 0.0])
+            held, goes = (
+                frames.turn(alpha + s * there[0], beta + s * there[1]) @ up
+                for s in (0, 1)
+            )
+            np.testing.assert_allclose(more[k][at, :3], goes - held, atol=1e-6)
+    turned = np.linalg.norm(step * more[0][:, 3:].sum(axis=0))
+    assert turned == pytest.approx(np.deg2rad(0.3) * np.exp(-8.0 / 5.0), rel=0.01)
+
+
 def test_gyroscopes_that_are_late_show_what_was() -> None:
     moving = []
     for text in ("time_delay:seconds=0.02", "time_delay:seconds=-0.02", ""):

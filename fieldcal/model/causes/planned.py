@@ -83,6 +83,7 @@ def late(x: Experience, alpha: Array, beta: Array) -> Experience:
         position=np.full(len(alpha), -1), base_force=x.base_force,
         base_rate=x.base_rate, mounting=x.mounting, latitude=x.latitude,
         gravity_sigma=x.gravity_sigma, transport=x.transport,
+        joint_turns=x.joint_turns,
     )  # fmt: skip
 
 

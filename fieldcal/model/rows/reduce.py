@@ -29,6 +29,7 @@ from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.rows.turntable import going_round
 from fieldcal.model.rows.vibration import Shaking, shaking
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.session.description import Description
 from fieldcal.session.site_gravity import gravity_sigma
 
@@ -253,10 +254,19 @@ def _experience(
         mounting=about.mounting,
         latitude=about.latitude,
         gravity_sigma=float(np.hypot(gravity_sigma(about), source.unsure_gravity)),
+        joint_turns=_joint_turns(source),
         **known_attitudes(about, position),
     )
     free = ~x.oriented & ~x.rate.any(axis=1)
     return replace(x, w=np.where(free[:, None], gyroscopes.earth_rates(), x.w))
+
+
+def _joint_turns(source: RowSource) -> JointTurns:
+    """When the joints were turned, as far as the positions' angles are known."""
+    every = np.arange(len(source.arrived))
+    known = known_angles(source.about, every)
+    third = known_attitudes(source.about, every).get("gamma", np.zeros(len(every)))
+    return JointTurns.of(source.arrived, np.column_stack([*known, third]))
 
 
 def _without_round(

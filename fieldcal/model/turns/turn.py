@@ -260,7 +260,7 @@ class Turning:
             since_turn=np.full(len(t), np.inf), warming=warming, heating=heating,
             variance=np.full((len(t), 3), ends.variance.min(axis=0)),
             position=np.full(len(t), -1), mounting=ends.mounting,
-            latitude=ends.latitude, f=f,
+            latitude=ends.latitude, f=f, joint_turns=ends.joint_turns,
         )  # fmt: skip
         return replace(out, w=w, w_dot=accelerations(t, w))
 

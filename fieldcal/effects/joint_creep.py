@@ -44,7 +44,7 @@ class JointCreep(Sensor):
     """Angles of the joints that come back after each turn."""
 
     params = (Param("alpha_deg", "deg", 0.1), Param("beta_deg", "deg", 0.1))
-    shapes = (Shape("tau_s", "s", 0.7, 60.0, "turn"),)
+    shapes = (Shape("tau_s", "s", 0.7, 60.0, "joint"),)
     covariate = "time since the turn, along what each joint turns"
     seen_in = "transient"
     decided_by = "a longer wait between the turn and the window"

@@ -36,15 +36,16 @@ FINEST = 1.06
 class Shape:
     """A parameter that the outputs are not linear in, and the range to search.
 
-    `kind` says what it is: a time constant of the "session" or since the "turn", an
-    "instant", or the "frequency" of a line, which is found in the spectrum.
+    `kind` says what it is: a time constant of the "session", since the "turn" or since
+    each turn of a "joint", an "instant", or the "frequency" of a line, which is found
+    in the spectrum.
     """
 
     name: str
     unit: str
     low: float = 0.0
     high: float = np.inf
-    kind: Literal["session", "turn", "instant", "frequency"] = "frequency"
+    kind: Literal["session", "turn", "joint", "instant", "frequency"] = "frequency"
 
     def grid(self, x: Experience, since: Array) -> Iterator[tuple[float, int]]:
         """Values to try in rows, each with the origin that times count from.
@@ -58,8 +59,11 @@ class Shape:
             low, high = max(self.low, span / 20), min(self.high, 3 * span)
             for tau in np.geomspace(low, max(high, 1.01 * low), POINTS):
                 yield float(tau), 0
-        elif self.kind == "turn":
-            for origin, times in enumerate(since):
+        elif self.kind in ("turn", "joint"):
+            # joints know by themselves when they were turned
+            for origin, times in enumerate(
+                since[: 1 if self.kind == "joint" else None]
+            ):
                 if not np.isfinite(soonest := float(times.min())):
                     continue  # it was never turned
                 low, high = max(self.low, soonest / 4), min(self.high, span / 3)

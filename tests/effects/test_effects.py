@@ -14,6 +14,7 @@ from fieldcal.model.causes.columns import RowView, of_effect
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.physics.lag import Lag
 
 SHAPE = {"tau_s": 7.0, "at_s": 20.0}
@@ -22,6 +23,9 @@ ROWS = 40
 
 def experience() -> Experience:
     rng = np.random.default_rng(0)
+    joints = JointTurns.of(
+        np.arange(0.0, ROWS, 5.0), rng.uniform(-1, 1, (ROWS // 5, 3))
+    )
     return Experience.at_rest(
         rng.uniform(-np.pi, np.pi, ROWS),
         rng.uniform(-1.5, 1.5, ROWS),
@@ -38,6 +42,7 @@ def experience() -> Experience:
         variance=rng.uniform(0, 1, (ROWS, 3)),
         base_rate=earth_rate_home(0.9),
         latitude=0.9,
+        joint_turns=joints,
     )
 
 

@@ -179,7 +179,8 @@ def whatever_turned(
 def _since_arrival(found: dict[str, Quantity], group: Group) -> dict[str, Quantity]:
     """Amplitudes with the uncertainty of the instant that they are counted from."""
     shapes = group.effect.shapes if group.effect else ()
-    tau = next((group.shape[s.name] for s in shapes if s.kind == "turn"), np.inf)
+    fading = (group.shape[s.name] for s in shapes if s.kind in ("turn", "joint"))
+    tau = next(fading, np.inf)
     part = priors.ARRIVAL_S / max(tau, priors.ARRIVAL_S)
     return {
         name: Quantity(q.value, float(np.hypot(q.sigma, q.value * part)), q.unit)

@@ -235,7 +235,7 @@ def _total(shares: Iterable[float]) -> float:
 def _fades(group: Group) -> bool:
     """Whether a group has a time constant."""
     shapes = group.effect.shapes if group.effect else ()
-    return any(s.kind in ("session", "turn") for s in shapes)
+    return any(s.kind in ("session", "turn", "joint") for s in shapes)
 
 
 LOOKED_AT = 8

@@ -26,6 +26,9 @@ from fieldcal.model.system.turn_rows import TurnRows
 PASSES = 8
 """Linearisations at most; a set that comes and goes is settled by weight."""
 
+OWN_SIGMA = 0.5
+"""Fall of ln Z where a time constant is off by its own uncertainty."""
+
 STAYED = 1.0
 """Largest step of a column, in standard deviations, after which rows of turns need not
 be linearised again."""
@@ -138,7 +141,9 @@ class Inference(Refinement):
                 found = search.run(members)
             if found.keys == same:
                 own = search.evaluated(members, found.sizes)  # with its own shapes
-                if found.score <= own.score + SETTLED:
+                # a point of the grid next to where a time constant was refined
+                back = Search.key(found.members) in seen
+                if found.score <= own.score + (OWN_SIGMA if back else SETTLED):
                     found = own
                     there, moved, _ = self.settled(state, values, members, found.sizes)
                     if self.step(found, values, moved) < STAYED:

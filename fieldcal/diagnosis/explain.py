@@ -32,7 +32,7 @@ from fieldcal.model.rows.interruptions import interruptions
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import beginnings
-from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.search.inference import OWN_SIGMA, Inference, Inferred
 from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
@@ -177,8 +177,11 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
     found = inference.run(None if before is None else _begun(before))
     posterior = _posterior(found)
     for _ in range(RESUMED):
-        better = found.search.highest
-        if better.score <= found.best.score + SETTLED:
+        better, now = found.search.highest, found.best
+        # the same causes between the points of their grids are as good
+        if better.score <= now.score + (
+            OWN_SIGMA if better.keys == now.keys else SETTLED
+        ):
             break
         # what may stand in the place of a cause does so better than the cause itself
         found = found.inference.resumed(better, found)

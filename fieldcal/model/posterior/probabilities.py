@@ -75,7 +75,7 @@ class Posterior:
         self.instead = {name: instead[name] for name in self.names(best)}
         for one in list(search.visited.values()) if best.members else ():
             if one.score > best.score - KEPT:
-                search.vary(one)
+                search.vary(one, best.score)
         self._one_more()
 
     def _one_more(self) -> None:

@@ -74,49 +74,43 @@ class Search(Offers):
             best = fewer
         return best
 
-    def vary(self, there: Set) -> None:
-        """Visit the set with other parameters of each of its causes, if they come near.
+    def vary(self, there: Set, top: float) -> None:
+        """Visit the set with other parameters of each of its causes, and without it.
 
-        Which of its parameters an effect was given is no more certain than that it is
-        there at all.
+        As far as that comes near the weight `top`: which of its parameters an effect
+        was given is no more certain than that it is there at all.
         """
+        least = top - OTHERWISE
         for i, (cause, group) in enumerate(there.members):
             if cause.kind != "effect":
                 continue
-            for other in self._varied(there, self.without(there, i), cause, group):
-                members = list(there.members)
-                members[i] = (cause, other)
-                self.evaluated(tuple(members), there.sizes)
-
-    @staticmethod
-    def _varied(there: Set, less: Set, cause: Cause, group: Group) -> Iterator[Group]:
-        """Variants of a cause that are about as likely as one that a set has."""
-        rows, wide = there.state.rows, less.state.sizes
-        rest = Eliminated.of(rows, less.state.columns, wide)
-        worth = _worth(rest, group.siblings(cause.variants))
-        least = worth[group] - OTHERWISE
-        yield from (g for g, w in worth.items() if g is not group and w > least)
+            worth = _worth(_rest(there, group), group.siblings(cause.variants))
+            bare = there.score - worth[group]
+            rest = (*there.members[:i], *there.members[i + 1 :])
+            if bare - self.chance(there.members) + self.chance(rest) > least:
+                self.without(there, i)
+            for other, more in worth.items():
+                if other is not group and bare + more > least:
+                    members = list(there.members)
+                    members[i] = (cause, other)
+                    self.evaluated(tuple(members), there.sizes)
 
     def on_more_outputs(self, there: Set) -> Set:
         """A set with its causes on more outputs, where those raise the weight.
 
         What a further cause did on an output may be what another one does there, too.
         """
-        state = there.state
         for cause, group in there.members:
             own = group.siblings(cause.variants)
             some = [g for g in own if {*g.params} > {*group.params}]
             if cause.kind != "effect" or not some:
                 continue
-            kept = ~np.isin(state.columns, group.columns)
-            rest = Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
-            worth = _worth(rest, [group, *some])
+            worth = _worth(_rest(there, group), [group, *some])
             most = max(worth, key=lambda g: worth[g])
             if most is not group:
                 members = tuple((c, most if c is cause else g)
                                 for c, g in there.members)  # fmt: skip
                 there = max([there, self.evaluated(members, there.sizes)], key=_score)
-                state = there.state
         return there
 
     def _of_effects(self, best: Set) -> Set:
@@ -276,6 +270,13 @@ class Search(Offers):
         """Chance of two more causes beside those of a set, ln."""
         both = [*there.members, one.member, two.member]
         return self.chance(both) - self.chance(there.members)
+
+
+def _rest(there: Set, group: Group) -> Eliminated:
+    """What is left by a set without one of its groups, with the sizes as they are."""
+    state = there.state
+    kept = ~np.isin(state.columns, group.columns)
+    return Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
 
 
 def _worth(rest: Eliminated, some: Iterable[Group]) -> dict[Group, float]:

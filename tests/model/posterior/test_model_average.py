@@ -198,7 +198,7 @@ def test_variants_that_come_near_are_visited(times: float) -> None:
     search = search_of(np.array([3e-5, 4e-6, -3e-5]) * times, 5)
     best = search.run()
     before = set(search.visited)
-    search.vary(best)
+    search.vary(best, best.score)
     ((cause, _),) = best.members
     new = [s for key, s in search.visited.items() if key not in before]
     assert {c for s in new for c, _ in s.members} <= {cause}

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means, masked
@@ -263,10 +264,11 @@ def _experience(
 
 def _joint_turns(source: RowSource) -> JointTurns:
     """When the joints were turned, as far as the positions' angles are known."""
-    every = np.arange(len(source.arrived))
-    known = known_angles(source.about, every)
-    third = known_attitudes(source.about, every).get("gamma", np.zeros(len(every)))
-    return JointTurns.of(source.arrived, np.column_stack([*known, third]))
+    positions = source.about.positions
+    if not positions:
+        return JointTurns.none()
+    known = np.column_stack([*angles(positions), third_angles(positions)])
+    return JointTurns.of(source.arrived[: len(known)], known)
 
 
 def _without_round(

@@ -20,6 +20,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
+from fieldcal.physics.joint_turns import JointTurns
 
 EFFECTS = catalogue()
 RNG = np.random.default_rng(7)
@@ -35,7 +36,10 @@ def rows(free: tuple[int, ...] = (), **known: Array) -> Experience:
         "variance": RNG.uniform(0, 1, (ROWS, 3)),
         "w_dot": RNG.standard_normal((ROWS, 3)),
     }
-    return ladder(2, free, **(has | known))
+    x = ladder(2, free, **(has | known))
+    first = np.unique(x.position, return_index=True)[1]
+    angles = np.column_stack([x.alpha, x.beta, x.gamma])[first]
+    return replace(x, joint_turns=JointTurns.of(x.t[first] - 1.0, angles))
 
 
 def away(x: Experience) -> State:

@@ -238,6 +238,7 @@ def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
     assert ("position 5 with a wrong α" in check.says) == (ok is False)
 
 
+@pytest.mark.thorough
 def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
     """A percent of cross-coupling, and 0.5 % of 2 g off a line, both by hand."""
     rng = np.random.default_rng(7)

@@ -178,6 +178,7 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
         assert len(gap) == 1 and abs(gap[0]["to_s"] - block.t[at + 1]) < 1e-3
 
 
+@pytest.mark.thorough
 def test_a_link_that_loses_all_the_time_is_marked_now_and_then(tmp_path: Path) -> None:
     with Run(tmp_path, "serial --with dropped:fraction=0.05", 4.0) as run:
         code, result, said = run.end()

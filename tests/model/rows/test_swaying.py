@@ -94,6 +94,7 @@ def off(found: Any) -> Array:
     return np.column_stack([pulls, sigma]).T
 
 
+@pytest.mark.thorough
 def test_it_calibrates_through_sway(tmp_path: Path) -> None:
     """Biases as on firm ground; scale factors by turns that begin and end aslant."""
     block = played(3, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))

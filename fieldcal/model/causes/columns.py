@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -45,6 +47,7 @@ class RowView:
     x : as the state has it
     since : (o, n) s since the turn, by origin
     state : the base state
+    rotations : what `small_rotation` found, if it was asked for
 
     """
 
@@ -53,6 +56,7 @@ class RowView:
     since: Array
     state: State
     _by_origin: dict[int, Experience] = field(default_factory=dict, repr=False)
+    rotations: list[Array] = field(default_factory=list, repr=False)
 
     @classmethod
     def of(cls, plain: Experience, since: Array, state: State) -> RowView:
@@ -157,11 +161,13 @@ def of_courses(
     """Columns of a pattern times each of several courses, point by point."""
 
     def of(view: RowView) -> Array:
-        patterns = {o: effect.pattern(view.counting_from(o)) for _, o in grid}
         parts = []
-        for shape, origin in grid:
-            course = effect.course(view.counting_from(origin), shape or NO_SHAPE)
-            parts.append(patterns[origin] * course[:, None, None])
+        for origin, some in groupby(grid, key=itemgetter(1)):
+            seen = view.counting_from(origin)
+            pattern = effect.pattern(seen)
+            courses = [effect.course(seen, shape or NO_SHAPE) for shape, _ in some]
+            each = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
+            parts.append(each.reshape(len(view.x), 6, -1))
         return np.concatenate(parts, axis=2)
 
     return General(effect.id, of)
@@ -314,6 +320,13 @@ def small_rotation_sides(
 
 def small_rotation(view: RowView) -> Array:
     """The same as columns (n, 6, 2 p), those of a position together."""
+    if not view.rotations:
+        view.rotations.append(_small_rotation(view))
+    return view.rotations[0]
+
+
+def _small_rotation(view: RowView) -> Array:
+    """The same, calculated."""
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.plain.position

@@ -65,9 +65,11 @@ class WindowSystem(System):
             if isinstance(basis, Course):
                 add_course(parts, at, table, kept)
                 continue
+            if not kept.all():
+                at, table = at[kept], table[:, :, kept]
+            touched = table != 0.0
             for c, some in parts.items():
-                used = self.rows.used[:, c]
-                there = kept & np.any(table[used, c] != 0.0, axis=0)
+                there = (touched[:, c] & self.rows.used[:, c, None]).any(axis=0)
                 if there.any():
                     some.append((at[there], table[:, c, there]))
         return parts

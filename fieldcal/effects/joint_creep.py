@@ -70,12 +70,11 @@ class JointCreep(Sensor):
             return out
         axes = turns.axes(x.t, ONSET_S, x.mounting)
         angle, rate = self._course(x, shape["tau_s"])
-        held = (x.position >= 0)[:, None]  # on the way w is about the axis itself
-        for j in range(2):
-            e = axes[:, :, j]
-            turned = -angle[:, j, None]
-            out[:, :3, j] = turned * np.cross(e, x.f)
-            out[:, 3:, j] = turned * held * np.cross(e, x.w) + rate[:, j, None] * e
+        out[:, :3] = np.cross(x.f[:, :, None], axes, axis=1) * angle[:, None]
+        out[:, 3:] = axes * rate[:, None]
+        held = np.flatnonzero(x.position >= 0)  # on the way w is about the axis itself
+        turned = np.cross(x.w[held, :, None], axes[held], axis=1)
+        out[held, 3:] += turned * angle[held, None]
         out *= np.deg2rad(1.0)
         return out
 

@@ -8,10 +8,11 @@ device that is turned by a small theta about e reads
 
     f' = f - theta e x f,    w' = w - theta e x w + theta' e              (1)
 
-with e the axis of the joint. So the axes across gravity creep together, gyroscopes see
-it go, and the length of the force stays: no bias that settles does that. Source:
-kinematics of a small rotation (Titterton and Weston 2004, 3.6); belts, gears, rubber
-and plastic creep back after a load (standard linear solid).
+with e the axis of the joint; while beta is turned, alpha carries its axis along, and
+the second term is none of its own. So the axes across gravity creep together,
+gyroscopes see it go, and the length of the force stays: no bias that settles does that.
+Source: kinematics of a small rotation (Titterton and Weston 2004, 3.6); belts, gears,
+rubber and plastic creep back after a load (standard linear solid).
 
 >>> import numpy as np
 >>> from fieldcal.physics.joint_turns import JointTurns
@@ -69,12 +70,15 @@ class JointCreep(Sensor):
         if not len(turns.at):
             return out
         axes = turns.axes(x.t, ONSET_S, x.mounting)
+        followed = np.isfinite(x.alpha_axis).all(axis=1)
+        axes[followed, :, 0] = x.alpha_axis[followed]
         angle, rate = self._course(x, shape["tau_s"])
         out[:, :3] = np.cross(x.f[:, :, None], axes, axis=1) * angle[:, None]
         out[:, 3:] = axes * rate[:, None]
-        held = np.flatnonzero(x.position >= 0)  # on the way w is about the axis itself
-        turned = np.cross(x.w[held, :, None], axes[held], axis=1)
-        out[held, 3:] += turned * angle[held, None]
+        # in a turn beta carries the device as it has crept; alpha carries beta's axis
+        carried = np.column_stack([x.position >= 0, np.ones(len(x), bool)])
+        turned = np.cross(x.w[:, :, None], axes, axis=1)
+        out[:, 3:] += turned * (angle * carried)[:, None]
         out *= np.deg2rad(1.0)
         return out
 

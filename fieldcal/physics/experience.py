@@ -56,6 +56,8 @@ class Experience:
     base_force : (3,) m/s^2, specific force in base axes
     base_rate : (3,) rad/s, the Earth's rate in base axes; zero where it is left out
     transport : (3,) rad/s, what a base that moves over the Earth adds to it
+    alpha_axis : (n, 3) axis of alpha, which is fixed in the base, in device axes where
+        it is known beside the angles: while the device is turned; else nan
     joint_turns : when the joints that hold the device were turned, as far as is known
     mounting : (3, 3) P, procedure = P device
     latitude : rad; nan where unknown
@@ -93,6 +95,7 @@ class Experience:
     gamma: Array
     attitude_sigma: Array
     transport: Array
+    alpha_axis: Array
     joint_turns: JointTurns = field(default_factory=JointTurns.none)
 
     @classmethod
@@ -137,6 +140,7 @@ class Experience:
             "gamma": np.zeros(n),
             "attitude_sigma": np.full(n, np.nan),
             "transport": np.zeros(3),
+            "alpha_axis": np.full((n, 3), np.nan),
         }
         return cls(alpha, beta, **(unknown | known)).turned()
 

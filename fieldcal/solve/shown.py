@@ -38,6 +38,7 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import only
 from fieldcal.physics.effect import Motion, Scatter, Sensor
+from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.solve.warm_scales import WARM_SCALE
 
 AXES = 3
@@ -273,13 +274,17 @@ def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
 
 
 def _outputs(d: Dictionary, there: Array, felt: Array) -> Array:
-    """Outputs by column, (6, k), at the end where f and w are given, (6,)."""
+    """Outputs by column, (6, k), at the end where f and w are given, (6,).
+
+    Long after the last turn: what joints still do then is nothing of the device.
+    """
     x = only(d.x, [int(np.argmax(d.x.t))])
     nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
     x = replace(
         x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
         f=felt[None, :3], w=felt[None, 3:], w_dot=nothing, variance=nothing,
         heating=np.zeros(1), since_turn=np.full(1, np.inf),
+        joint_turns=JointTurns.none(),
     )  # fmt: skip
     nowhere = State(np.zeros(6), np.ones(6), np.zeros((d.places, 2)), np.zeros(3))
     view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)

@@ -98,6 +98,28 @@ def test_gyroscopes_follow_it_on_the_way() -> None:
             assert 0.3 < np.linalg.norm(sum_) / np.deg2rad(0.1) < 0.95
 
 
+def test_a_turn_is_about_the_axes_as_they_have_crept() -> None:
+    """What alpha turns is seen past beta; what beta turns, past neither."""
+    t = np.array([22.0, 25.0])  # of the third position, on the way on from it
+    beta, size = ANGLES[2, 1], off(t)
+    way = replace(rows(t), position=np.full(2, -1))
+    course = outputs(replace(way, w=np.zeros((2, 3))))[:, 3:]
+    about = np.array([0.0, 0.0, 0.7])
+    a, g = np.full(2, ANGLES[2, 0]), np.full(2, ANGLES[2, 2])
+    plain, crept = (
+        np.array([turn(*one) @ about for one in zip(a, beta + more, g, strict=True)])
+        @ P
+        for more in (np.zeros(2), size[:, 1])
+    )
+    seen = outputs(replace(way, w=plain))[:, 3:] - course
+    assert np.abs(crept - plain).max() > 3e-4
+    np.testing.assert_allclose(seen, crept - plain, atol=1e-6)
+    inner = JointTurns.of(AT, ANGLES).axes(t, 1.0, P)[:, :, 1]
+    np.testing.assert_allclose(
+        outputs(replace(way, w=0.7 * inner))[:, 3:], course, atol=1e-12
+    )
+
+
 def test_a_row_has_the_mean_of_its_samples() -> None:
     t = np.array([11.5, 14.0, 33.0])
     long = outputs(rows(t, lasts=np.full(3, 3.0)))
@@ -126,10 +148,12 @@ def session(folder: Path, seed: int, **sizes: float) -> Path:
     return write_session(folder, recorded(profile, taken, seed), taken)
 
 
+@pytest.mark.parametrize("tau", [20.0, pytest.param(6.0, marks=pytest.mark.thorough)])
 def test_a_calibration_with_joints_that_creep_is_right(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tau: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = session(tmp_path / "s", 5, alpha_deg=0.12, beta_deg=0.09, tau_s=6.0)
+    """Also where they creep still when the recording ends: that is no bias."""
+    folder = session(tmp_path / "s", 5, alpha_deg=0.6, beta_deg=0.5, tau_s=tau)
     main(["solve", str(folder), "--json", "--angles", "0.002"])
     said = json.loads(capsys.readouterr().out)
     assert said["carried"]["causes"]["joint_creep"] > 0.9

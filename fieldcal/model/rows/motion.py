@@ -175,6 +175,7 @@ class MotionRows:
             speed_sigma=np.zeros(n), base_force=np.array([0.0, -G0, 0.0]),
             base_rate=np.zeros(3), mounting=np.eye(3), latitude=np.nan,
             gravity_sigma=0.0, attitude_sigma=unknown, transport=np.zeros(3),
+            alpha_axis=np.full((n, 3), np.nan),
         )  # fmt: skip
 
     @property

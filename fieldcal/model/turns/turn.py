@@ -29,8 +29,10 @@ from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (
     accelerations,
     astray,
+    between,
     blur,
     geometry,
+    rows_of,
     trapezoid_means,
 )
 from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
@@ -46,7 +48,7 @@ LEAST = np.deg2rad(1.0)
 PER_ROW = (
     "alpha", "beta", "gamma", "f", "w", "w_dot", "slope", "bend", "missed", "f_bend",
     "t", "lasts", "since_start", "since_turn", "warming", "heating", "variance",
-    "position", "rate", "speed", "speed_sigma", "attitude_sigma",
+    "position", "rate", "speed", "speed_sigma", "attitude_sigma", "alpha_axis",
 )  # fmt: skip
 """Fields of what is experienced that differ from row to row."""
 
@@ -252,6 +254,7 @@ class Turning:
         """What is experienced at the edges of the steps, as the gyroscopes tell."""
         f, _, _ = geometry(ends, pair, way.attitude, way.done)
         w = way.rate[edge]
+        held = ends.to_device[rows_of(ends, pair)]
         warming, heating = self.source.warmth.at(t)
         unknown = np.full(len(t), np.nan)
         out = Experience.at_rest(
@@ -261,6 +264,7 @@ class Turning:
             variance=np.full((len(t), 3), ends.variance.min(axis=0)),
             position=np.full(len(t), -1), mounting=ends.mounting,
             latitude=ends.latitude, f=f, joint_turns=ends.joint_turns,
+            alpha_axis=between(way.attitude, way.done, *held[:, :, 2]),
         )  # fmt: skip
         return replace(out, w=w, w_dot=accelerations(t, w))
 

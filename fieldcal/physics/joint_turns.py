@@ -16,7 +16,7 @@ import numpy as np
 from fieldcal.core.frames import about_y, in_turned_axes
 from fieldcal.core.samples import Array, Index
 
-SAME = 1e-6
+SAME = 1e-8
 """Difference up to which two angles are the same, rad."""
 
 

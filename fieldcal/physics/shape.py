@@ -61,9 +61,8 @@ class Shape:
                 yield float(tau), 0
         elif self.kind in ("turn", "joint"):
             # joints know by themselves when they were turned
-            for origin, times in enumerate(
-                since[: 1 if self.kind == "joint" else None]
-            ):
+            origins = since[:1] if self.kind == "joint" else since
+            for origin, times in enumerate(origins):
                 if not np.isfinite(soonest := float(times.min())):
                     continue  # it was never turned
                 low, high = max(self.low, soonest / 4), min(self.high, span / 3)

@@ -326,7 +326,7 @@ def small_rotation(view: RowView) -> Array:
 
 
 def _small_rotation(view: RowView) -> Array:
-    """The same, calculated."""
+    """The same, not asked for yet."""
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
     at = view.plain.position

@@ -13,9 +13,7 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
-
-SAME = 1e-8
-"""Difference up to which two angles are the same, rad."""
+from fieldcal.physics.joint_turns import SAME
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,7 +173,7 @@ class SimulatedEffect:
         return None
 
     def creep(self) -> Creep | None:
-        """How its joints go too far and come back, if they do."""
+        """How its joints overshoot and relax, if they do."""
         return None
 
     def setting(self, rng: np.random.Generator) -> Callable[[Array], Array] | None:

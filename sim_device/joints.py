@@ -59,12 +59,12 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class Creep:
-    """How joints go too far in a turn, and come back afterwards.
+    """How joints overshoot in a turn, and relax afterwards.
 
     Attributes
     ----------
     by : (joints,) rad, of a turn in which the angle rises
-    tau : time constant of the way back, s
+    tau : time constant of the relaxation, s
 
     """
 

@@ -1,4 +1,4 @@
-"""The joints of the fixture creep: each goes too far in a turn, and comes back.
+"""The joints of the fixture creep: each overshoots in a turn, and relaxes.
 
     theta_j(t) = A_j sum_k d_jk h(t - t_k),    h(s) = exp(-s / tau)  (s >= 0)
 
@@ -37,12 +37,12 @@ from fieldcal.physics.experience import Experience
 from fieldcal.physics.shape import Shape
 
 ONSET_S = 1.0
-"""Time before the end of a turn in which a joint is taken to go too far, s: about the
+"""Time before the end of a turn in which a joint is taken to overshoot, s: about the
 joint's own axis it does not matter when."""
 
 
 class JointCreep(Sensor):
-    """Angles of the joints that come back after each turn."""
+    """Angles of the joints that relax after each turn."""
 
     params = (Param("alpha_deg", "deg", 0.1), Param("beta_deg", "deg", 0.1))
     shapes = (Shape("tau_s", "s", 0.7, 60.0, "joint"),)

@@ -1,4 +1,4 @@
-"""The joints creep: each goes too far in a turn, and comes back when it has ended.
+"""The joints creep: each overshoots in a turn, and relaxes when it has ended.
 
 Beside the angle that a joint is turned to, by the side d = 1, -1 or 0 of each turn,
 
@@ -18,7 +18,7 @@ from fieldcal.sim_device.joints import Creep
 
 
 class SimulatedJointCreep(SimulatedEffect):
-    """How far alpha and beta go too far, and how slowly they come back."""
+    """How far alpha and beta overshoot, and how slowly they relax."""
 
     VECTOR = ("alpha_deg", "beta_deg")
     NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}

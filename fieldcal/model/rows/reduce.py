@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import angles, third_angles
+from fieldcal.core.positions import angles, attitude_sigmas, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means, masked
@@ -263,11 +263,16 @@ def _experience(
 
 
 def _joint_turns(source: RowSource) -> JointTurns:
-    """When the joints were turned, as far as the positions' angles are known."""
+    """When the joints were turned, as far as the positions' angles are known.
+
+    An attitude that was measured is not that of two joints: no joint stayed in its
+    place because an angle did.
+    """
     positions = source.about.positions
     if not positions:
         return JointTurns.none()
     known = np.column_stack([*angles(positions), third_angles(positions)])
+    known[np.isfinite(attitude_sigmas(positions))] = np.nan
     return JointTurns.of(source.arrived[: len(known)], known)
 
 

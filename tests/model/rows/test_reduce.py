@@ -53,6 +53,19 @@ def test_the_time_since_a_turn_counts_from_the_arrival() -> None:
     np.testing.assert_allclose(x.since_turn, since)
 
 
+def test_joints_are_those_of_angles_that_were_set_and_not_measured() -> None:
+    block = samples(60.0)
+    known = about(place(3.0, 13.0), place(25.0, 35.0, 90.0), place(40.0, 50.0))
+    arrived = np.array([2.5, 21.0, 38.0])
+    turns = reduce(replace(source(block, known), arrived=arrived)).x.joint_turns
+    assert turns.at.tolist() == [21.0, 38.0]
+    assert turns.side[:, 0].tolist() == [1.0, -1.0]
+    first, *rest = known.positions
+    measured = replace(known, positions=(replace(first, sigma=1e-3), *rest))
+    turns = reduce(replace(source(block, measured), arrived=arrived)).x.joint_turns
+    assert turns.at.tolist() == [38.0] and turns.side[:, 0].tolist() == [-1.0]
+
+
 def test_a_device_that_sees_the_earth_has_its_rate() -> None:
     block, device = samples(20.0), {"grade": "navigation", "name": "a"}
     x = reduce(source(block, about(place(3.0, 13.0), device=device))).x

@@ -9,11 +9,13 @@ Source: D. Percival, A. Walden, Spectral Analysis for Physical Applications, cha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.signal.pieces import Complex, Pieces
@@ -31,6 +33,12 @@ BESIDE = 40
 
 CLOSE, FAR = 5, 12
 """Neighbours that the taper does not reach and that are still close."""
+
+SURE = 200
+"""Periodograms whose mean tells the level of noise, to 7 %."""
+
+SIGMAS = 3.0
+"""Standard deviations of what windows differ by, from which it is more than noise."""
 
 STEEP = 4.0
 """Multiple of the floor above which these neighbours replace it."""
@@ -52,7 +60,7 @@ of a period loses 3 % of its power at most below 0.4 of the rate, by a half a th
 NEAR = 2.0
 """Distance between two lines, in cycles of the shortest window."""
 
-LOOKS = 10
+LOOKS = 16
 """Spectra looked at."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
@@ -77,6 +85,7 @@ class Spectrum:
     count : periodograms summed in it
     hz : (m,)
     together : channels in whose sums a line may stand out
+    level : (6, m) mean power of noise, where it is known otherwise
 
     """
 
@@ -84,6 +93,7 @@ class Spectrum:
     count: int
     hz: Array
     together: tuple[tuple[int, ...], ...]
+    level: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +106,7 @@ class Peak:
     low, high : between which it is above the floor; a line's own are its frequency
     noise : (6,) standard deviation of a sample of white noise as strong as what is
         beside it: filters and bearings make noise that is not white
+    channels : in which, together
 
     """
 
@@ -103,6 +114,7 @@ class Peak:
     low: float
     high: float
     noise: Array
+    channels: tuple[int, ...] = ()
 
 
 def highest(
@@ -114,48 +126,105 @@ def highest(
     no line. Peaks close to one that was taken already are ignored.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
-    low, channels = max(0.05, CYCLES / shortest), spectra[0]
-    kept = [s for s in spectra if s.count == 1]
-    for some in (kept, [s for s in spectra if s.count > 1]):
-        found = [_highest(s, low, NEAR / shortest, taken) for s in some]
-        odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
-        if peak is not None and odds < np.log(thresholds.LINE_BY_CHANCE):
-            # a line in short windows reaches its neighbours
-            near = noise_near(channels, peak.hz, pieces.noise)
-            return replace(peak, noise=np.minimum(near, pieces.noise))
-    return None
+    low, reach = max(0.05, CYCLES / shortest), NEAR / shortest
+    one_phase = [s for s in spectra if s.count == 1]
+    peak = _significant(one_phase, low, reach, taken)
+    windows, passed = [s for s in spectra if s.count > 1], list[Peak]()
+    while peak is None:
+        peak = _significant(windows, low, reach, taken, passed)
+        if peak is None:
+            return None
+        if one_phase and not _may_last(one_phase, peak, reach):
+            passed.append(peak)
+            peak = None
+    # a line in short windows reaches its neighbours
+    near = noise_near(spectra[0], peak.hz, pieces.noise)
+    return replace(peak, noise=np.minimum(near, pieces.noise))
+
+
+def _significant(
+    spectra: Sequence[Spectrum],
+    low: float,
+    reach: float,
+    taken: Sequence[Peak],
+    passed: Sequence[Peak] = (),
+) -> Peak | None:
+    """The most significant peak of some spectra, None if chance makes as high ones."""
+    found = [_highest(s, low, reach, taken, passed) for s in spectra]
+    odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
+    return peak if odds < np.log(thresholds.LINE_BY_CHANCE) else None
+
+
+def _may_last(one_phase: Sequence[Spectrum], peak: Peak, reach: float) -> bool:
+    """Whether a peak of the windows may be a line: near it one phase lasts.
+
+    In the channel in which it stands out, as far as that can be told.
+    """
+    low, high = peak.hz - reach, peak.hz + reach
+    for spectrum in one_phase:
+        near = (spectrum.hz >= low) & (spectrum.hz <= high)
+        stands = [_stands(spectrum, c, near) for c in peak.channels]
+        odds = _beyond(float(np.max(stands)), 1) + np.log(near.sum())
+        if odds < np.log(thresholds.LINE_BY_CHANCE):
+            return True
+    return False
+
+
+def _stands(spectrum: Spectrum, channel: int, band: NDArray[np.bool_]) -> Array:
+    """Power in that of the noise, by frequency, summed over the periodograms."""
+    power = spectrum.power[channel, band]
+    known = None if spectrum.level is None else spectrum.level[channel, band]
+    level = _level(power, spectrum.count, known)
+    out: Array = power / level * spectrum.count
+    return out
 
 
 def _highest(
-    spectrum: Spectrum, low: float, reach: float, taken: Sequence[Peak]
+    spectrum: Spectrum,
+    low: float,
+    reach: float,
+    taken: Sequence[Peak],
+    passed: Sequence[Peak],
 ) -> tuple[float, Peak] | None:
-    """The highest peak of a spectrum, with the ln probability of one by chance."""
+    """The highest peak of a spectrum, with the ln probability of one by chance.
+
+    Near those that were taken already there is none, nor, in the channels of those that
+    were passed over, near these.
+    """
     band, count = spectrum.hz >= low, spectrum.count
     hz = spectrum.hz[band]
-    free = np.ones(len(hz), dtype=bool)
-    for other in taken:
-        free &= (hz < other.low - reach) | (hz > other.high + reach)
-    if free.sum() < 4 * BESIDE:
-        return None
-    stands = {}
-    for c in sorted({c for some in spectrum.together for c in some}):
-        power = spectrum.power[c, band]
-        stands[c] = power / _level(power, count) * count
+    used = sorted({c for some in spectrum.together for c in some})
+    stands = {c: _stands(spectrum, c, band) for c in used}
     best: tuple[float, Peak] | None = None
     for some in spectrum.together:
+        there = [*taken, *(p for p in passed if set(p.channels) & set(some))]
+        free = _away_from(hz, there, reach)
+        if free.sum() < 4 * BESIDE:
+            continue
         total = np.sum([stands[c] for c in some], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
         odds = _beyond(float(total[at]), count * len(some))
         odds += np.log(LOOKS * len(total))
         if best is None or odds < best[0]:
-            best = odds, _peak_at(hz, total / (count * len(some)), at)
+            peak = _peak_at(hz, total / (count * len(some)), at)
+            best = odds, replace(peak, channels=some)
     return best
 
 
-def _level(power: Array, count: int) -> Array:
+def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> NDArray[np.bool_]:
+    """Frequencies that are close to none of some peaks, (m,)."""
+    free = np.ones(len(hz), dtype=bool)
+    for peak in peaks:
+        free &= (hz < peak.low - reach) | (hz > peak.high + reach)
+    return free
+
+
+def _level(power: Array, count: int, known: Array | None = None) -> Array:
     """Mean power of noise at each frequency, of the sum of some periodograms (m,)."""
-    # median of Gamma(W) over its mean, by Wilson and Hilferty
-    return _on_a_slope(power, _floor(power) / (1 - 1 / (9 * count)) ** 3)
+    if known is None:
+        # median of Gamma(W) over its mean, by Wilson and Hilferty
+        known = _floor(power) / (1 - 1 / (9 * count)) ** 3
+    return _on_a_slope(power, known)
 
 
 def noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
@@ -187,14 +256,16 @@ def _peak_at(hz: Array, power: Array, at: int) -> Peak:
 def spectra_of(pieces: Pieces) -> list[Spectrum]:
     """Spectra in which a line may stand out.
 
-    Channel by channel window by window; and triads with one phase throughout, in
-    the device's axes and, where the angles are known, in the base's. Windows are
+    Channel by channel window by window; and with one phase throughout, channels and
+    triads in the device's axes and, where the angles are known, triads in the base's.
+    Windows are
     tapered: what settles at the start of each is no line, though it comes as often.
     Stamps of arrival keep no phase.
     """
     power, count, hz = _power(pieces)
     used = np.flatnonzero(power.any(axis=1)).tolist()
-    out = [Spectrum(power, count, hz, tuple((c,) for c in used))]
+    windows = Spectrum(power, count, hz, tuple((c,) for c in used))
+    out = [windows]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
     long = lasts * pieces.rate > GRID or sum(map(len, pieces.samples)) > COHERENT
     if long or any(_in_bursts(t, pieces.rate) for t in pieces.times):
@@ -203,20 +274,70 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
     triads = [some for some in TRIADS if set(some) <= set(used)]
-    out += [Spectrum(*_one_phase(pieces, frame), tuple(triads)) for frame in frames]
+    # electronics may be heard in one output alone, what shakes the base in none
+    each = [(*windows.together, *triads), tuple(triads)]
+    beside = _beside(windows, pieces)
+    for frame, together in zip(frames, each, strict=False):
+        power, unsteady, hz = _one_phase(pieces, frame)
+        level = np.array([np.interp(hz, windows.hz, row) for row in beside])
+        level = _turned_level(pieces, frame, level)
+        sure = 1 + SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
+        level = np.where(unsteady > sure * level, unsteady, level)
+        out.append(Spectrum(power, 1, hz, together, level))
     return out
 
 
-def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, int, Array]:
-    """Of the whole recording, with windows turned into a frame, as in `Spectrum`."""
+def _beside(windows: Spectrum, pieces: Pieces) -> Array:
+    """Variance of a sample of noise at each frequency, by its neighbours, (6, m).
+
+    In windows side by side noise is known far better than in their sum with one phase:
+    there, only frequencies that are as near as a whole recording can tell are alike. A
+    line reaches as far as the taper of the shortest window does.
+    """
+    count, size = windows.count, windows.power.shape[1]
+    cycle = pieces.rate / min(LONGEST, min(map(len, pieces.samples)))
+    close = max(CLOSE, math.ceil(NEAR * cycle / windows.hz[1]))
+    reach = close + max(FAR - CLOSE, close, -(-SURE // (2 * count)))
+    kernel = np.ones(2 * reach + 1)
+    kernel[reach - close : reach + close + 1] = 0.0
+    there = np.convolve(np.ones(size), kernel)[reach:-reach]
+    total = [np.convolve(row, kernel)[reach:-reach] for row in windows.power]
+    out: Array = np.array(total) / np.maximum(there, 1.0) / count
+    return out
+
+
+def _turned_level(pieces: Pieces, frame: Array, level: Array) -> Array:
+    """Mean power with one phase of noise of a variance (6, m), windows turned."""
+    length = [len(samples) for samples in pieces.samples]
+    square = np.array([(np.hanning(n) ** 2).sum() for n in length])
+    shares = np.einsum("w,wij->ij", square, frame**2)
+    return np.vstack([shares @ level[:3], shares @ level[3:]])
+
+
+def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array, Array]:
+    """Power (6, m) of the whole recording, windows turned into a frame; Hz, (m,).
+
+    And between them the power of noise as strong as what has no one phase: of W
+    windows with Fourier sums X_w, (sum |X_w|^2 - |sum X_w|^2 / W) W / (W - 1). What
+    trembles has that, and a line does not.
+    """
     turned = []
     for samples, to_frame in zip(pieces.samples, frame, strict=True):
         tapered = (np.hanning(len(samples))[:, None] * samples).T
         turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
-    t = np.concatenate(pieces.times)
-    n = _fast(2 * round((t[-1] - t[0]) * pieces.rate) + 2)
-    spectrum = _transformed(np.hstack(turned), t, pieces.rate, n)
-    return _square(spectrum), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
+    t, rate, count = np.concatenate(pieces.times), pieces.rate, len(turned)
+    n = _fast(2 * round((t[-1] - t[0]) * rate) + 2)
+    power = _square(_transformed(np.hstack(turned), t, rate, n))
+    hz = np.fft.rfftfreq(n, 1 / rate)
+    if count == 1:
+        return power, np.zeros_like(power), hz
+    short = 2 * _fast(max(map(len, pieces.times)))
+    each = np.zeros((6, short // 2 + 1))
+    for values, at in zip(turned, pieces.times, strict=True):
+        each += _square(_transformed(values, at, rate, short))
+    coarse = np.fft.rfftfreq(short, 1 / rate)
+    total = np.array([np.interp(hz, coarse, row) for row in each])
+    return power, (count * total - power) / (count - 1), hz
 
 
 def _fast(n: int) -> int:

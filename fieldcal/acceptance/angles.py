@@ -86,8 +86,8 @@ def unwitnessed(
     if worst is None:
         return ""
     return (
-        f"wrong angles would not be noticed: {worst.says} could move {most} by up to"
-        f" {sigmas:.0f} σ"
+        f"wrong angles would not be noticed: {worst.description} could move {most} by"
+        f" up to {sigmas:.0f} σ"
     )
 
 
@@ -105,7 +105,7 @@ def would_explain(found: Calibration, off: Mapping[str, float]) -> str:
         for name, size in off.items():
             most = abs(wrong.moves.get(name, 0.0))
             if size <= most and wrong.shows * size / most < SHOWN:
-                return wrong.says
+                return wrong.description
     return ""
 
 

@@ -63,7 +63,7 @@ class Verification:
         """Non-centrality by which wrong angles of the session show here, r^T S^-1 r."""
         if self.position.alpha is None or self.position.beta is None:
             return 0.0
-        off = wrong.off_at(self.position.alpha, self.position.beta)
+        off = wrong.error_at(self.position.alpha, self.position.beta)
         moved: Array = self.turned @ off
         for name, by in wrong.moves.items():
             moved = moved - by * self.slope.get(name, 0.0)

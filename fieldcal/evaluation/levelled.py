@@ -20,13 +20,13 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS, group_of
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.estimation import RecordedRows
 
 
 def with_tilt_shown(
     found: Calibration,
     observations: Observations,
-    recorded: Recorded | None,
+    recorded: RecordedRows | None,
     asked: Mapping[str, Any],
 ) -> Calibration:
     """The same with the tilt that the positions show, where the level is stated.

@@ -17,7 +17,7 @@ has no other value below d. A mean of less than 2 d is off by d / sqrt(3) or les
 
 What values that were rounded down are too small by is added to the biases' variance;
 what values cut toward zero are hangs on the signs of the means, and is in the model
-(`solve.given`).
+(`solve.parameter_set`).
 """
 
 from __future__ import annotations

@@ -46,9 +46,9 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.estimation import Recorded
-from fieldcal.solve.rows import variances, widened
-from fieldcal.solve.shown import Shown
+from fieldcal.solve.estimation import RecordedRows
+from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.rows import mean_variances, with_window_variances
 
 Turns = Literal["auto", "yes", "no"]
 
@@ -136,7 +136,7 @@ class Laid:
 
     def recorded(
         self, turns: bool, shown: Explanation | None = None
-    ) -> Recorded | None:
+    ) -> RecordedRows | None:
         """Rows of the windows, and the samples between them if they are to be used.
 
         `shown` is what the recording shows to be there.
@@ -149,15 +149,15 @@ class Laid:
         for c in np.flatnonzero(measured):
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
-        known = variances(self.observations)
+        known = mean_variances(self.observations)
         known[:, :3] += self.rounding.around_zero(self.observations.mean[:, :3])
-        rows = widened(rows, known)
+        rows = with_window_variances(rows, known)
         likely = () if shown is None else shown.posterior.weights
-        return Recorded(
+        return RecordedRows(
             rows,
             origins(source, rows),
             source if turns else None,
-            tuple(Shown.of(s, p) for s, p in likely),
+            tuple(WeightedExplanation.of(s, p) for s, p in likely),
             None if shown is None else shown.filters,
             tuple(self.rounding.toward_zero.tolist()),
         )

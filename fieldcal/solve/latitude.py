@@ -21,14 +21,14 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.search.selection import Search
-from fieldcal.solve.given import Given
+from fieldcal.solve.parameter_set import ParameterSet
 
 VERTICAL = 1
 """Place of the vertical among the columns of the Earth's rate; it points down."""
 
 
 @dataclass(frozen=True, slots=True)
-class EarthVertical:
+class VerticalEarthRate:
     """The Earth's rate about the vertical, as gyroscopes show it.
 
     Attributes
@@ -40,14 +40,14 @@ class EarthVertical:
     """
 
     stated: float
-    shown: float
+    measured: float
     sigma: float
     gain: float
 
     @classmethod
     def of(
-        cls, given: Given, search: Search, latitude: float | None
-    ) -> EarthVertical | None:
+        cls, parameter_set: ParameterSet, search: Search, latitude: float | None
+    ) -> VerticalEarthRate | None:
         """What the rows of a set show, (1); None where they have no such column.
 
         Parameters
@@ -57,13 +57,13 @@ class EarthVertical:
         latitude : that is stated, rad; None where none is
 
         """
-        if given.earth < 0 or latitude is None:
+        if parameter_set.earth < 0 or latitude is None:
             return None
-        column = np.array([given.earth + VERTICAL])
+        column = np.array([parameter_set.earth + VERTICAL])
         group = Group("earth", "vertical", column, np.array([EARTH_RATE]), fixed=1.0)
         other = Cause(group.cause, group.part, priors.ELSEWHERE, (group,), "given")
-        as_said = search.evaluated(given.members)
-        free = search.evaluated((*given.members, (other, group)))
+        as_said = search.evaluated(parameter_set.members)
+        free = search.evaluated((*parameter_set.members, (other, group)))
         at = free.state.columns == column[0]
         stated = EARTH_RATE * float(np.sin(latitude))
         return cls(
@@ -74,27 +74,27 @@ class EarthVertical:
         )
 
     @property
-    def favoured(self) -> bool:
+    def other_favoured(self) -> bool:
         """Whether the rows speak for another one at all, possible or not."""
         return self.gain > float(np.log(priors.ELSEWHERE))
 
     @property
-    def wrong(self) -> bool:
+    def latitude_wrong(self) -> bool:
         """Whether it is likelier that of another latitude; what none has is no such."""
-        beyond = abs(self.shown) - EARTH_RATE
+        beyond = abs(self.measured) - EARTH_RATE
         named = np.log(thresholds.NAMED / (1 - thresholds.NAMED))
         return self.gain > float(named) and beyond < 2 * self.sigma
 
     @property
     def sentence(self) -> str:
         """What is wrong, and what to do."""
-        sine = np.clip(self.shown / EARTH_RATE, -1.0, 1.0)
+        sine = np.clip(self.measured / EARTH_RATE, -1.0, 1.0)
         degrees, stated = (
             np.rad2deg(np.arcsin(s)) for s in (sine, self.stated / EARTH_RATE)
         )
         return (
             f"the gyroscopes show the Earth's rate of latitude {degrees:.0f}°"
-            f" ({self.shown:.2g} ± {self.sigma:.1g} rad/s about the vertical), not of"
-            f" {stated:.4g}°: south is negative; mend latitude_deg in [site], or the"
+            f" ({self.measured:.2g} ± {self.sigma:.1g} rad/s about the vertical), not"
+            f" of {stated:.4g}°: south is negative; mend latitude_deg in [site], or the"
             " signs of the gyroscopes' axes, and solve again"
         )

@@ -98,7 +98,7 @@ class Observations:
         return cls(
             tuple(positions),
             np.array([a.mean for a in averages]),
-            np.array([_regular(a.covariance) for a in averages]),
+            np.array([_regularised(a.covariance) for a in averages]),
             gravity,
             np.array([a.temperature for a in averages]),
             np.array([(a.start + a.end) / 2 for a in averages]),
@@ -216,7 +216,7 @@ class Observations:
             )
 
 
-def _regular(covariance: Array) -> Array:
+def _regularised(covariance: Array) -> Array:
     """Drop correlations that a window is too short to know; they make it singular."""
     out = covariance.copy()
     for three in (ACC, GYR):

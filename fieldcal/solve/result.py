@@ -14,20 +14,20 @@ from fieldcal.calibration.plausible import elsewhere, senseless
 from fieldcal.core.errors import NotObservable
 from fieldcal.model import thresholds
 from fieldcal.solve import words
-from fieldcal.solve.assumed import Asked
-from fieldcal.solve.borrowed import Borrowed
+from fieldcal.solve.cross_coupling_effect import largest_cross_coupling_effect
 from fieldcal.solve.doubt import DoubtfulPosition
-from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
-from fieldcal.solve.latitude import EarthVertical
-from fieldcal.solve.magnified import magnified
+from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
+from fieldcal.solve.latitude import VerticalEarthRate
+from fieldcal.solve.lot_contribution import LotContribution
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.solve.warnings import (
+    agreement_warnings,
     closure_chi2,
-    contradicted,
-    doubts,
-    left_open,
-    not_levelled,
+    contradiction_warnings,
+    level_warnings,
+    undetermined_warnings,
 )
 
 UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
@@ -35,13 +35,13 @@ UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
 """Unit of each group's components."""
 
 
-def calibration(
+def build_calibration(
     method: Method,
     observations: Observations,
-    asked: Asked,
-    found: Estimated,
+    asked: SolveOptions,
+    found: ParameterEstimate,
     notes: Sequence[str],
-    told: Borrowed | None = None,
+    told: LotContribution | None = None,
 ) -> Calibration:
     """Put an estimate into a calibration.
 
@@ -52,14 +52,20 @@ def calibration(
 
     """
     names, sigma = found.names, np.sqrt(np.diag(found.covariance))
-    worst = magnified(found)
+    worst = largest_cross_coupling_effect(found)
     sentences = [
-        words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
+        words.effects_warning(
+            found.any_cause_probability,
+            found.causes,
+            names,
+            found.shift_sigmas,
+            found.valid_at_s,
+        ),
         told.sentence if told else "",
-        *left_open(method, observations, found),
+        *undetermined_warnings(method, observations, found),
         worst.sentence if worst else "",
         *notes,
-        *not_levelled(method, asked, observations),
+        *level_warnings(method, asked, observations),
     ]
     if not names:
         raise NotObservable(
@@ -68,11 +74,11 @@ def calibration(
     of_acc = any(map(_is_acc, names))
     odd = [
         *senseless(names, found.values, sigma, observations.nominal),
-        *elsewhere(_named(found.contradicted, observations)),
+        *elsewhere(_turn_names(found.contradicted_turns, observations)),
         *_wrong_latitude(found, observations),
-        *contradicted(observations, found, of_acc),
+        *contradiction_warnings(observations, found, of_acc),
     ]
-    sentences += doubts(method, observations, found)
+    sentences += agreement_warnings(method, observations, found)
     fit = found.acc if of_acc else found.gyr
     info = _info(method, observations, asked, found)
     info |= {"borrowed": told.to_json()} if told else {}
@@ -96,7 +102,7 @@ def _is_acc(name: str) -> bool:
     return sensor_of(group_of(name)) == "acc"
 
 
-def _named(
+def _turn_names(
     turns: Sequence[tuple[int, int]], observations: Observations
 ) -> list[tuple[str, str]]:
     """Turns by the names of the positions at their ends."""
@@ -104,13 +110,15 @@ def _named(
     return [(names[before], names[behind]) for before, behind in turns]
 
 
-def _wrong_latitude(found: Estimated, observations: Observations) -> list[str]:
+def _wrong_latitude(found: ParameterEstimate, observations: Observations) -> list[str]:
     """A latitude that the gyroscopes contradict."""
-    shown = EarthVertical.of(found.given, found.search, observations.latitude)
-    return [shown.sentence] if shown and shown.wrong else []
+    shown = VerticalEarthRate.of(
+        found.parameter_set, found.search, observations.latitude
+    )
+    return [shown.sentence] if shown and shown.latitude_wrong else []
 
 
-def _harms(wrong: WrongAngles, found: Estimated) -> bool:
+def _is_harmful(wrong: WrongAngles, found: ParameterEstimate) -> bool:
     """Whether wrong angles could move a parameter beyond its uncertainty."""
     sigma = np.sqrt(np.diag(found.covariance))
     return any(
@@ -119,27 +127,32 @@ def _harms(wrong: WrongAngles, found: Estimated) -> bool:
     )
 
 
-def _carried(observations: Observations, found: Estimated) -> dict[str, Any]:
+def _carried_info(
+    observations: Observations, found: ParameterEstimate
+) -> dict[str, Any]:
     """What the set has that was not asked for, and what that does."""
-    moved = dict(zip(found.names, found.moved.tolist(), strict=True))
+    moved = dict(zip(found.names, found.shift_sigmas.tolist(), strict=True))
     out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
-    if found.ended_s is not None:
+    if found.valid_at_s is not None:
         last = (
             float(observations.temperature[-1])
             if len(observations.temperature)
             else np.nan
         )
         warm = last if np.isfinite(last) else None
-        out["as_of"] = {"since_start_s": found.ended_s, "temperature_degc": warm}
+        out["as_of"] = {"since_start_s": found.valid_at_s, "temperature_degc": warm}
     return out
 
 
 def _info(
-    method: Method, observations: Observations, asked: Asked, found: Estimated
+    method: Method,
+    observations: Observations,
+    asked: SolveOptions,
+    found: ParameterEstimate,
 ) -> dict[str, Any]:
     known = observations.temperature[np.isfinite(observations.temperature)]
     latitude = observations.latitude
-    wanted = found.given.wanted
+    wanted = found.parameter_set.options
     out: dict[str, Any] = {
         "conditions": {
             "positions": len(observations),
@@ -149,8 +162,8 @@ def _info(
             "temperature_sd_k": float(known.std()) if len(known) else None,
             "grade": observations.grade,
         },
-        "bad_position": [round(float(p), 4) for p in found.bad],
-        "extra_scatter": scatter_of(found.found, (0, 1, 2)),
+        "bad_position": [round(float(p), 4) for p in found.bad_probability],
+        "extra_scatter": window_scatter(found.mixture, (0, 1, 2)),
         "log_evidence": found.score,
         "angle_sigma_deg": asked.angles_deg,
         "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
@@ -160,12 +173,12 @@ def _info(
         "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
         "acc_hysteresis_sigma": wanted.factory.hysteresis,
     }
-    if doubt := DoubtfulPosition.of(observations, found.bad):
+    if doubt := DoubtfulPosition.of(observations, found.bad_probability):
         out["doubtful_position"] = doubt.to_json()
-    if np.isfinite(found.acc.left_out):
-        out["left_out_rms"] = found.acc.left_out
-    if found.given.wanted.level_deg:
-        out["level_sigma_deg"] = found.given.wanted.level_deg
+    if np.isfinite(found.acc.held_out_rms):
+        out["left_out_rms"] = found.acc.held_out_rms
+    if found.parameter_set.options.level_deg:
+        out["level_sigma_deg"] = found.parameter_set.options.level_deg
     if wanted.tilt != "none" and wanted.beside_tilt_deg:
         out["beside_tilt_sigma_deg"] = wanted.beside_tilt_deg
     if observations.has_gyr:
@@ -173,14 +186,14 @@ def _info(
         out["gyroscopes"] = {
             "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
             "rms": gyr.rms if np.isfinite(gyr.rms) else None,
-            "extra_scatter": scatter_of(found.found, (3, 4, 5)),
+            "extra_scatter": window_scatter(found.mixture, (3, 4, 5)),
         }  # fmt: skip
-    if harmful := [w for w in found.wrong_angles if _harms(w, found)]:
+    if harmful := [w for w in found.wrong_angles if _is_harmful(w, found)]:
         out["wrong_angles"] = [w.to_json() for w in harmful]
-    if found.causes or found.ended_s is not None:
-        out["carried"] = _carried(observations, found)
-    if found.turns:
+    if found.causes or found.valid_at_s is not None:
+        out["carried"] = _carried_info(observations, found)
+    if found.turn_rows:
         chi2, dof = closure_chi2(found)
-        scatter = turns_scatter(found.found)
+        scatter = closure_scatter(found.mixture)
         out["turns"] = {"chi2": chi2, "dof": dof, "scatter_rad": scatter}
     return out

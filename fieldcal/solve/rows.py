@@ -18,27 +18,27 @@ from fieldcal.model.rows.orientation import free_force
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.rows.turntable import Readings
 from fieldcal.physics.experience import Experience
-from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.observations import Observations
 
 
-def of_means(observations: Observations) -> Recorded:
+def rows_of_means(observations: Observations) -> RecordedRows:
     """One row for each window; correlations between outputs are not kept."""
     n, nominal = len(observations), observations.nominal
     index = np.arange(n)
     y = observations.mean.copy()
-    told = variances(observations)
+    told = mean_variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
     read = Readings(
         observations.positions,
         index,
         (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
-        _earth(observations),
+        _earth_rate_at_rest(observations),
     )
     x = Experience.at_rest(
         *observations.angles,
         observations.gravity,
-        f=_force(observations),
+        f=_measured_force(observations),
         t=np.where(np.isfinite(observations.time), observations.time, index),
         position=index,
         gamma=third_angles(observations.positions),
@@ -56,11 +56,11 @@ def of_means(observations: Observations) -> Recorded:
     x = replace(x, w=np.where(free[:, None], read.earth_rates(), x.w))
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
-    common[x.earth_unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
+    common[x.earth_unseen, 3:] = unknown_earth_rate(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
     span = np.column_stack([x.t, x.t])
     rows = Rows(x, y, sd, common, np.ones(n), level, span, np.zeros(n))
-    return Recorded(rows, np.full((1, n), np.inf))
+    return RecordedRows(rows, np.full((1, n), np.inf))
 
 
 def without_angles(rows: Rows, nominal: Nominal) -> Rows:
@@ -76,7 +76,7 @@ def without_angles(rows: Rows, nominal: Nominal) -> Rows:
     return replace(rows, x=replace(x, alpha=nowhere, beta=nowhere, f=f))
 
 
-def variances(observations: Observations) -> Array:
+def mean_variances(observations: Observations) -> Array:
     """Of the means, (n, 6); of windows whose orientation is free along the force alone.
 
     A device that turns a little at rest, as in a hand, is unsteady across it, and that
@@ -84,14 +84,14 @@ def variances(observations: Observations) -> Array:
     """
     out: Array = np.einsum("nii->ni", observations.covariance).copy()
     free = ~observations.oriented & np.isfinite(observations.mean[:, ACC]).all(axis=1)
-    f = _force(observations)[free]
+    f = _measured_force(observations)[free]
     up = f / np.linalg.norm(f, axis=1, keepdims=True)
     along = np.einsum("ni,nij,nj->n", up, observations.covariance[free, ACC, ACC], up)
     out[free, ACC] = along[:, None]
     return out
 
 
-def widened(rows: Rows, known: Array) -> Rows:
+def with_window_variances(rows: Rows, known: Array) -> Rows:
     """Rows whose windows' means are as uncertain as each window's spectrum says.
 
     `known` (p, 6) are the variances; what they are beyond white noise all rows of a
@@ -107,7 +107,7 @@ def widened(rows: Rows, known: Array) -> Rows:
     return replace(rows, common=common)
 
 
-def _earth(observations: Observations) -> float:
+def _earth_rate_at_rest(observations: Observations) -> float:
     """Length of the rate at rest, rad/s; 0 where the gyroscopes do not see it."""
     if observations.grade != "navigation":
         return 0.0
@@ -117,7 +117,7 @@ def _earth(observations: Observations) -> float:
     return float(np.linalg.norm(rate))
 
 
-def _force(observations: Observations) -> Array:
+def _measured_force(observations: Observations) -> Array:
     """Force along what the accelerometers read, (n, 3) m/s^2.
 
     Any direction will do where they say nothing.
@@ -128,7 +128,7 @@ def _force(observations: Observations) -> Array:
     return free_force(observations.gravity, np.arange(len(observations)), apart)
 
 
-def unseen_earth(scale: Array | tuple[float, ...]) -> Array:
+def unknown_earth_rate(scale: Array | tuple[float, ...]) -> Array:
     """What the Earth's rate adds where orientations are not known, (3,) outputs."""
     size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
     return size

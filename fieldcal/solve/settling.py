@@ -20,9 +20,9 @@ from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.solve.averaging import mixed
-from fieldcal.solve.given import Given
+from fieldcal.solve.averaging import mixture_with_causes
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.parameter_set import ParameterSet
 
 FOLLOWED, NEAR = 6, 0.01
 """Times that turns are followed at most, and the change of a scale factor from which
@@ -46,32 +46,34 @@ class SettledSet:
 
     """
 
-    found: Mixture
+    mixture: Mixture
     gram: Gram
-    turned: tuple[TurnRows, ...]
+    turn_rows: tuple[TurnRows, ...]
     score: float
 
 
-def without_bad_windows(
-    rows: Rows, given: Given, nominal: State, turns: Turns | None
+def settle_without_bad_windows(
+    rows: Rows, parameter_set: ParameterSet, nominal: State, turns: Turns | None
 ) -> SettledSet:
     """The fit of the windows that agree, while those left out are few."""
 
     def inference(left: Mask) -> Inference:
         return Inference(
-            WindowSystem(_without_windows(rows, given, left), given), nominal, turns
+            WindowSystem(_without_windows(rows, parameter_set, left), parameter_set),
+            nominal,
+            turns,
         )
 
-    bad, score = np.zeros(len(given.held), dtype=bool), np.nan
+    bad, score = np.zeros(len(parameter_set.held), dtype=bool), np.nan
     # one bad window of six can be told from scatter, two of six cannot
     most = max(1, len(bad) // 6)
     for _ in range(1 + most):
         now = inference(bad)
-        gram, found = _settled_fit(now, now, given)
+        gram, found = _settled_fit(now, now, parameter_set)
         worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
         if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
             # a gross error bends the state so far that nothing is linear about it
-            gram, found = _settled_fit(now, inference(bad | worst), given)
+            gram, found = _settled_fit(now, inference(bad | worst), parameter_set)
         if not bad.any():
             score = found.score
         worst &= (found.bad > thresholds.CERTAIN) & ~bad
@@ -83,43 +85,51 @@ def without_bad_windows(
 
 
 def _settled_fit(
-    inference: Inference, settling: Inference, given: Given
+    inference: Inference, settling: Inference, parameter_set: ParameterSet
 ) -> tuple[Gram, Mixture]:
     """The likeliest explanation about the state where other rows have settled."""
-    gram = inference.gram(*_settled(settling, given), None)
-    return gram, mixed(given, Search(given, gram), given.explanations[0].members)
+    gram = inference.gram(*_settled_state(settling, parameter_set), None)
+    return gram, mixture_with_causes(
+        parameter_set,
+        Search(parameter_set, gram),
+        parameter_set.explanations[0].members,
+    )
 
 
-def _without_windows(rows: Rows, given: Given, bad: Mask) -> Rows:
+def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows:
     """Rows of which some windows (p,) have no weight."""
-    left = np.isin(rows.x.position, given.held[bad])
+    left = np.isin(rows.x.position, parameter_set.held[bad])
     return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
 
 
-def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
+def _settled_state(
+    inference: Inference, parameter_set: ParameterSet
+) -> tuple[State, Array]:
     """The state where the set has settled, and the columns' values in it."""
-    start: Array = np.zeros(given.width)
-    state, values, _ = inference.settled(inference.nominal, start, given.members)
+    start: Array = np.zeros(parameter_set.width)
+    state, values, _ = inference.settled(
+        inference.nominal, start, parameter_set.members
+    )
     if inference.turns is None:
         return state, values
     # windows see no rate but the Earth's, too little to follow turns by
-    gyr = np.s_[given.scale + 3 : given.scale + 6]
+    gyr = np.s_[parameter_set.scale + 3 : parameter_set.scale + 6]
     values[gyr] = 0.0
     nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
     state = replace(state, scale=nominal)
-    state, values = _followed_first(inference, given, state, values)
+    state, values = _follow_turns_first(inference, parameter_set, state, values)
     for again in range(FOLLOWED):
         if again:
             inference.followed(state, values)
         before = state.scale
-        state, values, _ = inference.settled(state, values, given.members)
+        state, values, _ = inference.settled(state, values, parameter_set.members)
         if np.abs(state.scale / before - 1).max() < NEAR:
             break
     return state, values
 
 
-def _followed_first(
-    inference: Inference, given: Given, state: State, values: Array
+def _follow_turns_first(
+    inference: Inference, parameter_set: ParameterSet, state: State, values: Array
 ) -> tuple[State, Array]:
     """Follow the turns by the state that windows led to; back comes where to go on.
 
@@ -127,18 +137,20 @@ def _followed_first(
     elsewhere for no other reason. If they do so in fewer turns where everything is
     nominal, those turns are what tells the rest.
     """
-    astray = _astray(inference, state, values)
+    astray = _contradicted_turns(inference, state, values)
     if not astray:
         return state, values
-    nothing: Array = np.zeros(given.width)
-    if _astray(inference, inference.nominal, nothing) < astray:
-        state, values, _ = inference.settled(inference.nominal, nothing, given.members)
+    nothing: Array = np.zeros(parameter_set.width)
+    if _contradicted_turns(inference, inference.nominal, nothing) < astray:
+        state, values, _ = inference.settled(
+            inference.nominal, nothing, parameter_set.members
+        )
         return state, values
     inference.followed(state, values)
     return state, values
 
 
-def _astray(inference: Inference, state: State, values: Array) -> int:
+def _contradicted_turns(inference: Inference, state: State, values: Array) -> int:
     """In how many turns the gyroscopes lead elsewhere by a state."""
     inference.followed(state, values)
     return len(inference.turns.turning.contradicted) if inference.turns else 0

@@ -17,7 +17,7 @@ from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import chances
 from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member
 from fieldcal.model.search.selection import Search
-from fieldcal.solve.shown import Shown, has_equation
+from fieldcal.solve.explanations import WeightedExplanation, has_equation
 
 POINTS = 24
 """Variants of a certain explanation that stand for all of them; of one less likely so
@@ -32,7 +32,9 @@ PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67
 are more causes, over several of them alike."""
 
 
-def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Shown]:
+def variants(
+    search: Search, known: tuple[Member, ...], one: WeightedExplanation
+) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
     Parameters
@@ -43,20 +45,23 @@ def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Show
 
     """
     each = [_choices(search, (*known, *one.members), m) for m in one.members]
-    each += [_with_and_without(search, (*known, *one.members), m) for m in one.maybe]
+    each += [
+        _with_and_without(search, (*known, *one.members), m)
+        for m in one.possible_members
+    ]
     share: dict[tuple[Member, ...], float] = {}
-    points = spread(len(each), max(1, round(POINTS * one.probability)))
+    points = spread_points(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
         picked = [
-            choices[reached(weight, u)]
+            choices[choice_at(weight, u)]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
         members = tuple(m for some in picked for m in some)
         share[members] = share.get(members, 0.0) + 1 / len(points)
-    return [Shown(members, p) for members, p in share.items()]
+    return [WeightedExplanation(members, p) for members, p in share.items()]
 
 
-def reached(weight: Array, u: float) -> int:
+def choice_at(weight: Array, u: float) -> int:
     """Which of some choices of probability (k,) a point of the unit line lies in.
 
     >>> reached(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
@@ -65,7 +70,7 @@ def reached(weight: Array, u: float) -> int:
     return int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))
 
 
-def spread(count: int, points: int = POINTS) -> Array:
+def spread_points(count: int, points: int = POINTS) -> Array:
     """Points spread evenly over a cube, (points, count); in the middle of one line."""
     if not count:
         return np.full((1, 0), 0.5)

@@ -36,14 +36,14 @@ def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> 
     return f"{join(missing)} {verb} not determined by {what}{cure}"
 
 
-def chance(chi2: float, dof: int) -> float:
+def chi2_chance(chi2: float, dof: int) -> float:
     """Probability of a chi2 at least as large when only the stated noise acts."""
     return chi2_tail(chi2, dof) if dof > 0 else 1.0
 
 
-def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
+def scatter_warning(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     """Warning of scatter beyond the noise; empty if there is none."""
-    if chi2 <= dof or chance(chi2, dof) >= thresholds.BEYOND_NOISE:
+    if chi2 <= dof or chi2_chance(chi2, dof) >= thresholds.BEYOND_NOISE:
         return ""
     few = " (itself uncertain, with so few degrees of freedom)" if dof < 5 else ""
     cause = "run fieldcal diagnose to see where it comes from"
@@ -60,7 +60,7 @@ def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     )
 
 
-def carried(
+def effects_warning(
     sure: float,
     causes: Mapping[str, float],
     names: Sequence[str],

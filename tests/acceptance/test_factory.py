@@ -20,8 +20,8 @@ from fieldcal.core.samples import Array
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
-from fieldcal.solve.estimation import Recorded, estimated
-from fieldcal.solve.given import Wanted
+from fieldcal.solve.estimation import RecordedRows, estimate_parameters
+from fieldcal.solve.parameter_set import ParameterSetOptions
 
 TACTICAL = limits.read("tactical")
 ABOUT = description.parse({"format": 1})
@@ -155,7 +155,7 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
     """At the end of the recording; the course is that of a thermometer, or of a box."""
     rng, off, plain = np.random.default_rng(3), list[Array](), list[Array]()
     warming: dict[str, Any] = {} if shown else {"warming": np.zeros(27)}
-    x, wanted = ladder(**warming), Wanted(tilt="none")
+    x, wanted = ladder(**warming), ParameterSetOptions(tilt="none")
     left = FactoryErrors(**PER_K, warming_k=1.25)
     course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)
     end = 2e-3 * x.t[-1] if shown else 1.25 * np.exp(-x.since_start[-1] / 300)
@@ -164,9 +164,11 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
         y = np.hstack([x.f, x.w]) + drift * course[:, None]
         y += SD / 20 * rng.standard_normal(y.shape)
         rows = rows_of(x, y)
-        recorded = Recorded(replace(rows, sd=rows.sd / 20), np.array([x.since_turn]))
+        recorded = RecordedRows(
+            replace(rows, sd=rows.sd / 20), np.array([x.since_turn])
+        )
         for factory, pulls in ((left, off), (FactoryErrors(), plain)):
-            found = estimated(
+            found = estimate_parameters(
                 recorded, None, nominal(), replace(wanted, factory=factory)
             )
             at = [found.names.index(f"gyr_bias.{axis}") for axis in "xyz"]

@@ -12,7 +12,7 @@ from fieldcal.solve.observations import Mask, Observations
 
 
 @dataclass(frozen=True, slots=True)
-class Closed:
+class ClosedFormEstimate:
     """Parameters with the windows' covariance carried through.
 
     Attributes
@@ -33,14 +33,14 @@ class Closed:
         gain: Array,
         observations: Observations,
         channels: slice,
-    ) -> Closed:
+    ) -> ClosedFormEstimate:
         """Values by their derivatives (p, n, 3) by the means of a triad."""
         noise = observations.covariance[:, channels, channels]
         values = np.einsum("pnc,nc->p", gain, observations.mean[:, channels])
         covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
         return cls(tuple(names), values, covariance)
 
-    def only(self, kept: Mask) -> Closed:
+    def subset(self, kept: Mask) -> ClosedFormEstimate:
         """Keep some of the parameters, (p,) bool."""
         rows = np.flatnonzero(kept)
         return replace(

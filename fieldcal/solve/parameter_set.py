@@ -32,12 +32,16 @@ from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect
-from fieldcal.solve.shown import Shown, at_end, carried
+from fieldcal.solve.explanations import (
+    WeightedExplanation,
+    bias_scale_at_end,
+    translate_explanations,
+)
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ParameterSetOptions:
     """What is to be estimated beside bias and scale factor, and what is known.
 
     Attributes
@@ -68,7 +72,7 @@ class Wanted:
     lot: LotPrior | None = None
 
 
-class Given(Dictionary):
+class ParameterSet(Dictionary):
     """The columns of a given set, and those by which a window may be off by itself.
 
     Parameters
@@ -94,12 +98,12 @@ class Given(Dictionary):
         unit: Array,
         since: Array,
         turns: bool,
-        wanted: Wanted,
-        shown: Sequence[Shown] = (),
+        wanted: ParameterSetOptions,
+        shown: Sequence[WeightedExplanation] = (),
         cut: Sequence[float] = (),
     ) -> None:
-        self.wanted, self.cut = wanted, np.array(cut, dtype=float)
-        self.sign = _signs(rows, self.cut)
+        self.options, self.cut = wanted, np.array(cut, dtype=float)
+        self.sign = _mean_signs(rows, self.cut)
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
@@ -107,38 +111,42 @@ class Given(Dictionary):
             rows.x, rows.used, since, common, unit, turns, wander, rows.alike
         )
         has = {group_of(n) for n in self.names}
-        self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
-        left = self._warm_scales(self.asked)
+        self.explanations = translate_explanations(self, shown, has) or (
+            WeightedExplanation((), 1.0),
+        )
+        left = self._warm_scales(self.base_members)
         self.causes = [*self.causes, *(cause for cause, _ in left.values())]
         every = [m for one in self.explanations for m in one.members]
         self._warm = self._warm_scales(every)
-        self.left_out = self._left_out()
+        self.omitted_cross_coupling = self._usual_cross_coupling()
 
     @property
-    def asked(self) -> tuple[Member, ...]:
+    def base_members(self) -> tuple[Member, ...]:
         """What was asked for, and what is known of it."""
         return tuple((c, c.variants[0]) for c in self.causes)
 
     @property
     def members(self) -> tuple[Member, ...]:
         """The set, with what the likeliest explanation of the recording has."""
-        return self.beside(self.explanations[0].members)
+        return self.with_causes(self.explanations[0].members)
 
-    def beside(self, carried: Sequence[Member]) -> tuple[Member, ...]:
+    def with_causes(self, carried: Sequence[Member]) -> tuple[Member, ...]:
         """The set with some causes, and with what these do to scale factors."""
         warm = [self._warm[c.key] for c, _ in carried if c.key in self._warm]
-        return (*self.asked, *carried, *warm)
+        return (*self.base_members, *carried, *warm)
 
     @cached_property
-    def ending(self) -> Array:
+    def bias_scale_at_end(self) -> Array:
         """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        known = (*self.asked, *self._warm.values())
+        known = (*self.base_members, *self._warm.values())
         left = tuple(
             (cause, group)
             for cause, group in known
             if cause.name == WARM_SCALE or group.part in WARMING
         )
-        return at_end(self, (Shown(left, 1.0), *self.explanations))
+        return bias_scale_at_end(
+            self, (WeightedExplanation(left, 1.0), *self.explanations)
+        )
 
     @property
     def groups(self) -> list[Group]:
@@ -156,32 +164,32 @@ class Given(Dictionary):
                 continue
             yield Group("bias", part, self.bias + at, sizes[at], fixed=priors.FREE,
                         in_state=True)  # fmt: skip
-            if part == "acc" or self.wanted.gyr_scale:
+            if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
                 yield Group("scale", part, self.scale + at, size, fixed=priors.FREE,
                             in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
         """What was asked for, and how well the rest is known."""
-        w, oriented = self.wanted, bool(self.x.oriented.any())
+        w, oriented = self.options, bool(self.x.oriented.any())
         if w.tilt != "none" and oriented:
-            yield self._estimated(w.tilt, known=w.level_deg)
+            yield self._effect_cause(w.tilt, known=w.level_deg)
             if w.beside_tilt_deg:
                 (other,) = set(TILTS) - {w.tilt}
-                yield self._estimated(other, known=w.beside_tilt_deg)
+                yield self._effect_cause(other, known=w.beside_tilt_deg)
         if w.cross:
-            yield self._estimated("cross_coupling", turned=not oriented)
+            yield self._effect_cause("cross_coupling", turned=not oriented)
         left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))
         for one in of_factory(self, left, turned=not oriented):
             yield _given_cause(one)
         if w.gyro_cross:
-            yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
+            yield self._effect_cause("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
-            yield self._earth(np.array(w.earth))
+            yield self._earth_rate_cause(np.array(w.earth))
         if w.angles_deg:
-            yield from self._angles(float(np.deg2rad(w.angles_deg)))
+            yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
-            at = self.add(General("cut", self._shorter), 3) + lost
+            at = self.add(General("cut", self._truncated_outputs), 3) + lost
             yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
 
     def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
@@ -189,15 +197,15 @@ class Given(Dictionary):
         found = {cause.key: warm_scale(self, group) for cause, group in members}
         return {key: scale for key, scale in found.items() if scale is not None}
 
-    def _left_out(self) -> Group | None:
+    def _usual_cross_coupling(self) -> Group | None:
         """Cross-coupling that the set has not, of its usual size."""
         there = {c.name for c, _ in self.members}
         if "cross_coupling" in there or not self.x.f.any():
             return None
         oriented = bool(self.x.oriented.any())
-        return self._estimated("cross_coupling", turned=not oriented).variants[0]
+        return self._effect_cause("cross_coupling", turned=not oriented).variants[0]
 
-    def _estimated(
+    def _effect_cause(
         self,
         name: str,
         turned: bool = False,
@@ -215,7 +223,7 @@ class Given(Dictionary):
         size = np.full(len(one.params), known)
         return _given_cause(replace(one, typical=size, fixed=1.0))
 
-    def _earth(self, size: Array) -> Cause:
+    def _earth_rate_cause(self, size: Array) -> Cause:
         """What is not known of the Earth's rate."""
         sides = columns.earth_sides
         self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
@@ -224,14 +232,14 @@ class Given(Dictionary):
             Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
         )
 
-    def _shorter(self, view: RowView) -> Array:
+    def _truncated_outputs(self, view: RowView) -> Array:
         """Outputs of accelerometers whose size is less by one, (n, 6, 3)."""
         out = np.zeros((len(view.x), 6, 3))
         for c in range(3):
             out[:, c, c] = -self.sign[view.x.position, c]
         return out
 
-    def _angles(self, sigma: float) -> Iterator[Cause]:
+    def _angle_causes(self, sigma: float) -> Iterator[Cause]:
         """How well angles are set: anew in each position, and wherever repeated."""
         x = self.x
         alike = x.oriented & ~np.isfinite(x.attitude_sigma)  # others have their own
@@ -252,7 +260,7 @@ class Given(Dictionary):
 
     # -- where it stands
 
-    def place(self, name: str) -> Index:
+    def columns_for(self, name: str) -> Index:
         """Columns of a parameter by its full name; none if it is not in the set."""
         parameter = ParameterName.of(name)
         if parameter.sensor:
@@ -261,7 +269,7 @@ class Given(Dictionary):
             first = self.scale if parameter.is_scale else self.bias
             at = first + parameter.channel
             return np.array([at] if at in every else [], dtype=np.intp)
-        for cause, one in self.asked:
+        for cause, one in self.base_members:
             if cause.name == parameter.group and isinstance(one.effect, Effect):
                 names = [one.effect.params[j].name for j in one.params]
                 if parameter.component in names:
@@ -278,15 +286,15 @@ class Given(Dictionary):
             axes = [CHANNELS[c][-1] for c in channels if c in self.observed]
             groups = [f"{sensor}_bias", f"{sensor}_scale"]
             out += [f"{g}.{a}" for g in groups for a in axes]
-            out += self._of(cross)
+            out += self._effect_names(cross)
             if sensor == "acc":
-                out += self._of(self.wanted.tilt)
-        return tuple(n for n in out if len(self.place(n)))
+                out += self._effect_names(self.options.tilt)
+        return tuple(n for n in out if len(self.columns_for(n)))
 
-    def _of(self, name: str) -> list[str]:
+    def _effect_names(self, name: str) -> list[str]:
         return [
             f"{name}.{one.effect.params[j].name}"
-            for cause, one in self.asked
+            for cause, one in self.base_members
             if cause.name == name and isinstance(one.effect, Effect)
             for j in one.params
         ]
@@ -296,7 +304,7 @@ def _given_cause(group: Group) -> Cause:
     return Cause(group.cause, group.part, 1.0, (group,), "given")
 
 
-def _signs(rows: Rows, cut: Array) -> Array:
+def _mean_signs(rows: Rows, cut: Array) -> Array:
     """Sign of each accelerometer's mean by position, (p + 1, 3); none on the way.
 
     Less near zero, where values of both signs come.
@@ -309,7 +317,7 @@ def _signs(rows: Rows, cut: Array) -> Array:
     return out
 
 
-def earth_known(
+def known_earth_rate(
     latitude: float | None,
     navigation: bool,
     heading: float | None,
@@ -335,6 +343,6 @@ def earth_known(
     return home * [0.0, 1.0, 0.0], (anywhere, 0.0, anywhere)
 
 
-def seen_by(rows: Rows, base_rate: Array) -> Rows:
+def with_base_rate(rows: Rows, base_rate: Array) -> Rows:
     """Rows on a base that turns with the Earth."""
     return replace(rows, x=rows.x.turned(base_rate=base_rate))

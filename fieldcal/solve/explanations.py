@@ -53,7 +53,7 @@ SMALL = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class WeightedExplanation:
     """An explanation of a recording.
 
     Attributes
@@ -68,23 +68,25 @@ class Shown:
 
     members: tuple[Member, ...]
     probability: float
-    maybe: tuple[Member, ...] = ()
+    possible_members: tuple[Member, ...] = ()
     sizes: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, one: Set, probability: float) -> Shown:
+    def of(cls, one: Set, probability: float) -> WeightedExplanation:
         """A set of a search, as large as it has its causes."""
         sizes = priors.SIZES[list(one.sizes.members)].tolist()
         return cls(one.members, probability, sizes=tuple(sizes))
 
     @property
-    def size_of(self) -> dict[str, float]:
+    def sizes_by_key(self) -> dict[str, float]:
         """How large each cause is, by its key; none where that is not known."""
         keys = [cause.key for cause, _ in self.members]
         return dict(zip(keys, self.sizes, strict=True)) if self.sizes else {}
 
 
-def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown, ...]:
+def translate_explanations(
+    d: Dictionary, shown: Sequence[WeightedExplanation], has: set[str]
+) -> tuple[WeightedExplanation, ...]:
     """Explanations by the columns of another dictionary, the likeliest first.
 
     Parameters
@@ -100,7 +102,7 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     for one in shown:
         # one tilt stands for the other, where there are not both
         both = bool(has & unseen) and unseen <= {cause.name for cause, _ in one.members}
-        kept = [m for m in one.members if _adds(m, has if both else has | unseen)]
+        kept = [m for m in one.members if _is_missing(m, has if both else has | unseen)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability
@@ -110,20 +112,22 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
     size: dict[str, float] = {}
     for one in sorted(shown, key=lambda s: s.probability):
-        size |= one.size_of
+        size |= one.sizes_by_key
     here = {g: m for g, m in _in_other_dictionary(d, wanted, size)}
     also = list(_on_other_triad(d, [c for c, _ in here.values()]))
-    out: dict[frozenset[Group], Shown] = {}
+    out: dict[frozenset[Group], WeightedExplanation] = {}
     for key, p in likely.items():
         members = tuple(m for g, m in here.items() if g in key)
         same = frozenset(g for _, g in members)
         before = out[same].probability if same in out else 0.0
         maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})
-        out[same] = Shown(members, before + p / sum(likely.values()), maybe)
+        out[same] = WeightedExplanation(
+            members, before + p / sum(likely.values()), maybe
+        )
     return tuple(sorted(out.values(), key=lambda s: -s.probability))
 
 
-def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
+def _unseen_tilts(shown: Sequence[WeightedExplanation], has: set[str]) -> set[str]:
     """Tilts that a set does without: all if it has one, otherwise unlikely ones.
 
     Of positions that do not show the tilt it is stated how level the base is, or it is
@@ -139,7 +143,7 @@ def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
     return {name for name, p in share.items() if p < thresholds.NAMED}
 
 
-def _adds(member: Member, has: set[str]) -> bool:
+def _is_missing(member: Member, has: set[str]) -> bool:
     """Whether a given set lacks a cause."""
     cause, group = member
     if cause.by_window and cause.kind != "position":
@@ -170,7 +174,7 @@ def _in_other_dictionary(
     for group, cause in wanted.items():
         if has_equation(group):
             if group.effect is not None and group.effect.applies(d.x):
-                new.setdefault(cause.key, []).append((group, _variants(d, group)))
+                new.setdefault(cause.key, []).append((group, _group_variants(d, group)))
         elif cause.key in every:
             same = every[cause.key]
             yield group, (same, same.variants[cause.variants.index(group)])
@@ -186,7 +190,7 @@ def _in_other_dictionary(
             yield group, (same, next(off, own) if group in cause.expected else own)
 
 
-def _variants(d: Dictionary, group: Group) -> list[Group]:
+def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     """A group of an effect by columns of `d`, and its effect elsewhere."""
     effect = group.effect
     if not isinstance(effect, Motion | Sensor):
@@ -232,7 +236,7 @@ def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
         for part, some in parts(d, group.effect):
             other = replace(first, part=part)
             if part != first.part and some and other.key not in known:
-                every = _variants(d, replace(group, part=part, params=some))
+                every = _group_variants(d, replace(group, part=part, params=some))
                 yield replace(other, variants=tuple(every)), every[0]
 
 
@@ -249,7 +253,7 @@ def has_equation(group: Group) -> bool:
     return isinstance(group.effect, Motion | Sensor)
 
 
-def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
+def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Array:
     """What columns of what is carried have made of biases and scale factors, (2).
 
     Back come (2, 6, k): biases and scale factors by output and column of `d`.
@@ -257,7 +261,7 @@ def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
     out = np.zeros((2, 6, d.width))
     there = np.zeros(d.width, dtype=bool)
     for one in shown:
-        for cause, group in (*one.members, *one.maybe):
+        for cause, group in (*one.members, *one.possible_members):
             if not isinstance(group.effect, Motion) and (
                 group.effect is not None or cause.name in CHANGING
             ):
@@ -265,15 +269,15 @@ def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
                     there[each.columns] = True
     if not there.any():
         return out
-    out[0] = _outputs(d, there, np.zeros(6))
+    out[0] = _end_outputs(d, there, np.zeros(6))
     for c in range(6):
         step = SMALL * np.eye(6)[c]
-        up, down = (_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
+        up, down = (_end_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
         out[1, c] = (up - down) / (2 * SMALL)
     return out
 
 
-def _outputs(d: Dictionary, there: Array, felt: Array) -> Array:
+def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
     """Outputs by column, (6, k), at the end where f and w are given, (6,).
 
     Long after the last turn: what joints still do then is nothing of the device.

@@ -27,7 +27,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join
-from fieldcal.evaluation.observations import Rests
+from fieldcal.evaluation.observations import UsableWindows
 from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.session.installed import tells_an_offset
@@ -38,7 +38,7 @@ from fieldcal.windows.dead_axis import broken
 def assess(
     found: Calibration,
     session: Session,
-    still: Rests,
+    windows: UsableWindows,
     limits: GradeLimits,
     history: History | None,
 ) -> Calibration:
@@ -67,16 +67,16 @@ def assess(
         except FieldcalError as error:
             warnings.append(str(error))
     dead = broken(session.block.six)
-    taken_out = _taken_out(found, session, still, limits)
+    taken_out = _taken_out(found, session, windows, limits)
     circumstances = Circumstances(
-        temperatures=[a.temperature for a in still.averages],
-        link=_link(session, still.averages, marks),
+        temperatures=[a.temperature for a in windows.averages],
+        link=_link(session, windows.averages, marks),
         verification=_verification(found, session, marks, limits),
         family=earlier.calibrations if earlier else None,
         warmth=earlier.sigma if earlier else {},
         doubts=[*_doubts(marks), *dead, *taken_out],
-        windows=still.at_rest(session).averages,
-        held=[session.about.positions[i] for i in still.rows],
+        windows=windows.at_rest(session).averages,
+        held=[session.about.positions[i] for i in windows.position_numbers],
     )
     warnings += [w for w in _restarts(marks) if w not in warnings]
     made = decide(found, session.about, limits, circumstances)
@@ -89,7 +89,7 @@ def assess(
 
 
 def unassessed(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
 ) -> Calibration:
     """The calibration of a session that nobody is to fly with, with what is wrong.
 
@@ -99,23 +99,23 @@ def unassessed(
     about, of_acc = session.about, "acc_scale" in found.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
+    wrong += [_lacking(found, session, windows, limits), *broken(session.block.six)]
     wrong += [jumps_too_far(found, limits)]
-    wrong += _taken_out(found, session, still, limits)
+    wrong += _taken_out(found, session, windows, limits)
     wrong = [w for w in wrong if w]
     warnings = (*wrong, *found.warnings, *filter(None, unknown))
     return replace(found, warnings=warnings, good=found.good and not wrong)
 
 
 def _lacking(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
 ) -> str:
     """What is not determined where positions had to be left out; empty for nothing.
 
     That is what is known no better than of any unit of the grade. A person who recorded
     so few on purpose knows what they do not show.
     """
-    out = len(session.positions) - len(still.rows)
+    out = len(session.positions) - len(windows.position_numbers)
     lost = [
         f"{group}.{axis}"
         for group in ("acc_bias", "acc_scale")
@@ -135,10 +135,10 @@ def _lacking(
 
 
 def _taken_out(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
 ) -> list[str]:
     """Whether biases were subtracted, where they are as large as those found."""
-    held = still.at_rest(session).averages
+    held = windows.at_rest(session).averages
     seen = np.nan_to_num(found.vector("acc_bias")[0])
     gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
     repeat = limits.acc_bias_repeat, gyroscopes

@@ -53,16 +53,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _instances(args: argparse.Namespace) -> int:
     """Hold the IMUs of one log against each other and g."""
-    from fieldcal.evaluation.instances import compared
-    from fieldcal.evaluation.observations import rests
+    from fieldcal.evaluation.instances import compare_instances
+    from fieldcal.evaluation.observations import usable_windows
     from fieldcal.session.folder import Session
 
     sessions = {one.name: Session.open(one) for one in _folders(args.paths)}
     means = {
-        name: np.array([a.mean[:3] for a in rests(one).averages])
+        name: np.array([a.mean[:3] for a in usable_windows(one).averages])
         for name, one in sessions.items()
     }
-    found = compared(means, next(iter(sessions.values())).gravity)
+    found = compare_instances(means, next(iter(sessions.values())).gravity)
     if args.json:
         sys.stdout.write(json.dumps([one.document() for one in found]) + "\n")
     else:

@@ -37,12 +37,12 @@ def concluded(
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.installing import with_installed
-    from fieldcal.evaluation.observations import rests
-    from fieldcal.evaluation.solution import solved
+    from fieldcal.evaluation.observations import usable_windows
+    from fieldcal.evaluation.solution import solve_session
     from fieldcal.session.folder import RESULT
 
-    still = rests(session)
-    found = with_installed(solved(session, still, method=method), session)
+    still = usable_windows(session)
+    found = with_installed(solve_session(session, still, method=method), session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := store_in_history(history, session, found):

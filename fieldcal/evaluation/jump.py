@@ -22,10 +22,10 @@ NAMES = dict(
 
 
 def with_jump(found: Calibration, shown: Explanation) -> Calibration:
-    """The calibration with how much which bias jumps, and when, in its `info`.
+    """Add a jump of biases that the recording shows to `info`.
 
-    `jump` has `at_s`, and under `bias` by full name what it changes by and its standard
-    uncertainty, m/s^2 and rad/s, as far as the recording determines it.
+    `jump` has the time `at_s`, and under `bias`, by full name, change and standard
+    uncertainty, m/s^2 and rad/s, as far as the recording determines them.
     """
     for standing in shown.standing:
         if standing.name == JUMP:

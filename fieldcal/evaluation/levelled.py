@@ -1,8 +1,8 @@
 """Whether the recording contradicts how level the base is stated to be.
 
-A stated level of standard uncertainty s is a prior of the tilt. A tilt that is not
-there by the statement is taken for biases, and the fit is as good as before. The same
-rows without the statement give the tilt t with covariance C, and
+A stated level of standard uncertainty s is a prior of the tilt. A larger tilt is then
+taken for biases, and the fit is as good as before. The same rows without the statement
+give the tilt t with covariance C, and
 
     chi2 = t^T (C + s^2 I)^-1 t                                                   (1)
 
@@ -29,12 +29,12 @@ def with_tilt_shown(
     recorded: RecordedRows | None,
     asked: Mapping[str, Any],
 ) -> Calibration:
-    """The same with the tilt that the positions show, where the level is stated.
+    """Add the tilt that the positions show without the stated level to `info`.
 
     Parameters
     ----------
     found : the result with the stated level
-    observations, recorded, asked : what it was made from
+    observations, recorded, asked : arguments of `solve` that it was made from
 
     """
     level = found.info.get("level_sigma_deg")

@@ -11,9 +11,9 @@ from fieldcal.acceptance.assessment import assess, limits_path, start_time, unas
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.diagnosis.verdict import concluded
-from fieldcal.evaluation.not_carried import mended
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import Laid, solved_as
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.fleet.reduced import reduced
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, of_calibration
@@ -57,10 +57,10 @@ class SessionTask:
         return StoredSession(folder, fingerprint=mark, error=said)
 
     def _carried_out(self, folder: Path) -> StoredSession:
-        session, repaired = mended(Session.open(folder))
-        still = rests(session)
-        laid = Laid(session, still)
-        found = solved_as(laid)
+        session, repaired = with_repaired_bytes(Session.open(folder))
+        still = usable_windows(session)
+        prepared = PreparedSession(session, still)
+        found = solve_prepared(prepared)
         found = replace(found, warnings=(*repaired, *found.warnings))
         given = Path(self.limits) if self.limits else None
         bounds = limits.read(session.grade, limits_path(session, given))
@@ -68,7 +68,7 @@ class SessionTask:
             found = unassessed(found, session, still, bounds)
         else:
             found = assess(found, session, still, bounds, None)
-        explanation = laid.explanation
+        explanation = prepared.explanation
         diagnosis = None
         if explanation is not None and self.diagnose:
             diagnosis = concluded(session.block, explanation).to_json()

@@ -112,7 +112,10 @@ def _facts(material: Material) -> NameValues:
         ("rate", _rate(block)),
     ]
     if material.still is not None:
-        taken, of = len(material.still.rows), len(material.session.positions)
+        taken, of = (
+            len(material.still.position_numbers),
+            len(material.session.positions),
+        )
         facts.append(("positions", f"{taken} of {of}" if taken < of else f"{of}"))
     warm = block.temperature[np.isfinite(block.temperature)]
     if warm.size:

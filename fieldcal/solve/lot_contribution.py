@@ -30,20 +30,20 @@ from fieldcal.model.posterior.mixture import covariance_of_means
 from fieldcal.solve.estimation import ParameterEstimate
 
 ALL_PARAMETERS = ""
-"""In place of a parameter's name: none of them by itself."""
+"""In place of a parameter's name: all parameters, not a single one."""
 
 
 @dataclass(frozen=True, slots=True)
 class LotContribution:
-    """What a unit has from its lot.
+    """Contribution of the production lot to the result of a unit.
 
     Attributes
     ----------
-    lot : the parameters that both know
-    odd : probability that the unit is odd
-    parameter : in which it is, if it is; empty for all of them
+    lot : prior of the parameters that unit and lot have in common
+    outlier_probability : probability that the unit is an outlier
+    outlier_parameter : parameter in which it most likely is one; empty for all
     own : value and standard uncertainty by full name, without the lot
-    found : the same with it
+    combined : the same with the lot
 
     """
 
@@ -55,12 +55,12 @@ class LotContribution:
 
     @property
     def refused(self) -> bool:
-        """Whether the unit is odd, and has nothing from its lot."""
+        """Whether the unit is an outlier, so that the lot is not used."""
         return self.outlier_probability > thresholds.NAMED
 
     @property
     def sentence(self) -> str:
-        """What is in the result, or why nothing is."""
+        """What the lot contributes, or why it is not used."""
         units = f"{min(self.lot.units)} units of {self.lot.label}"
         if self.refused:
             return (
@@ -86,11 +86,11 @@ class LotContribution:
         )
 
     def _remaining_share(self, name: str) -> float:
-        """What is left of a parameter's uncertainty, as a part."""
+        """Uncertainty of a parameter with the lot, as a part of that without."""
         return self.combined[name][1] / self.own.get(name, (0.0, np.inf))[1]
 
     def _largest_shift(self) -> str:
-        """By what the unit differs most from its lot."""
+        """Sentence part: the largest difference of the unit from its lot."""
         known = [n for n in self.lot.names if n in self.own]
         off = {
             n: (self.own[n][0] - m) / np.hypot(self.own[n][1], s)
@@ -140,12 +140,14 @@ def _unit(name: str) -> str:
 def combine_with_lot(
     own: ParameterEstimate, found: ParameterEstimate, lot: LotPrior
 ) -> tuple[ParameterEstimate, LotContribution | None]:
-    """An estimate with its lot, unless the unit is odd; None where both share nothing.
+    """The estimate with the lot, or without it if the unit is an outlier.
+
+    The contribution is None if unit and lot have no parameter in common.
 
     Parameters
     ----------
-    own, found : without the lot and with it
-    lot : what it says
+    own, found : estimates without the lot and with it
+    lot : prior from the lot
 
     """
     lot = lot.only([n for n in found.names if n in own.parameter_set.names])
@@ -176,13 +178,13 @@ def _estimates(one: ParameterEstimate) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True, slots=True)
 class _OutlierHypotheses:
-    """In what a unit may be odd; the first hypothesis is that it is not.
+    """Hypotheses of an outlier; the first one is that the unit is none.
 
     Attributes
     ----------
     names : (k,) all parameters of the unit's own set
-    parameters : (h,) in which it is odd; empty where in none by itself
-    share : (h,) probability
+    parameters : (h,) parameter of the outlier; empty if it is not a single one
+    probabilities : (h,)
     means, covariances : (h, k), (h, k, k), (1)
 
     """
@@ -195,7 +197,7 @@ class _OutlierHypotheses:
 
     @classmethod
     def of(cls, own: ParameterEstimate, lot: LotPrior) -> _OutlierHypotheses:
-        """Weigh them by what the unit says on its own, (1) and (2)."""
+        """Weigh the hypotheses by the estimate without the lot, (1) and (2)."""
         names, every = own.parameter_set.names, own.all_parameters
         at = np.array([names.index(name) for name in lot.names])
         scale = np.sqrt(np.diag(every.covariance))
@@ -222,16 +224,16 @@ class _OutlierHypotheses:
 
     @property
     def outlier_probability(self) -> float:
-        """Probability that the unit is odd."""
+        """Probability that the unit is an outlier."""
         return float(self.probabilities[1:].sum())
 
     @property
     def outlier_parameter(self) -> str:
-        """In what it is then."""
+        """Most likely parameter of an outlier; empty for all."""
         return self.parameters[1 + int(np.argmax(self.probabilities[1:]))]
 
     def mixture_with(self, found: ParameterEstimate) -> ParameterEstimate:
-        """The estimate with the lot, and what it is where the unit is odd."""
+        """Mixture of the estimate with the lot and those of the outlier hypotheses."""
         ours = [i for i, name in enumerate(found.names) if name in self.names]
         at = [self.names.index(found.names[i]) for i in ours]
         means = np.tile(found.values, (len(self.probabilities), 1))
@@ -248,7 +250,7 @@ class _OutlierHypotheses:
 def _hypothesis_priors(
     lot: LotPrior, wide: Array
 ) -> Iterator[tuple[str, float, Array]]:
-    """In what a unit is odd, if it is, how likely that is, and P_h."""
+    """Parameter, prior odds and P_h of each hypothesis."""
     yield ALL_PARAMETERS, 1.0, wide
     more = lot.times**2 - 1
     for j, name in enumerate(lot.names):

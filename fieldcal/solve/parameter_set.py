@@ -1,10 +1,10 @@
-"""The given set of `solve`: the parameters that describe the device.
+"""The parameter set of `solve`: the parameters that describe the device.
 
-It is a set of the model (`fieldcal.model`) that is given instead of searched for. The
-priors of the estimated parameters are so wide that they do not matter. The tilt of the
-base, the errors of set angles, and the uncertainty of the Earth's rate have the stated
-sizes. The error of an angle has two parts of equal variance: one is repeated by the
-fixture each time the same detent is set, the other is new in each position.
+It is a set of causes of the model (`fieldcal.model`) that is given instead of searched
+for. The priors of the estimated parameters are so wide that they do not matter. The
+tilt of the base, the errors of set angles, and the uncertainty of the Earth's rate have
+the stated sizes. The error of an angle has two parts of equal variance: one is repeated
+by the fixture each time the same detent is set, the other is new in each position.
 """
 
 from __future__ import annotations
@@ -42,20 +42,21 @@ from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 @dataclass(frozen=True, slots=True)
 class ParameterSetOptions:
-    """What is to be estimated beside bias and scale factor, and what is known.
+    """Contents of a parameter set besides bias and scale factor; uncertainties 1 sigma.
 
     Attributes
     ----------
-    tilt : how the base is tilted
-    cross, gyro_cross : cross-coupling of the accelerometers, of the gyroscopes
-    gyr_scale : whether the scale factor of the gyroscopes is
-    level_deg : how level the base is, about each level axis; None if it is not stated
-    beside_tilt_deg : how large the other kind of tilt may be beside it
-    angles_deg : how well each angle is set
-    factory : what the factory left of errors, where they are not estimated
-    earth : (3,) rad/s, what is not known of the Earth's rate in base axes
+    tilt : kind of the estimated tilt
+    cross, gyro_cross : whether cross-coupling of the accelerometers, of the gyroscopes,
+        is estimated
+    gyr_scale : whether the scale factor of the gyroscopes is estimated
+    level_deg : uncertainty of the level about each level axis; None if not stated
+    beside_tilt_deg : possible size of the other kind of tilt
+    angles_deg : uncertainty of each set angle
+    factory : sizes of the errors that the factory left and that are not estimated
+    earth : (3,) rad/s, uncertainty of the Earth's rate in base axes
     turned : whether turns between positions were recorded
-    lot : what the unit's lot says of its parameters; None where nobody asks it
+    lot : prior of the parameters from the unit's lot; None if not used
 
     """
 
@@ -73,22 +74,24 @@ class ParameterSetOptions:
 
 
 class ParameterSet(Dictionary):
-    """The columns of a given set, and those by which a window may be off by itself.
+    """Columns of the parameters, and of errors that affect single windows.
 
     Parameters
     ----------
-    rows : of the windows
+    rows : rows of the windows
     unit : (6,) outputs per SI unit
-    since : (o, n) s since the turn, by origin
-    turns : whether the way between positions is seen
-    wanted : what the set is made of
-    shown : explanations of the recording, of which the set takes what it lacks
-    cut : what each accelerometer's values may have lost in size, 1 sigma
+    since : (o, n) time since the last turn, s, by origin
+    turns : whether the turns between positions are used
+    wanted : contents of the set
+    shown : explanations of the recording; the set adds their causes that it lacks
+    cut : how much smaller each accelerometer's values may be because they were rounded
+        toward zero, 1 sigma
 
     Attributes
     ----------
-    explanations : the same by its own columns, the likeliest first
-    left_out : cross-coupling of the accelerometers, where it is not in the set
+    explanations : the explanations in the columns of this set, the likeliest first
+    omitted_cross_coupling : cross-coupling of the accelerometers if it is not in the
+        set; else None
 
     """
 
@@ -122,22 +125,22 @@ class ParameterSet(Dictionary):
 
     @property
     def base_members(self) -> tuple[Member, ...]:
-        """What was asked for, and what is known of it."""
+        """Requested parameters, and errors of known size."""
         return tuple((c, c.variants[0]) for c in self.causes)
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """The set, with what the likeliest explanation of the recording has."""
+        """The set with the causes of the likeliest explanation."""
         return self.with_causes(self.explanations[0].members)
 
     def with_causes(self, carried: Sequence[Member]) -> tuple[Member, ...]:
-        """The set with some causes, and with what these do to scale factors."""
+        """The set with further causes and their changes of scale factors."""
         warm = [self._warm[c.key] for c, _ in carried if c.key in self._warm]
         return (*self.base_members, *carried, *warm)
 
     @cached_property
     def bias_scale_at_end(self) -> Array:
-        """What columns make of biases and scale factors at the end, (2, 6, k)."""
+        """Derivative of final biases and scale factors by the columns, (2, 6, k)."""
         known = (*self.base_members, *self._warm.values())
         left = tuple(
             (cause, group)
@@ -150,10 +153,10 @@ class ParameterSet(Dictionary):
 
     @property
     def groups(self) -> list[Group]:
-        """All groups, those that are always in first."""
+        """All groups; those that every set has come first."""
         return [*self.always, *(g for _, g in self.members)]
 
-    # -- what is in it
+    # -- contents
 
     def _calibration(self) -> Iterator[Group]:
         """Bias and scale factor, free."""
@@ -170,7 +173,7 @@ class ParameterSet(Dictionary):
                             in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
-        """What was asked for, and how well the rest is known."""
+        """Causes of the requested parameters, and of errors of known size."""
         w, oriented = self.options, bool(self.x.oriented.any())
         if w.tilt != "none" and oriented:
             yield self._effect_cause(w.tilt, known=w.level_deg)
@@ -193,12 +196,12 @@ class ParameterSet(Dictionary):
             yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
 
     def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
-        """What changes scale factors beside causes that change biases, by their key."""
+        """Changes of scale factors that accompany changes of biases, by cause key."""
         found = {cause.key: warm_scale(self, group) for cause, group in members}
         return {key: scale for key, scale in found.items() if scale is not None}
 
     def _usual_cross_coupling(self) -> Group | None:
-        """Cross-coupling that the set has not, of its usual size."""
+        """Cross-coupling of usual size if it is not in the set; else None."""
         there = {c.name for c, _ in self.members}
         if "cross_coupling" in there or not self.x.f.any():
             return None
@@ -212,10 +215,10 @@ class ParameterSet(Dictionary):
         known: float | None = None,
         free: float = priors.FREE,
     ) -> Cause:
-        """An effect with its parameters, free or of a known size.
+        """Cause of an effect with all its parameters, free or of a known size.
 
-        Those that a turn of the whole device makes of others are left out of one that
-        is `turned` as nobody knows.
+        If the device is `turned` by an unknown rotation, the parameters that such a
+        rotation can produce from others are left out.
         """
         one = whole(self, name, turned)
         if known is None:
@@ -224,7 +227,7 @@ class ParameterSet(Dictionary):
         return _given_cause(replace(one, typical=size, fixed=1.0))
 
     def _earth_rate_cause(self, size: Array) -> Cause:
-        """What is not known of the Earth's rate."""
+        """Uncertainty of the Earth's rate."""
         sides = columns.earth_sides
         self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
         kept = np.flatnonzero(size)
@@ -233,16 +236,18 @@ class ParameterSet(Dictionary):
         )
 
     def _truncated_outputs(self, view: RowView) -> Array:
-        """Outputs of accelerometers whose size is less by one, (n, 6, 3)."""
+        """Change of outputs if each accelerometer's size is less by one, (n, 6, 3)."""
         out = np.zeros((len(view.x), 6, 3))
         for c in range(3):
             out[:, c, c] = -self.sign[view.x.position, c]
         return out
 
     def _angle_causes(self, sigma: float) -> Iterator[Cause]:
-        """How well angles are set: anew in each position, and wherever repeated."""
+        """Errors of set angles: new in each position, and repeated with each detent."""
         x = self.x
-        alike = x.oriented & ~np.isfinite(x.attitude_sigma)  # others have their own
+        alike = x.oriented & ~np.isfinite(
+            x.attitude_sigma
+        )  # the others have their own uncertainty
         oriented = [p for p in self.held if alike[x.position == p].all()]
         if not oriented:
             return
@@ -258,7 +263,7 @@ class ParameterSet(Dictionary):
             wide = np.full(len(at), size)
             yield _given_cause(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 
-    # -- where it stands
+    # -- places of the parameters
 
     def columns_for(self, name: str) -> Index:
         """Columns of a parameter by its full name; none if it is not in the set."""
@@ -305,9 +310,9 @@ def _given_cause(group: Group) -> Cause:
 
 
 def _mean_signs(rows: Rows, cut: Array) -> Array:
-    """Sign of each accelerometer's mean by position, (p + 1, 3); none on the way.
+    """Sign of each accelerometer's mean by position, (p + 1, 3); 0 during turns.
 
-    Less near zero, where values of both signs come.
+    Its size is less than 1 near zero, where values of both signs occur.
     """
     held = rows.x.position
     out = np.zeros((int(held.max()) + 2, 3))
@@ -323,11 +328,11 @@ def known_earth_rate(
     heading: float | None,
     under_way: UnderWay | None = None,
 ) -> tuple[Array, tuple[float, float, float]]:
-    """What is known of the Earth's rate in base axes, and how uncertain it is, rad/s.
+    """The Earth's rate in base axes, and its uncertainty, rad/s.
 
-    The vertical part by the latitude, the level part by the heading of z from north,
-    rad; tactical grade has it pointing anywhere where nobody says, and navigation grade
-    exactly north.
+    The vertical part follows from the latitude, the level part from the uncertainty of
+    the heading, rad, with z pointing north. If no heading is stated, z may point
+    anywhere for tactical grade, and points exactly north for navigation grade.
     """
     if latitude is None:
         free = EARTH_RATE / float(np.sqrt(3.0))
@@ -344,5 +349,5 @@ def known_earth_rate(
 
 
 def with_base_rate(rows: Rows, base_rate: Array) -> Rows:
-    """Rows on a base that turns with the Earth."""
+    """The rows with the rate of the base, (3,) rad/s."""
     return replace(rows, x=rows.x.turned(base_rate=base_rate))

@@ -15,8 +15,8 @@ from fieldcal.acceptance.remedy import cheapest
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.positions import FIVE, TWO, ladder
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile
 
@@ -36,8 +36,8 @@ def decided(
     site: dict[str, float] = {"latitude_deg": 50.45, "height_m": 170.0}
     site |= {"angle_setting_deg": 0.05}
     session = Session.open(write_session(folder, block, positions, site=site))
-    still = rests(session)
-    return assess(solved(session, still), session, still, bounds, None)
+    still = usable_windows(session)
+    return assess(solve_session(session, still), session, still, bounds, None)
 
 
 @pytest.mark.thorough  # as test_adaptive has it of a run that asks for it at once

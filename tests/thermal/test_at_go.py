@@ -14,7 +14,7 @@ from fieldcal.acceptance.assessment import assess, store_in_history
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.warmed import warmed
 from fieldcal.calibration import Calibration, limits
-from fieldcal.evaluation.observations import observe, rests, with_provenance
+from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
 from fieldcal.history.store import History, HistoryRun
 from fieldcal.history.trend import trend
 from fieldcal.session.folder import Session
@@ -59,7 +59,7 @@ def assessed(folder: Path, temperature: float, seed: int) -> Calibration:
     write_session(folder, block, positions, site=site, device={"serial": "SIM-1"})
     recorded, history = Session.open(folder), History(folder.parent / "h.db")
     means = with_provenance(solve(observe(recorded)[0]), recorded.about)
-    found = assess(means, recorded, rests(recorded), BOUNDS, history)
+    found = assess(means, recorded, usable_windows(recorded), BOUNDS, history)
     assert not store_in_history(history, recorded, found)
     return found
 

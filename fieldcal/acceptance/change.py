@@ -1,6 +1,6 @@
-"""Whether a calibration is of one family with earlier ones of the same device.
+"""Compares a calibration with earlier ones of the same device.
 
-The history is compared with; nothing of it enters the calibration.
+The history does not influence the calibration.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fieldcal.acceptance.check import Check, shown_unit
+from fieldcal.acceptance.check import Check, unit_suffix
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName, group_of
@@ -22,15 +22,15 @@ def check_change(
     family: Sequence[Calibration] | None,
     warmth: Mapping[str, float],
 ) -> list[Check]:
-    """Compare each group with what the history lets expect, by its worst parameter.
+    """Compare each group with earlier calibrations, by its most unusual parameter.
 
     Parameters
     ----------
     found : the calibration
-    limits : of its grade
-    family : earlier ones, at its temperature; None without a history
-    warmth : by how much parameters may differ because earlier ones were taken at
-        other temperatures, 1 sigma by full name
+    limits : limits of its grade
+    family : earlier calibrations at its temperature; None without a history
+    warmth : additional uncertainty for the change of temperature since, 1 sigma, by
+        full name
 
     """
     if family is None:
@@ -74,7 +74,7 @@ def _compared(
     )
     chance, limit = usual.chance(value, sigma), limits.family_chance / together
     ok = chance >= limit
-    unit = shown_unit(found.units[found.names.index(name)])
+    unit = unit_suffix(found.units[found.names.index(name)])
     says = (
         f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
         f" calibration{'s' if usual.runs > 1 else ''}"

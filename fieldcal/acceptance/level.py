@@ -18,17 +18,17 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.session.description import Description
 
 BLIND = 2
-"""Positions with known angles that cannot tell a tilt from a bias."""
+"""Number of positions with known angles that cannot distinguish a tilt from a bias."""
 
 
 DOUBTED = 0.01
-"""Probability of what the positions show below which a stated level is not believed. A
-bias is off by half as many of its sigmas again as the tilt is of its own, and nothing
-is lost without the statement: the tilt is then estimated."""
+"""Probability of the tilt that the positions show, below which a stated level is not
+accepted. The error of a bias, in its sigmas, is then half as large again as that of the
+tilt. Without the statement the tilt is estimated."""
 
 
 OTHER = {"angle_offset": "a tilt of the base", "base_tilt": "offsets of the joints"}
-"""What may be there beside the tilt of a result."""
+"""The other kind of tilt, by the kind that a result contains."""
 
 
 def tilt_is_found(found: Calibration) -> bool:
@@ -38,7 +38,7 @@ def tilt_is_found(found: Calibration) -> bool:
 
 
 def level_missing(about: Description) -> str:
-    """Sentence for a base whose level was not stated, with the remedy."""
+    """Sentence about a base whose level is not stated, with the remedy."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
         "these positions do not show how level the base is, and a tilt of 1° changes a"
@@ -48,15 +48,15 @@ def level_missing(about: Description) -> str:
 
 
 def level_unknown(about: Description) -> str:
-    """Warning before a run that will be NO-GO for it; empty if the tilt is known."""
+    """Warning before a run that would end in NO-GO for it; empty if not needed."""
     known = sum(position.oriented for position in about.positions)
     return level_missing(about) if known <= BLIND and about.level_deg is None else ""
 
 
 def check_level(found: Calibration, about: Description) -> list[Check]:
-    """Whether the level of the base is known: an unseen tilt acts as a bias.
+    """Check whether the level of the base is known: an unknown tilt acts as a bias.
 
-    A stated level that the positions contradict is not.
+    A stated level that the positions contradict fails.
     """
     shown = found.info.get("tilt_shown")
     level = found.info.get("level_sigma_deg")
@@ -69,15 +69,15 @@ def check_level(found: Calibration, about: Description) -> list[Check]:
         )
         return [Check("level", False, says)]
     if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return list(_beside(found))
+        return list(_other_tilt_checks(found))
     if level is None:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
 
 
-def _beside(found: Calibration) -> Iterator[Check]:
-    """What the result has of the other kind of tilt."""
+def _other_tilt_checks(found: Calibration) -> Iterator[Check]:
+    """Report the assumed size of the other kind of tilt."""
     kinds = [OTHER[group] for group in found.groups if group in OTHER]
     if kinds and (off := found.info.get("beside_tilt_sigma_deg")):
         says = f"each ± includes {kinds[0]} of 0 ± {off:.2g}°, beside the tilt found"

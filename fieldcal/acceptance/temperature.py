@@ -18,28 +18,30 @@ from fieldcal.thermal import ThermalPoint, point, thermal_model
 from fieldcal.thermal.wording import costs, document
 
 NEAR_K = 2.0
-"""Difference up to which temperatures count as equal, K: a room's from day to day."""
+"""Difference up to which temperatures count as equal, K, as of a room on two days."""
 
 
-def since_last(
+def effect_of_temperature_change(
     found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
 ) -> dict[str, Any] | None:
     """Effect of the change of temperature since the last calibration.
 
     Parameters
     ----------
-    found : the calibration of now
-    earlier : of the device's family, oldest first
-    limits : of its grade
+    found : the present calibration
+    earlier : earlier calibrations of the device, oldest first
+    limits : limits of its grade
 
     Returns
     -------
-    Temperatures, changes with their ± where the history tells them, and sentences; None
-    where nothing changed or no temperature is known.
+    Temperatures, changes with their ± if the history determines them, and sentences;
+    None if the temperature has not changed, or is not known.
 
     """
-    points = [p for run in earlier if (p := as_point(run.taken_at, run.calibration))]
-    now = as_point("now", found)
+    points = [
+        p for run in earlier if (p := as_thermal_point(run.taken_at, run.calibration))
+    ]
+    now = as_thermal_point("now", found)
     if now is None or not points:
         return None
     then = points[-1]
@@ -72,8 +74,8 @@ def since_last(
     return {**out, "parameters": document(changes), "says": [says]}
 
 
-def as_point(name: str, found: Calibration) -> ThermalPoint | None:
-    """A calibration as a point; None where it has no temperature or is no good."""
+def as_thermal_point(name: str, found: Calibration) -> ThermalPoint | None:
+    """A calibration as a point of temperature; None if it has none, or is bad."""
     try:
         return point(name, found)
     except InputError:

@@ -1,4 +1,4 @@
-"""Whether a result can be trusted for which positions were left out.
+"""Whether a result from which positions were left out can be trusted.
 
 The position that disagrees with all others may be the only right one: a gauge that is
 too long spoils all positions but the level one. The remaining positions are trusted if
@@ -16,8 +16,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.model import thresholds
 
 
-def left_out(found: Calibration) -> int:
-    """How many positions were given no weight."""
+def rejected_positions(found: Calibration) -> int:
+    """Number of positions that were given no weight."""
     return sum(
         chance > thresholds.CERTAIN for chance in found.info.get("bad_position", ())
     )
@@ -28,9 +28,9 @@ def has_witnesses(found: Calibration) -> bool:
     return _kept(found) >= 2 * _needed(found)
 
 
-def witnesses(found: Calibration) -> str:
-    """How many positions were left out and used, with the remedy if too few are."""
-    out = left_out(found)
+def witness_sentence(found: Calibration) -> str:
+    """Sentence with the numbers of positions left out and used, and the remedy."""
+    out = rejected_positions(found)
     verb = "were" if out > 1 else "was"
     says = (
         f"{out} position{'s' if out > 1 else ''} disagreed and {verb} not used;"
@@ -47,10 +47,10 @@ def witnesses(found: Calibration) -> str:
 
 
 def _kept(found: Calibration) -> int:
-    return len(found.info.get("bad_position", ())) - left_out(found)
+    return len(found.info.get("bad_position", ())) - rejected_positions(found)
 
 
 def _needed(found: Calibration) -> int:
-    """A window of known angles gives three numbers, one of unknown angles a length."""
+    """Positions needed: each gives 3 numbers, or 1 if its angles are unknown."""
     of_acc = [name for name in found.names if not name.startswith("gyr")]
     return -(-len(of_acc) // (1 if found.method == "scalar" else 3))

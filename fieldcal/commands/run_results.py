@@ -103,7 +103,7 @@ def write_junit(
     path: Path, task: Task, folder: Path, result: Any, said: str = ""
 ) -> None:
     """Write what happened as JUnit XML; `result` is None where the run broke off."""
-    from fieldcal.acceptance.verification import planned
+    from fieldcal.acceptance.verification import planned_verification
     from fieldcal.core.positions import Position
     from fieldcal.run import junit
     from fieldcal.session.description import with_more
@@ -116,7 +116,7 @@ def write_junit(
         Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
         for m in more if int(m["position"]) >= len(about.positions)
     ])  # fmt: skip
-    positions = [*about.positions, *filter(None, [planned(about)])]
+    positions = [*about.positions, *filter(None, [planned_verification(about)])]
     junit.write(path, task.procedure, positions, marks, result, said)
 
 

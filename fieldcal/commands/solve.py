@@ -188,13 +188,13 @@ def _decided(
     args: argparse.Namespace, found: Calibration, session: Session, still: UsableWindows
 ) -> Calibration:
     """GO or NO-GO, where the session was a recalibration or limits are given."""
-    from fieldcal.acceptance.assessment import assess, limits_path, unassessed
+    from fieldcal.acceptance.assessment import assess, limits_path, with_faults
     from fieldcal.calibration import limits
     from fieldcal.history.place import default_place
     from fieldcal.history.store import History
 
     bounds = limits.read(session.grade, limits_path(session, args.limits))
     if args.limits is None and "run" not in session.about.raw:
-        return unassessed(found, session, still, bounds)
+        return with_faults(found, session, still, bounds)
     history = History(args.history or default_place())
     return assess(found, session, still, bounds, history)

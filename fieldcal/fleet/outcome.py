@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fieldcal.acceptance.assessment import assess, limits_path, start_time, unassessed
+from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.diagnosis.verdict import concluded
@@ -65,7 +65,7 @@ class SessionTask:
         given = Path(self.limits) if self.limits else None
         bounds = limits.read(session.grade, limits_path(session, given))
         if given is None and "run" not in session.about.raw:
-            found = unassessed(found, session, still, bounds)
+            found = with_faults(found, session, still, bounds)
         else:
             found = assess(found, session, still, bounds, None)
         explanation = prepared.explanation

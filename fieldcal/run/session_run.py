@@ -14,7 +14,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from fieldcal import procedures
-from fieldcal.acceptance.verification import planned
+from fieldcal.acceptance.verification import planned_verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.documents import load_json
@@ -161,7 +161,7 @@ class SessionRun:
         plan = procedures.procedure(name).plan
         found = yield from plan(about, task.seconds, task.sigma)
         about = with_more(task.about, self._added)
-        verification = planned(about)
+        verification = planned_verification(about)
         if verification is not None:
             yield from self._verified(len(about.positions), verification)
         elif self._until_go:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
 from fieldcal.acceptance.growth import growth
-from fieldcal.acceptance.verification import proposed, verify
+from fieldcal.acceptance.verification import propose_verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.document import schema
 from fieldcal.core.errors import InputError
@@ -272,7 +272,7 @@ def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> A
 
 @pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.thorough)])
 def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) -> None:
-    rng, position, chances = np.random.default_rng(8), proposed(FIVE), []
+    rng, position, chances = np.random.default_rng(8), propose_verification(FIVE), []
     for _ in range(runs):
         windows = [_held(p, rng) for p in FIVE]
         found = solve(Observations.of(FIVE, windows, G))
@@ -282,10 +282,10 @@ def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) ->
 
 
 def test_a_position_that_is_off_is_no_go() -> None:
-    rng, position = np.random.default_rng(9), proposed(FIVE)
+    rng, position = np.random.default_rng(9), propose_verification(FIVE)
     found = solve(Observations.of(FIVE, [_held(p, rng) for p in FIVE], G))
     seen = verify(found, ABOUT, position, _held(position, rng, cross=0.02))
-    assert seen.largest == pytest.approx(0.2, abs=0.05)
+    assert seen.residual_size == pytest.approx(0.2, abs=0.05)
     made = decide(found, ABOUT, BOUNDS, Circumstances([21.0], LINK, seen))
     reason = next(r for r in made.reasons if "not fitted" in r)
     assert position.name in reason and "does not explain" in reason
@@ -295,7 +295,7 @@ def test_a_position_that_is_off_is_no_go() -> None:
 def test_the_verification_position_is_within_the_ladder_and_new(
     positions: tuple[Position, ...],
 ) -> None:
-    found = proposed(positions).degrees
+    found = propose_verification(positions).degrees
     assert found is not None and found not in [p.degrees for p in positions]
     known = np.array([p.degrees for p in positions])
     assert (known.min(axis=0) <= found).all() and (found <= known.max(axis=0)).all()
@@ -427,4 +427,4 @@ def test_a_misfit_counts_by_what_it_does_to_the_navigator(
 
 def test_where_all_positions_have_a_third_angle_home_verifies_them() -> None:
     three = [Position.deg(a, 10.0, gamma=c) for a, c in ((0, 90), (30, -90))]
-    assert proposed(three) == Position.deg(0.0, 0.0)
+    assert propose_verification(three) == Position.deg(0.0, 0.0)

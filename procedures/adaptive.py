@@ -18,13 +18,13 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import CalibrationFailed, Skipped
 from fieldcal.core.positions import TWO, Position, forces, ladder
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import angle_setting
 from fieldcal.model import thresholds
-from fieldcal.planning.expected_gain import COMMON, ExpectedGain, Worth
+from fieldcal.planning.expected_gain import COMMON, ExpectedGain, PositionGains
 from fieldcal.planning.holding import (
     hold_each,
     hold_until_still,
@@ -109,7 +109,7 @@ def _worth(
     about: Description,
     positions: Sequence[Position],
     refused: Collection[tuple[float, float] | None],
-) -> tuple[Worth | None, list[Position]]:
+) -> tuple[PositionGains | None, list[Position]]:
     """What each position that is left to choose would tell; None if nobody knows."""
     places = [p for p in candidates(about) if p.degrees not in refused]
     explanation = so_far.explanation
@@ -130,7 +130,11 @@ def _allowed(so_far: InterimResult) -> dict[str, float]:
 
 
 def _end(
-    so_far: InterimResult, worth: Worth | None, held: int, most: int, content: bool
+    so_far: InterimResult,
+    worth: PositionGains | None,
+    held: int,
+    most: int,
+    content: bool,
 ) -> str:
     """Why it ends here, for the operator; empty if it goes on.
 
@@ -181,7 +185,9 @@ def _named(so_far: InterimResult) -> str:
     return ", ".join(s.name for s in sure) if len(sure) == len(wrong) else ""
 
 
-def _choice(worth: Worth | None, places: Sequence[Position], last: Position) -> int:
+def _choice(
+    worth: PositionGains | None, places: Sequence[Position], last: Position
+) -> int:
     """The place worth most; of those alike the one nearest to the last position."""
     if worth is None:
         raise CalibrationFailed("there is no position left to choose from")
@@ -191,10 +197,10 @@ def _choice(worth: Worth | None, places: Sequence[Position], last: Position) -> 
     return nearest
 
 
-def _why(so_far: InterimResult, worth: Worth | None, place: int) -> str:
+def _why(so_far: InterimResult, worth: PositionGains | None, place: int) -> str:
     """Why the next position is asked for."""
-    told = worth.foremost(place) if worth else ""
-    what = f"the {title(told)}" if "." in told else f"whether there is {told}"
+    told = worth.most_improved(place) if worth else ""
+    what = f"the {parameter_title(told)}" if "." in told else f"whether there is {told}"
     if so_far.sufficient:
         return f"GO so far; the next position tells {what}; s pressed twice ends here"
     lacking = ", ".join(so_far.failed_checks).replace("_", " ") or so_far.failure

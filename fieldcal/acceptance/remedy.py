@@ -23,12 +23,12 @@ from fieldcal.acceptance.factory import factory_errors_used
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import Position, forces, ladder
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
-from fieldcal.planning.planner import sigma_of
+from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 
@@ -193,8 +193,8 @@ def _as_remedy(
     if not np.isfinite(over[worst]):
         now = "not determined yet"
     says = (
-        f"{word} more for {seconds:.0f} s, {where}: then GO is expected ({title(worst)}"
-        f" is {now})"
+        f"{word} more for {seconds:.0f} s, {where}: then GO is expected"
+        f" ({parameter_title(worst)} is {now})"
     )
     angles = tuple(p.degrees or (0.0, 0.0) for p in chosen)
     return Remedy(says, positions=angles, seconds=seconds)
@@ -252,7 +252,7 @@ def _expected_sigma(
     sizes = np.array([left[group_of(name)] for name in more])
     before = np.eye(len(every))[len(names) :] / sizes[:, None]
     whitened = np.vstack([whitened, before])
-    return sigma_of(whitened)[: len(names)]  # (1)
+    return parameter_sigma(whitened)[: len(names)]  # (1)
 
 
 def _force_slopes(

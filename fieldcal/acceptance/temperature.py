@@ -11,7 +11,7 @@ from typing import Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import InputError
 from fieldcal.history.store import HistoryRun
 from fieldcal.thermal import ThermalPoint, point, thermal_model
@@ -70,7 +70,7 @@ def effect_of_temperature_change(
     if not told:
         says = f"{about}: no parameter changes measurably with it"
     elif rest:
-        says += f"; no change is seen in {', '.join(map(title, rest))}"
+        says += f"; no change is seen in {', '.join(map(parameter_title, rest))}"
     return {**out, "parameters": document(changes), "says": [says]}
 
 

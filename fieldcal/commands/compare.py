@@ -123,14 +123,14 @@ def read(path: Path) -> Calibration:
 
 def table(found: Comparison) -> str:
     """Lines of a comparison, a parameter each."""
-    from fieldcal.calibration.wording import number
+    from fieldcal.calibration.wording import format_with_sigma
 
     width = max(len(n) for n in found.names)
     lines = [f"{'parameter':{width}}  second - first      ± 1σ       difference/σ"]
     for name, d, s, z in zip(
         found.names, found.difference, found.sigma, found.z, strict=True
     ):
-        value, sigma = number(-float(d), float(s))
+        value, sigma = format_with_sigma(-float(d), float(s))
         mark = "  changed" if name in found.changed else ""
         lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:12.1f}{mark}")
     for which, names in (("first", found.only_first), ("second", found.only_second)):

@@ -70,7 +70,7 @@ def angle_setting(about: Description) -> float:
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:
     """The calibration with the device it belongs to and the software that made it."""
     origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}
-    if not about.gauge.plain:
+    if not about.gauge.is_si:
         origin["gauge"] = about.gauge.table()
     return replace(calibration, info={**calibration.info, **origin})
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.evaluation.observations import UsableWindows
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
@@ -145,7 +145,10 @@ def averages(material: Material, still: UsableWindows) -> list[Table]:
         rows = [
             [
                 material.position_name(row),
-                *(" ± ".join(number(a.mean[i], a.sigma[i])) for i in channels),
+                *(
+                    " ± ".join(format_with_sigma(a.mean[i], a.sigma[i]))
+                    for i in channels
+                ),
                 f"{a.start:.1f} – {a.end:.1f}",
                 f"{a.n:,}",
                 f"{a.temperature:.2f}" if np.isfinite(a.temperature) else "–",

@@ -131,7 +131,7 @@ def lot_rows(
     parameter_set: ParameterSet, lot: LotPrior, nominal: State
 ) -> KnownRows | None:
     """Prior of a lot as rows for the columns of a set; None if it has no parameter."""
-    lot = lot.only(parameter_set.names)
+    lot = lot.subset(parameter_set.names)
     if not lot.names:
         return None
     picked = parameter_matrix(parameter_set, np.arange(parameter_set.width))

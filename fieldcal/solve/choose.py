@@ -1,14 +1,13 @@
-"""From what is asked for to a calibration: the set is given, the model does the rest.
+"""Chooses the parameter set for the requested calibration, and fits it.
 
     two known positions            two_position      bias and scale factor
     more known positions           joint             and the tilt that the data prefer
     positions without angles       scalar            by the length of the force
     rates of a table               least_squares     for the gyroscopes
 
-Whatever the method is called, all rows are in one fit: windows, the turns between them
-where they were recorded, the Earth's rate as far as it is known, how well angles are
-set. Where two models of the tilt fit nearly alike, what they differ by is in the
-uncertainty.
+Each method fits all rows at once: windows, the turns between them if they were
+recorded, the Earth's rate as far as it is known, and the uncertainty of set angles. If
+two models of the tilt fit about equally well, the uncertainty includes the difference.
 """
 
 from __future__ import annotations
@@ -47,16 +46,16 @@ from fieldcal.solve.result import build_calibration
 from fieldcal.solve.rows import rows_of_means, without_angles
 
 EarthRateModel = Literal["stated", "another", "none"]
-"""Whose rate gyroscopes have: of the stated latitude, of another one, or none."""
+"""Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
 
 EVEN = 0.5
-"""Chance from which an error is taken to be as large as the coarser grade has it."""
+"""Probability from which an error is taken to be as large as in the coarser grade."""
 
 NO_EARTH = (
     "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
     " their biases are stated without; real ones that do so take out what is a bias"
 )
-"""Said where the Earth's rate is absent."""
+"""Warning if the Earth's rate is absent."""
 
 
 def solve(
@@ -84,18 +83,20 @@ def solve(
     tilt : model of the base's tilt; "auto" estimates it where the positions show it
     cross : estimate cross-coupling (non-orthogonality in the scalar method)
     as_printed : closed forms with the misprints of the paper, to compare
-    level_sigma_deg : how level the base was made, about each level axis; the tilt is
-        then that of the base, within this
-    heading_sigma_deg : how well z points north; not known for tactical grade if None
-    angle_sigma_deg : how well each position's angles are set, about each level axis
-    beside_tilt_sigma_deg : how large a tilt of the base may be beside offsets of the
-        joints, and the other way round, where "auto" takes one of them
+    level_sigma_deg : uncertainty of the level of the base about each level axis; the
+        tilt is then that of the base, with this prior
+    heading_sigma_deg : uncertainty of the direction of z from north; None means unknown
+        for tactical grade, and exact for navigation grade
+    angle_sigma_deg : uncertainty of each position's angles, about each level axis
+    beside_tilt_sigma_deg : possible size of a tilt of the base besides offsets of the
+        joints, or the other way round, if "auto" takes one of them
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
-    factory : what the factory left of errors that are not estimated; nothing if None
-    at_best : the same if the device is as good as it is called, where `factory` is what
-        its biases make likely: the rows tell which, for each kind of error
-    lot : what the unit's lot says, which the result then has unless the unit is odd
+    factory : sizes of errors that the factory left and that are not estimated; None for
+        no errors
+    at_best : the same for the stated grade, if `factory` is that of a coarser grade
+        that the biases show; the rows decide for each kind of error
+    lot : prior from the unit's lot; it is not used if the unit is an outlier
 
     Raises
     ------
@@ -130,7 +131,7 @@ def _solve_with_lot(
     method: Method,
     recorded: RecordedRows | None,
 ) -> Calibration:
-    """The calibration by the session alone, or with its lot where that fits."""
+    """The calibration of the session alone, or with its lot if the unit fits to it."""
     alone = replace(asked, lot=None)
     found, notes = _fit_over_earth_rates(observations, alone, method, recorded)
     told = None
@@ -147,10 +148,10 @@ def _fit_over_earth_rates(
     method: Method,
     recorded: RecordedRows | None,
 ) -> tuple[ParameterEstimate, list[str]]:
-    """The set that fits, with what other rates of the Earth differ by in its sigmas.
+    """Fit with the Earth's rate of the stated latitude, of another one, and with none.
 
-    The rate of the stated latitude, of another, or none as simulators have it: one
-    that fits a little better is not the only one that is possible.
+    The most likely one is the result. Its covariance includes the differences from the
+    others, weighted by their probabilities. Simulators may have no Earth's rate.
     """
 
     def fitted(earth: EarthRateModel) -> tuple[ParameterEstimate, list[str]]:
@@ -175,15 +176,15 @@ def _fit_over_earth_rates(
 
 
 class _SessionFit:
-    """One session's rows, to be laid to sets.
+    """Fits of several parameter sets to the rows of one session.
 
     Parameters
     ----------
-    observations : of the windows
-    asked : what for
-    method : that was chosen
-    recorded : its rows, if there are more than the means
-    earth : whose rate gyroscopes have
+    observations : means of the windows
+    asked : options
+    method : chosen method
+    recorded : rows of the recording; None if there are only means
+    earth : Earth's rate in the gyroscopes
 
     """
 
@@ -221,7 +222,7 @@ class _SessionFit:
         )
 
     def best_fit(self) -> tuple[ParameterEstimate, list[str]]:
-        """The set that fits, with remarks about the tilt."""
+        """The estimate with the model of the tilt that fits best, and remarks on it."""
         level, tilt = self.asked.level_deg, self.asked.tilt
         if self.method in ("scalar", "least_squares"):
             return self._fit("none"), []
@@ -235,13 +236,13 @@ class _SessionFit:
 
     @property
     def _other_tilt_deg(self) -> float:
-        """How large the other kind of tilt may be; nothing where one is asked for."""
+        """Possible size of the other kind of tilt, deg; 0 if one kind is requested."""
         return self.asked.beside_tilt_deg if self.asked.tilt == "auto" else 0.0
 
     def _fit(
         self, tilt: Tilt, level: float | None = None, follow: bool = True
     ) -> ParameterEstimate:
-        """A set with a model of the tilt; windows alone are to choose one by."""
+        """Fit with a model of the tilt; without `follow`, to windows alone."""
         turning = self.turn_integrator if follow else None
         observations, turned = self.observations, turning is not None
         table = bool(observations.rotating.any())
@@ -277,9 +278,9 @@ class _SessionFit:
         return best.with_model_uncertainty(best, found, 1 - float(as_stated))
 
     def _fit_best_tilt(self) -> tuple[ParameterEstimate, list[str]]:
-        """The model of the tilt that fits better, the other one being weighed in.
+        """Fit with the better model of the tilt; the covariance includes the other one.
 
-        Windows tell which; turns hardly add to that.
+        The windows decide: turns add little to the choice.
         """
         fits = {name: self._fit(name, follow=False) for name in TILTS}
         usable = {n: e for n, e in fits.items() if _determines_all(e)}
@@ -309,7 +310,7 @@ class _SessionFit:
     def _fit_all_rows(
         self, tilt: Tilt, by_windows: dict[Tilt, ParameterEstimate]
     ) -> ParameterEstimate:
-        """The set by all rows, where there are more than those it was chosen by."""
+        """Fit to all rows, if there are more than the windows used for the choice."""
         if self.turn_integrator is None and not self.recorded.explanations:
             return by_windows[tilt]
         return self._fit(tilt)
@@ -323,7 +324,7 @@ class _SessionFit:
 
 
 def _determines_all(found: ParameterEstimate) -> bool:
-    """Whether all of the accelerometers is determined, and the tilt with it."""
+    """Whether all parameters of the accelerometers and the tilt are determined."""
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False
     open_ = {group_of(n) for n in found.undetermined}

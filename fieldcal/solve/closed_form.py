@@ -76,7 +76,7 @@ def two_position(
 
 
 def printed_forces(observations: Observations) -> Array:
-    """Reference (5) as printed, in device axes, (n, 3) m/s^2; not for use."""
+    """Forces by (5) as printed, with its error, in device axes, (n, 3) m/s^2."""
     f = observations.forces @ observations.mounting.T
     f[:, 2] *= -1.0
     printed: Array = f @ observations.mounting

@@ -1,4 +1,4 @@
-"""Result of a printed formula: parameters that are linear in the means."""
+"""Estimate by a printed formula: parameters that are linear in the means."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fieldcal.solve.observations import Mask, Observations
 
 @dataclass(frozen=True, slots=True)
 class ClosedFormEstimate:
-    """Parameters with the windows' covariance carried through.
+    """Parameters with the covariance that follows from that of the windows.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class ClosedFormEstimate:
         observations: Observations,
         channels: slice,
     ) -> ClosedFormEstimate:
-        """Values by their derivatives (p, n, 3) by the means of a triad."""
+        """Make the estimate from derivatives (p, n, 3) by the means of a triad."""
         noise = observations.covariance[:, channels, channels]
         values = np.einsum("pnc,nc->p", gain, observations.mean[:, channels])
         covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)

@@ -29,7 +29,7 @@ from fieldcal.solve.estimation import ParameterEstimate
 
 @dataclass(frozen=True, slots=True)
 class CrossCouplingEffect:
-    """What cross-coupling that is left out does to the parameter it moves most.
+    """Effect of omitted cross-coupling on the parameter that it moves most.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class CrossCouplingEffect:
 
     @property
     def sentence(self) -> str:
-        """What it costs and what to do."""
+        """The size of the effect, and the remedy."""
         moved = f"{self.shift_per_unit / 1000:.2g} {self.unit}".removesuffix(" 1")
         return (
             f"cross-coupling {self._beyond}is taken as zero, and these positions"
@@ -91,9 +91,9 @@ def largest_cross_coupling_effect(
 
 
 def _added_sigma(found: ParameterEstimate, group: Group) -> Array:
-    """What an unknown group adds to each parameter, over its usual size.
+    """Uncertainty of each parameter from an unknown group, over its usual size.
 
-    Back comes (k,), 1 sigma, in units of the parameter.
+    Returns (k,), 1 sigma, in units of the parameter.
     """
     there = found.search.evaluated(found.parameter_set.members).state
     inner, _ = there.rest(group.columns, group.typical)

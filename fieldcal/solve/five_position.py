@@ -44,7 +44,7 @@ STEP = 1e-30
 
 @dataclass(frozen=True, slots=True)
 class AxisEstimates:
-    """What each procedure axis gives by itself.
+    """Estimates from each procedure axis alone.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ def five_position(
 
 
 def expansion(observations: Observations) -> tuple[Array, Array, Array]:
-    """Functions of the angles that each axis is expanded in, (n, 3 or 5) each."""
+    """Functions of the angles for the expansion of each axis, (n, 3 or 5) each."""
     a, b = observations.angles
     sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
     one = np.ones_like(a)

@@ -24,18 +24,18 @@ from fieldcal.model.search.selection import Search
 from fieldcal.solve.parameter_set import ParameterSet
 
 VERTICAL = 1
-"""Place of the vertical among the columns of the Earth's rate; it points down."""
+"""Index of the vertical in the columns of the Earth's rate; it points down."""
 
 
 @dataclass(frozen=True, slots=True)
 class VerticalEarthRate:
-    """The Earth's rate about the vertical, as gyroscopes show it.
+    """The Earth's rate about the vertical, as measured by the gyroscopes.
 
     Attributes
     ----------
-    stated : by the latitude, rad/s, upwards
+    stated : rate by the stated latitude, rad/s, upwards
     shown, sigma : rad/s
-    gain : ln of evidence times chance, for another latitude than the stated one
+    gain : log odds of another latitude against the stated one
 
     """
 
@@ -48,13 +48,13 @@ class VerticalEarthRate:
     def of(
         cls, parameter_set: ParameterSet, search: Search, latitude: float | None
     ) -> VerticalEarthRate | None:
-        """What the rows of a set show, (1); None where they have no such column.
+        """Measure by the rows of a set, (1); None if the set has no such column.
 
         Parameters
         ----------
-        given : the set
+        parameter_set : the set
         search : of its rows
-        latitude : that is stated, rad; None where none is
+        latitude : stated latitude, rad; None if none is stated
 
         """
         if parameter_set.earth < 0 or latitude is None:
@@ -75,12 +75,12 @@ class VerticalEarthRate:
 
     @property
     def other_favoured(self) -> bool:
-        """Whether the rows speak for another one at all, possible or not."""
+        """Whether the evidence favours another latitude, possible or not."""
         return self.gain > float(np.log(priors.ELSEWHERE))
 
     @property
     def latitude_wrong(self) -> bool:
-        """Whether it is likelier that of another latitude; what none has is no such."""
+        """Whether another latitude is probable, with a rate possible on the Earth."""
         beyond = abs(self.measured) - EARTH_RATE
         named = np.log(thresholds.NAMED / (1 - thresholds.NAMED))
         return self.gain > float(named) and beyond < 2 * self.sigma

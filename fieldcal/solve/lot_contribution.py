@@ -23,7 +23,7 @@ import numpy as np
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.mixture import covariance_of_means
@@ -103,8 +103,10 @@ class LotContribution:
         if name not in off:
             return "in what several parameters are together"
         i = self.lot.names.index(name)
-        own = " ± ".join(number(*self.own[name]))
-        usual = " ± ".join(number(float(self.lot.mean[i]), float(self.lot.sigma[i])))
+        own = " ± ".join(format_with_sigma(*self.own[name]))
+        usual = " ± ".join(
+            format_with_sigma(float(self.lot.mean[i]), float(self.lot.sigma[i]))
+        )
         unit = f" {_unit(name)}".rstrip()
         return f"{name} is {own}{unit}, where the lot has {usual}"
 
@@ -134,7 +136,7 @@ class LotContribution:
 
 
 def _unit(name: str) -> str:
-    return pretty(GROUPS[group_of(name)][2])
+    return format_unit(GROUPS[group_of(name)][2])
 
 
 def combine_with_lot(
@@ -150,7 +152,7 @@ def combine_with_lot(
     lot : prior from the lot
 
     """
-    lot = lot.only([n for n in found.names if n in own.parameter_set.names])
+    lot = lot.subset([n for n in found.names if n in own.parameter_set.names])
     if not lot.names:
         return own, None
     others = _OutlierHypotheses.of(own, lot)
@@ -159,7 +161,7 @@ def combine_with_lot(
         if others.outlier_probability > thresholds.NAMED
         else others.mixture_with(found)
     )
-    lot = lot.only(kept.names)
+    lot = lot.subset(kept.names)
     told = LotContribution(
         lot,
         others.outlier_probability,
@@ -252,10 +254,14 @@ def _hypothesis_priors(
 ) -> Iterator[tuple[str, float, Array]]:
     """Parameter, prior odds and P_h of each hypothesis."""
     yield ALL_PARAMETERS, 1.0, wide
-    more = lot.times**2 - 1
+    more = lot.outlier_factor**2 - 1
     for j, name in enumerate(lot.names):
         one = wide.copy()
         one[j, j] += more * wide[j, j]
-        yield name, float(lot.odd[j] / (1 - lot.odd[j])), one
-    odd = float(lot.odd.mean())
+        yield (
+            name,
+            float(lot.outlier_probability[j] / (1 - lot.outlier_probability[j])),
+            one,
+        )
+    odd = float(lot.outlier_probability.mean())
     yield ALL_PARAMETERS, odd / (1 - odd), (1 + more) * wide

@@ -195,7 +195,7 @@ class Observations:
             raise InputError("there is no position: mark at least two")
 
     def _check_numbers(self, sensor: str, three: slice) -> None:
-        # on a table that turns nothing is asked of the accelerometers
+        # accelerometers are not used while a rate table turns
         rows = np.flatnonzero(~self.rotating) if three == ACC else np.arange(len(self))
         mean = self.mean[rows, three]
         cov = self.covariance[rows, three, three]
@@ -217,7 +217,7 @@ class Observations:
 
 
 def _regularised(covariance: Array) -> Array:
-    """Drop correlations that a window is too short to know; they make it singular."""
+    """Drop correlations if they make the covariance of a short window singular."""
     out = covariance.copy()
     for three in (ACC, GYR):
         block = out[three, three]

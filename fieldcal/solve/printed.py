@@ -29,11 +29,11 @@ METHODS = ("two_position", "five_position")
 
 TWO = "as printed: the sign of (5) makes the scale factor of z negative"
 FIVE = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
-"""Said of the misprints of each method."""
+"""Warning about the misprints of each method."""
 
 
 def solve(observations: Observations, asked: SolveOptions) -> Calibration:
-    """Everything that the print gives.
+    """Calibration by the printed formulas.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def solve(observations: Observations, asked: SolveOptions) -> Calibration:
 
 
 def _check_supported(observations: Observations, asked: SolveOptions) -> None:
-    """Refuse what the paper prints no formula for."""
+    """Refuse methods and positions for which no formula is printed."""
     if asked.method not in ("auto", *METHODS):
         raise InputError(
             f"the paper prints no {asked.method} method: as printed are two_position"
@@ -101,7 +101,7 @@ def _check_supported(observations: Observations, asked: SolveOptions) -> None:
 
 
 def _gyroscopes(observations: Observations) -> ClosedFormEstimate:
-    """Bias, and what the positions or rates give besides."""
+    """Bias of the gyroscopes, and what positions or rates determine besides."""
     n = len(observations)
     if observations.rotating.any():
         return least_squares.gyroscopes(observations)
@@ -132,7 +132,7 @@ def _bias_and_scale_by_earth_rate(observations: Observations) -> ClosedFormEstim
 
 
 def printed_earth_rate(observations: Observations) -> Array:
-    """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
+    """Earth's rate by (40), (41) as printed, in procedure axes, (n, 3) rad/s."""
     a, b = observations.angles
     up, north = (EARTH_RATE * f(observations.known_latitude) for f in (np.sin, np.cos))
     third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha

@@ -1,4 +1,4 @@
-"""Parameters that a design determines, and further positions for the other ones.
+"""Parameters that a design determines, and positions that determine the others.
 
 Columns are scaled to length one, so that the rank does not depend on units; directions
 whose singular value is below `RCOND` of the largest are not determined, nor is a
@@ -30,7 +30,7 @@ LEAK = 1e-4
 """Share of a null direction above which a parameter counts as not determined."""
 
 MAX_POSITIONS = 4
-"""Positions that are proposed; of more, another procedure is the answer."""
+"""Largest number of proposed positions; beyond it another procedure is needed."""
 
 LADDER = tuple(
     Position.deg(a, b)
@@ -43,7 +43,7 @@ LADDER = tuple(
 def determined_parameters(rows: Array) -> tuple[Mask, int]:
     """Which parameters (p,) a design (m, p) determines, and its rank."""
     scale = np.linalg.norm(rows, axis=0)
-    # sin(180°) is not quite zero: what is left of such a column is rounding
+    # sin(180°) is not quite zero: such a column contains only rounding errors
     scale = np.where(scale > ROUNDING * scale.max(initial=0.0), scale, np.inf)
     _, s, vt = np.linalg.svd(rows / scale, full_matrices=True)
     rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())
@@ -88,7 +88,7 @@ def positions_to_add(
 def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]:
     """Names of the fewest positions of `LADDER` that would determine parameters.
 
-    Positions without angles say nothing that is linear in the parameters.
+    Positions without angles are ignored: they are not linear in the parameters.
     """
     known = [p for p in observations.positions if p.oriented]
 

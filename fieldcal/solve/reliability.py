@@ -33,15 +33,16 @@ JOINTS = ("α", "β")
 
 @dataclass(frozen=True, slots=True)
 class WrongAngles:
-    """A mistake of its largest size.
+    """A mistake of set angles at its largest size.
 
     Attributes
     ----------
     joint : index of the joint
-    angle_deg : that is wrong wherever it is set; None of a position alone or a gauge
-    position : number of the one that is wrong, from 0; None of several
-    shows : l of (1)
-    moves : d t of (1) by full name
+    angle_deg : angle that is wrong wherever it is set; None for a single position, or
+        for all angles in proportion
+    position : number of the single wrong position, from 0; None for several
+    shows : l of (1), how well the mistake shows
+    moves : d t of (1), shift of each parameter by full name
 
     """
 
@@ -63,7 +64,7 @@ class WrongAngles:
         return f"every {name} set {priors.GAUGE:.1%} too far"
 
     def error_at(self, alpha: float, beta: float) -> tuple[float, float]:
-        """What the same mistake makes of another position's angles, rad."""
+        """Error of the angles of another position by the same mistake, rad."""
         angle = (alpha, beta)[self.joint]
         off = 0.0
         if self.position is None and self.angle_deg is None:
@@ -93,13 +94,13 @@ class WrongAngles:
 def wrong_angles(
     parameter_set: ParameterSet, found: Mixture, names: tuple[str, ...], picked: Array
 ) -> list[WrongAngles]:
-    """Mistakes of the angles of a set.
+    """Effects of all possible mistakes of angles on an estimate.
 
     Parameters
     ----------
-    given, found : the set and its estimate
+    parameter_set, found : the set and its posterior
     names : (k,) parameters
-    picked : (k, c) each of them by the columns of the estimate
+    picked : (k, c) derivative of the parameters by the columns of the estimate
 
     """
     own = [
@@ -127,7 +128,7 @@ def wrong_angles(
 def _mistakes(
     parameter_set: ParameterSet, places: Index
 ) -> Iterator[tuple[int, float | None, int | None, Array]]:
-    """Joint, angle, position and what each angle is off by, (2 p,) rad."""
+    """Joint, angle, position and errors of all angles, (2 p,) rad, of each mistake."""
     x = parameter_set.x
     rows = [int(np.argmax(x.position == p)) for p in places]
     for joint, angles in enumerate((x.alpha[rows], x.beta[rows])):

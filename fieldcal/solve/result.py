@@ -1,4 +1,4 @@
-"""An estimated set as a calibration, with its warnings."""
+"""Makes a calibration with warnings from an estimate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.names import group_of, sensor_of
-from fieldcal.calibration.plausible import elsewhere, senseless
+from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.errors import NotObservable
 from fieldcal.model import thresholds
 from fieldcal.solve import words
@@ -43,7 +43,7 @@ def build_calibration(
     notes: Sequence[str],
     told: LotContribution | None = None,
 ) -> Calibration:
-    """Put an estimate into a calibration.
+    """Make a calibration from an estimate.
 
     Raises
     ------
@@ -73,8 +73,8 @@ def build_calibration(
         )
     of_acc = any(map(_is_acc, names))
     odd = [
-        *senseless(names, found.values, sigma, observations.nominal),
-        *elsewhere(_turn_names(found.contradicted_turns, observations)),
+        *implausible_values(names, found.values, sigma, observations.nominal),
+        *misdirected_turns(_turn_names(found.contradicted_turns, observations)),
         *_wrong_latitude(found, observations),
         *contradiction_warnings(observations, found, of_acc),
     ]
@@ -111,7 +111,7 @@ def _turn_names(
 
 
 def _wrong_latitude(found: ParameterEstimate, observations: Observations) -> list[str]:
-    """A latitude that the gyroscopes contradict."""
+    """Sentence if the gyroscopes contradict the stated latitude."""
     shown = VerticalEarthRate.of(
         found.parameter_set, found.search, observations.latitude
     )
@@ -130,7 +130,7 @@ def _is_harmful(wrong: WrongAngles, found: ParameterEstimate) -> bool:
 def _carried_info(
     observations: Observations, found: ParameterEstimate
 ) -> dict[str, Any]:
-    """What the set has that was not asked for, and what that does."""
+    """Unrequested causes in the set, and their effects on the parameters."""
     moved = dict(zip(found.names, found.shift_sigmas.tolist(), strict=True))
     out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
     if found.valid_at_s is not None:

@@ -1,4 +1,4 @@
-"""Rows of windows of which only the means are known, one row for each.
+"""Rows of windows of which only the means are known: one row for each window.
 
 A recording has several rows for each window (`model.reduce`). A table of means, and a
 procedure that is still running, have only the means and their covariances.
@@ -64,9 +64,9 @@ def rows_of_means(observations: Observations) -> RecordedRows:
 
 
 def without_angles(rows: Rows, nominal: Nominal) -> Rows:
-    """Rows of which nobody says how the device lay: the force is along what is read.
+    """Rows with unknown orientation: the force is along the measured one.
 
-    Where a table turns, or the accelerometers say nothing, it stays as it is.
+    Rows on a turning table, or without accelerometers, keep their force.
     """
     x, nowhere = rows.x, np.full(len(rows.x), np.nan)
     apart = (rows.y[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
@@ -77,10 +77,10 @@ def without_angles(rows: Rows, nominal: Nominal) -> Rows:
 
 
 def mean_variances(observations: Observations) -> Array:
-    """Of the means, (n, 6); of windows whose orientation is free along the force alone.
+    """Variances of the means, (n, 6).
 
-    A device that turns a little at rest, as in a hand, is unsteady across it, and that
-    its free orientation takes up.
+    If the orientation is unknown, that along the force is taken for all three axes: the
+    motion of a device held in a hand is across it, and changes only the orientation.
     """
     out: Array = np.einsum("nii->ni", observations.covariance).copy()
     free = ~observations.oriented & np.isfinite(observations.mean[:, ACC]).all(axis=1)
@@ -92,10 +92,9 @@ def mean_variances(observations: Observations) -> Array:
 
 
 def with_window_variances(rows: Rows, known: Array) -> Rows:
-    """Rows whose windows' means are as uncertain as each window's spectrum says.
+    """Rows whose windows have means of given variances `known`, (p, 6).
 
-    `known` (p, 6) are the variances; what they are beyond white noise all rows of a
-    window share.
+    The part beyond white noise is an error that all rows of a window have in common.
     """
     common = rows.common.copy()
     for p in np.unique(rows.x.position):
@@ -108,7 +107,7 @@ def with_window_variances(rows: Rows, known: Array) -> Rows:
 
 
 def _earth_rate_at_rest(observations: Observations) -> float:
-    """Length of the rate at rest, rad/s; 0 where the gyroscopes do not see it."""
+    """Size of the angular rate at rest, rad/s; 0 if gyroscopes do not resolve it."""
     if observations.grade != "navigation":
         return 0.0
     if observations.latitude is None:
@@ -118,9 +117,9 @@ def _earth_rate_at_rest(observations: Observations) -> float:
 
 
 def _measured_force(observations: Observations) -> Array:
-    """Force along what the accelerometers read, (n, 3) m/s^2.
+    """Force along the measured one, (n, 3) m/s^2.
 
-    Any direction will do where they say nothing.
+    The direction is arbitrary where it was not measured.
     """
     nominal = observations.nominal
     apart = (observations.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
@@ -129,6 +128,6 @@ def _measured_force(observations: Observations) -> Array:
 
 
 def unknown_earth_rate(scale: Array | tuple[float, ...]) -> Array:
-    """What the Earth's rate adds where orientations are not known, (3,) outputs."""
+    """Error from the Earth's rate in unknown orientations, 1 sigma, (3,) outputs."""
     size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
     return size

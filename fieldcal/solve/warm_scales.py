@@ -24,23 +24,23 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 
 ACC = 3
-"""Outputs of accelerometers, the first ones of all."""
+"""Number of outputs of accelerometers; they come first."""
 
 WARM_SCALE = "warm_scale"
-"""What these groups are called."""
+"""Name of these groups."""
 
 COURSES = ("time", "temperature")
-"""Functions without physics that may be the temperature's."""
+"""Functions without physics that may be an effect of the temperature."""
 
 
 def warm_scale(table: ColumnTable, group: Group) -> Member | None:
-    """What changes the scale factors beside a group that changes the biases.
+    """Change of scale factors that accompanies a group that changes biases.
 
     Parameters
     ----------
     table : to which the columns are added
-    group : none comes back unless it may follow the temperature and is on
-        accelerometers
+    group : the result is None unless the group may be an effect of the temperature and
+        is on accelerometers
 
     """
     if not _thermal(group):
@@ -67,7 +67,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
 
 
 def _thermal(group: Group) -> bool:
-    """Whether it may be the temperature that makes a group."""
+    """Whether a group may be an effect of the temperature."""
     effect = group.effect
     if effect is None:
         return group.cause in COURSES
@@ -75,9 +75,9 @@ def _thermal(group: Group) -> bool:
 
 
 def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
-    """Courses of a group's columns, which of them, and how large biases are by each.
+    """Course of a group, its columns on accelerometers, and sizes of the biases.
 
-    Those on accelerometers alone, m/s^2.
+    Sizes are in m/s^2.
     """
     first, basis = next(
         (first, basis)

@@ -1,4 +1,4 @@
-"""Warnings about a calibration: what is undetermined, unchecked, or scatters much.
+"""Warnings about a calibration: undetermined parameters, missing checks, scatter.
 
 Each is one sentence that also says what to do.
 """
@@ -85,7 +85,7 @@ def _force_length_warning(observations: Observations) -> str:
 
 
 def _remedy(observations: Observations, found: ParameterEstimate) -> list[str]:
-    """Positions that would determine them."""
+    """Positions that would determine parameters of the accelerometers."""
     names = [n for n in found.parameter_set.names if group_of(n) in OF_ACC]
     if any(n in found.undetermined for n in names) and not observations.rotating.any():
         return ladder_remedy(observations, names)
@@ -164,7 +164,7 @@ def agreement_warnings(
 def contradiction_warnings(
     observations: Observations, found: ParameterEstimate, of_acc: bool
 ) -> list[str]:
-    """A fit of forces, or of rates, in which the model is at fault, not the noise."""
+    """Warning if forces or rates contradict each other: noise cannot explain it."""
     fit, first = (found.acc, 0) if of_acc else (found.gyr, 3)
     if not fit.rejects_model:
         return []

@@ -26,11 +26,11 @@ IN_WORDS = {
     "misset": "a position that was set at another angle",
     "repeated_angle": "an angle that is wrong wherever it is set",
 }
-"""What is no effect, by its id."""
+"""Words for causes that are not effects, by id."""
 
 
 def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> str:
-    """Name parameters that the data leave open, and what would fix it."""
+    """Sentence about parameters that are not determined, with the remedy."""
     verb = "are" if len(missing) > 1 else "is"
     cure = f": add {join(remedy)}" if remedy else ""
     return f"{join(missing)} {verb} not determined by {what}{cure}"
@@ -67,7 +67,7 @@ def effects_warning(
     moved: Array,
     ended_s: float | None,
 ) -> str:
-    """Warning of effects that a result contains unasked; empty if they are unlikely.
+    """Warning of unrequested effects in a result; empty if they are unlikely.
 
     Parameters
     ----------

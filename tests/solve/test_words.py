@@ -6,7 +6,7 @@ from observed import BIAS, COUPLING, G, observe, outputs
 from scipy.stats import chi2 as chi_square
 
 from fieldcal.calibration import Nominal
-from fieldcal.calibration.plausible import senseless
+from fieldcal.calibration.plausible import implausible_values
 from fieldcal.core.positions import FIVE, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
@@ -57,11 +57,14 @@ def test_an_axis_that_does_not_follow_is_said() -> None:
 def test_numbers_are_only_called_senseless_when_they_are_sure() -> None:
     names, plain = ["acc_scale.x", "acc_bias.y", "gyr_scale.z"], Nominal()
     values = np.array([1.4, 6.0, 0.05])
-    sure = senseless(names, values, np.full(3, 1e-3), plain)
+    sure = implausible_values(names, values, np.full(3, 1e-3), plain)
     assert [s.partition(" ")[0] for s in sure] == names
-    unsure = senseless(names[:2], values[:2], np.array([0.08, 1.3]), plain)
+    unsure = implausible_values(names[:2], values[:2], np.array([0.08, 1.3]), plain)
     assert unsure == []
-    assert senseless(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain) == []
+    assert (
+        implausible_values(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain)
+        == []
+    )
 
 
 @pytest.mark.parametrize(("chi2", "dof"), [(3.0, 1), (12.0, 7), (60.0, 20)])

@@ -53,7 +53,7 @@ VIRTUAL = "virtual"
 
 
 def unnoticed_angle_error(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     verification: Verification | None,
@@ -63,17 +63,17 @@ def unnoticed_angle_error(
     if about.angles_from or _set_by_program(about):
         return ""
     worst, part, most, sigmas = None, UNSEEN, "", 0.0
-    for each in found.info.get("wrong_angles", ()):
+    for each in calibration.info.get("wrong_angles", ()):
         wrong = WrongAngles.from_json(each)
         shows = float(
             np.sqrt(
                 wrong.shows**2
                 + _shown_by_verification(wrong, verification)
-                + _shown_by_family(wrong, found, limits, family)
+                + _shown_by_family(wrong, calibration, limits, family)
             )
         )
         off = {
-            n: abs(d) / found.uncertainty(n)
+            n: abs(d) / calibration.uncertainty(n)
             for n, d in wrong.moves.items()
             if limits.sigma(group_of(n)) is not None
         }
@@ -91,16 +91,16 @@ def unnoticed_angle_error(
     )
 
 
-def angle_error_explaining(found: Calibration, off: Mapping[str, float]) -> str:
+def angle_error_explaining(calibration: Calibration, off: Mapping[str, float]) -> str:
     """Unnoticed mistake of an angle that could explain a change, in words; else empty.
 
     Parameters
     ----------
-    found : the calibration
+    calibration : the calibration
     off : difference of each parameter from nominal, by full name
 
     """
-    for each in found.info.get("wrong_angles", ()):
+    for each in calibration.info.get("wrong_angles", ()):
         wrong = WrongAngles.from_json(each)
         for name, size in off.items():
             most = abs(wrong.moves.get(name, 0.0))
@@ -131,10 +131,10 @@ def unstated_angles_warning(about: Description) -> str:
 
 
 def angles_are_stated(
-    found: Calibration, about: Description, limits: GradeLimits
+    calibration: Calibration, about: Description, limits: GradeLimits
 ) -> bool:
     """Whether the uncertainty of angles is stated, in the session or as an option."""
-    used = float(found.info.get("angle_sigma_deg") or 0.0)
+    used = float(calibration.info.get("angle_sigma_deg") or 0.0)
     return about.angle_setting_deg is not None or used < limits.angle_setting_deg
 
 
@@ -154,7 +154,7 @@ def _shown_by_verification(
 
 def _shown_by_family(
     wrong: WrongAngles,
-    found: Calibration,
+    calibration: Calibration,
     limits: GradeLimits,
     family: Sequence[Calibration] | None,
 ) -> float:
@@ -170,5 +170,5 @@ def _shown_by_family(
             np.array([c.uncertainty(name) for c in earlier]),
             repeat,
         )
-        seen.append((moved / usual.sigma(found.uncertainty(name))) ** 2)
+        seen.append((moved / usual.sigma(calibration.uncertainty(name))) ** 2)
     return max(seen)

@@ -39,7 +39,7 @@ from fieldcal.windows.dead_axis import broken
 
 
 def assess(
-    found: Calibration,
+    calibration: Calibration,
     session: Session,
     windows: UsableWindows,
     limits: GradeLimits,
@@ -49,7 +49,7 @@ def assess(
 
     Parameters
     ----------
-    found : calibration of the session
+    calibration : calibration of the session
     session : the recording
     windows : its usable windows
     limits : limits of the device's grade
@@ -57,7 +57,7 @@ def assess(
 
     """
     marks = list(session.marks())
-    warnings = list(found.warnings)
+    warnings = list(calibration.warnings)
     earlier: WarmedFamily | None = None
     usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
@@ -66,15 +66,15 @@ def assess(
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
             usual = family(runs)
-            earlier = family_at_temperature(found, usual, limits)
+            earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
     dead = broken(session.block.six)
-    taken_out = _removed_biases(found, session, windows, limits)
+    taken_out = _removed_biases(calibration, session, windows, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in windows.averages],
         link=_link(session, windows.averages, marks),
-        verification=_verification(found, session, marks, limits),
+        verification=_verification(calibration, session, marks, limits),
         family=earlier.calibrations if earlier else None,
         temperature_sigma=earlier.sigma if earlier else {},
         doubts=[*_insisted_positions(marks), *dead, *taken_out],
@@ -82,39 +82,47 @@ def assess(
         held_positions=[session.about.positions[i] for i in windows.position_numbers],
     )
     warnings += [w for w in _restart_warnings(marks) if w not in warnings]
-    made = decide(found, session.about, limits, circumstances)
+    made = decide(calibration, session.about, limits, circumstances)
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
-    info = {**found.info, "site": site, "taken_at": start_time(marks)}
-    if (costs := effect_of_temperature_change(found, usual, limits)) is not None:
+    info = {**calibration.info, "site": site, "taken_at": start_time(marks)}
+    if (costs := effect_of_temperature_change(calibration, usual, limits)) is not None:
         info["temperature_change"] = costs
-    return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
+    return with_decision(
+        replace(calibration, warnings=tuple(warnings), info=info), made
+    )
 
 
 def with_faults(
-    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> Calibration:
     """The calibration without a decision, with warnings about faults of the session.
 
     A recording from elsewhere need not meet limits, so there is no GO. Missing facts
     are warnings; wrong facts make the calibration bad.
     """
-    about, of_acc = session.about, "acc_scale" in found.groups
+    about, of_acc = session.about, "acc_scale" in calibration.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
     wrong += [
-        _undetermined_by_omission(found, session, windows, limits),
+        _undetermined_by_omission(calibration, session, windows, limits),
         *broken(session.block.six),
     ]
-    wrong += [bias_jump_warning(found, limits)]
-    wrong += _removed_biases(found, session, windows, limits)
+    wrong += [bias_jump_warning(calibration, limits)]
+    wrong += _removed_biases(calibration, session, windows, limits)
     wrong = [w for w in wrong if w]
-    warnings = (*wrong, *found.warnings, *filter(None, unknown))
-    return replace(found, warnings=warnings, good=found.good and not wrong)
+    warnings = (*wrong, *calibration.warnings, *filter(None, unknown))
+    return replace(calibration, warnings=warnings, good=calibration.good and not wrong)
 
 
 def _undetermined_by_omission(
-    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> str:
     """Sentence about parameters that are undetermined because positions were left out.
 
@@ -126,8 +134,8 @@ def _undetermined_by_omission(
     lost = [
         f"{group}.{axis}"
         for group in ("acc_bias", "acc_scale")
-        if group in found.groups
-        for axis, s in zip("xyz", found.vector(group)[1], strict=True)
+        if group in calibration.groups
+        for axis, s in zip("xyz", calibration.vector(group)[1], strict=True)
         if not s < (limits.tolerance(group) or np.inf)
     ]
     if not out or not lost:
@@ -142,23 +150,28 @@ def _undetermined_by_omission(
 
 
 def _removed_biases(
-    found: Calibration, session: Session, windows: UsableWindows, limits: GradeLimits
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> list[str]:
     """Sentences if biases of the size found were subtracted from the recording."""
     held = windows.at_rest(session).averages
-    seen = np.nan_to_num(found.vector("acc_bias")[0])
+    seen = np.nan_to_num(calibration.vector("acc_bias")[0])
     gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
     repeat = limits.acc_bias_repeat, gyroscopes
     return removed_bias_sentences(held, session.block, repeat, seen, limits.fit_chance)
 
 
-def store_in_history(history: History, session: Session, found: Calibration) -> str:
+def store_in_history(
+    history: History, session: Session, calibration: Calibration
+) -> str:
     """Store a calibration in the history; returns a sentence for the operator."""
     if not session.about.device.get("serial"):
         return ""
-    at = str(found.info.get("taken_at") or start_time([]))
+    at = str(calibration.info.get("taken_at") or start_time([]))
     try:
-        history.add(at, session.folder, found)
+        history.add(at, session.folder, calibration)
     except FieldcalError as error:
         return f"the calibration is not stored in the history: {error}"
     return ""
@@ -184,7 +197,7 @@ def verification_window(
 
 
 def _verification(
-    found: Calibration,
+    calibration: Calibration,
     session: Session,
     marks: Sequence[Mapping[str, Any]],
     limits: GradeLimits,
@@ -198,7 +211,7 @@ def _verification(
     except FieldcalError:
         return None
     angle = float(np.deg2rad(limits.angle_setting_deg))
-    return verify(found, session.about, position, held, angle)
+    return verify(calibration, session.about, position, held, angle)
 
 
 def _link(

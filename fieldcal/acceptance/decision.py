@@ -97,7 +97,7 @@ class Circumstances:
 
 
 def decide(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
@@ -105,19 +105,19 @@ def decide(
     """Check a calibration against limits."""
     verification = _verification_check(circumstances.verification, limits)
     checks = [
-        _fit_check(found, limits),
-        *_examination_checks(found),
-        *_doubtful_position_checks(found, verification.ok is True),
-        *_gyroscope_checks(found, limits),
-        *_turn_checks(found, limits),
-        *_jump_checks(found, limits),
-        *_angle_checks(found, about, limits, circumstances),
-        *check_factory_errors(found, about, limits),
-        *check_level(found, about),
-        *check_uncertainty(found, about, limits, circumstances.windows),
-        *_site_checks(found, about),
+        _fit_check(calibration, limits),
+        *_examination_checks(calibration),
+        *_doubtful_position_checks(calibration, verification.ok is True),
+        *_gyroscope_checks(calibration, limits),
+        *_turn_checks(calibration, limits),
+        *_jump_checks(calibration, limits),
+        *_angle_checks(calibration, about, limits, circumstances),
+        *check_factory_errors(calibration, about, limits),
+        *check_level(calibration, about),
+        *check_uncertainty(calibration, about, limits, circumstances.windows),
+        *_site_checks(calibration, about),
         *check_change(
-            found, limits, circumstances.family, circumstances.temperature_sigma
+            calibration, limits, circumstances.family, circumstances.temperature_sigma
         ),
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
@@ -125,19 +125,19 @@ def decide(
         *(Check("the run", False, doubt) for doubt in circumstances.doubts),
     ]
     g, mounting = about.gravity, about.mounting
-    grown = tuple(growth(found, g, mounting, seconds) for seconds in TIMES)
+    grown = tuple(growth(calibration, g, mounting, seconds) for seconds in TIMES)
     made = Decision(tuple(checks), grown)
     return (
         made
         if made.go
         else replace(
-            made, remedy=_find_remedy(found, about, limits, circumstances, checks)
+            made, remedy=_find_remedy(calibration, about, limits, circumstances, checks)
         )
     )
 
 
 def _find_remedy(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
@@ -164,10 +164,10 @@ def _find_remedy(
         float(np.ceil(seconds)),
         circumstances.held_positions or about.positions,
     )
-    return cheapest_remedy(found, about, held, limits, failed, sigma, length)
+    return cheapest_remedy(calibration, about, held, limits, failed, sigma, length)
 
 
-def with_decision(found: Calibration, made: Decision) -> Calibration:
+def with_decision(calibration: Calibration, made: Decision) -> Calibration:
     """The calibration with the decision in its `info`."""
     decision: dict[str, Any] = {
         "go": made.go,
@@ -178,25 +178,29 @@ def with_decision(found: Calibration, made: Decision) -> Calibration:
         decision["remedy"] = made.remedy.to_json()
     expectation = [each.to_json() for each in made.growth]
     more = {"decision": decision, "expectation": expectation}
-    return replace(found, info={**found.info, **more})
+    return replace(calibration, info={**calibration.info, **more})
 
 
-def _fit_check(found: Calibration, limits: GradeLimits) -> Check:
-    if not found.good:
-        return Check("fit", False, "the estimate is bad: " + _first_warning(found))
-    if found.dof <= 0 or not np.isfinite(found.chi2):
+def _fit_check(calibration: Calibration, limits: GradeLimits) -> Check:
+    if not calibration.good:
+        return Check(
+            "fit", False, "the estimate is bad: " + _first_warning(calibration)
+        )
+    if calibration.dof <= 0 or not np.isfinite(calibration.chi2):
         return Check("fit", None, "no degree of freedom is left to check the fit")
-    return _agreement_check("fit", "positions", found.chi2, found.dof, found, limits)
+    return _agreement_check(
+        "fit", "positions", calibration.chi2, calibration.dof, calibration, limits
+    )
 
 
-def _gyroscope_checks(found: Calibration, limits: GradeLimits) -> list[Check]:
+def _gyroscope_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
     """Check the agreement of the gyroscopes' means, if accelerometers were measured."""
-    gyr = found.info.get("gyroscopes", {})
+    gyr = calibration.info.get("gyroscopes", {})
     chi2, dof = float(gyr.get("chi2", 0.0)), int(gyr.get("dof", 0))
-    if dof <= 0 or "acc_bias" not in found.groups:
+    if dof <= 0 or "acc_bias" not in calibration.groups:
         return []
     what = "gyroscopes at rest"
-    return [_agreement_check("gyroscopes", what, chi2, dof, found, limits, "gyr")]
+    return [_agreement_check("gyroscopes", what, chi2, dof, calibration, limits, "gyr")]
 
 
 def _agreement_check(
@@ -204,7 +208,7 @@ def _agreement_check(
     what: str,
     chi2: float,
     dof: int,
-    found: Calibration,
+    calibration: Calibration,
     limits: GradeLimits,
     sensor: str = "acc",
 ) -> Check:
@@ -217,15 +221,15 @@ def _agreement_check(
         f" {dof} degrees of freedom, probability {chance:.2g}, required"
         f" {limits.fit_chance:.2g}"
     )
-    if not agree and (small := harmless_scatter_note(found, limits, sensor)):
+    if not agree and (small := harmless_scatter_note(calibration, limits, sensor)):
         says += f"; {small}"
         agree = True
     return Check(name, agree, says, chance, limits.fit_chance, "1")
 
 
-def _examination_checks(found: Calibration) -> list[Check]:
+def _examination_checks(calibration: Calibration) -> list[Check]:
     """NO-GO if only means were used: samples and turns might contradict them."""
-    why = found.info.get("unexamined")
+    why = calibration.info.get("unexamined")
     if not why:
         return []
     says = (
@@ -235,29 +239,32 @@ def _examination_checks(found: Calibration) -> list[Check]:
     return [Check("recording", False, says)]
 
 
-def _doubtful_position_checks(found: Calibration, verified: bool) -> list[Check]:
+def _doubtful_position_checks(calibration: Calibration, verified: bool) -> list[Check]:
     """Report a doubtful position; NO-GO if too few others confirm the result."""
-    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
     checks = [Check("positions", None, doubt.sentence)] if doubt else []
-    if verified or not rejected_positions(found):
+    if verified or not rejected_positions(calibration):
         return checks
-    return [*checks, Check("witnesses", has_witnesses(found), witness_sentence(found))]
+    return [
+        *checks,
+        Check("witnesses", has_witnesses(calibration), witness_sentence(calibration)),
+    ]
 
 
-def _turn_checks(found: Calibration, limits: GradeLimits) -> list[Check]:
+def _turn_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
     """Check whether the turns measured by the gyroscopes agree with the positions."""
-    apart = turn_disagreement(found, limits)
+    apart = turn_disagreement(calibration, limits)
     return [Check("turns", False, apart)] if apart else []
 
 
-def _jump_checks(found: Calibration, limits: GradeLimits) -> list[Check]:
+def _jump_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
     """Check whether biases jump as if another device had been recorded."""
-    far = bias_jump_warning(found, limits)
+    far = bias_jump_warning(calibration, limits)
     return [Check("jump", False, far)] if far else []
 
 
 def _angle_checks(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
@@ -267,25 +274,25 @@ def _angle_checks(
     if about.angles_from:
         says = f"the angles are certified by {one_line(about.angles_from)}"
         return [Check(ANGLES, True, says)]
-    unseen = unnoticed_angle_error(found, about, limits, *given)
+    unseen = unnoticed_angle_error(calibration, about, limits, *given)
     if not unseen:
         return []
-    if not angles_are_stated(found, about, limits):
+    if not angles_are_stated(calibration, about, limits):
         return [Check(ANGLES, False, f"{unseen}; {ANGLES_REMEDY}")]
-    said = found.info.get("angle_sigma_deg") or 0.0
-    shown = "angles_stated_deg" in found.info
+    said = calibration.info.get("angle_sigma_deg") or 0.0
+    shown = "angles_stated_deg" in calibration.info
     how = "as the recording shows" if shown else "as stated"
     relied = f"the result relies on angles set to ± {said:.2g}°, {how}: {unseen}"
     return [Check(ANGLES, None, relied)]
 
 
-def _first_warning(found: Calibration) -> str:
-    return found.warnings[0] if found.warnings else "see the fit"
+def _first_warning(calibration: Calibration) -> str:
+    return calibration.warnings[0] if calibration.warnings else "see the fit"
 
 
-def _site_checks(found: Calibration, about: Description) -> list[Check]:
+def _site_checks(calibration: Calibration, about: Description) -> list[Check]:
     """Check whether gravity is known: the scale factors refer to it."""
-    if "acc_scale" not in found.groups:
+    if "acc_scale" not in calibration.groups:
         return []
     wrong = gravity_unknown(about) or gravity_contradicted(about)
     return [Check("site", False, wrong)] if wrong else []

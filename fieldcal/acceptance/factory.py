@@ -23,32 +23,32 @@ DEG_H = math.radians(1) / 3600
 """rad/s of one degree an hour."""
 
 
-def factory_errors_used(found: Calibration) -> FactoryErrors:
+def factory_errors_used(calibration: Calibration) -> FactoryErrors:
     """Sizes of factory errors that a result was made with, from its `info`."""
     keys = (
         "square_sigma", "quadratic_sigma", "g_sensitivity_sigma",
         "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma", "acc_hysteresis_sigma",
     )  # fmt: skip
-    return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
+    return FactoryErrors(*(float(calibration.info.get(key) or 0.0) for key in keys))
 
 
 def check_factory_errors(
-    found: Calibration, about: Description, limits: GradeLimits
+    calibration: Calibration, about: Description, limits: GradeLimits
 ) -> list[Check]:
     """Report the assumed sizes of errors that were not estimated."""
-    return list(_factory_checks(found, about, limits))
+    return list(_factory_checks(calibration, about, limits))
 
 
 def _factory_checks(
-    found: Calibration, about: Description, limits: GradeLimits
+    calibration: Calibration, about: Description, limits: GradeLimits
 ) -> Iterator[Check]:
-    left, usual = factory_errors_used(found), limits.factory
-    measured = {sensor_of(group_of(n)) for n in found.names}
+    left, usual = factory_errors_used(calibration), limits.factory
+    measured = {sensor_of(group_of(n)) for n in calibration.names}
     of_grade = "as usual for the grade"
-    if shows := found.info.get("grade_shown"):
+    if shows := calibration.info.get("grade_shown"):
         usual = read(shows["grade"]).factory
         of_grade = f"as usual for {shows['grade']} grade"
-        yield _coarser_grade_check(found, about, shows)
+        yield _coarser_grade_check(calibration, about, shows)
 
     def whose(kind: str, said: float | None = None) -> str:
         size = getattr(left, kind)
@@ -113,7 +113,7 @@ def _warm_up_check(
 
 
 def _coarser_grade_check(
-    found: Calibration, about: Description, shows: Mapping[str, str]
+    calibration: Calibration, about: Description, shows: Mapping[str, str]
 ) -> Check:
     """Report a device that is not as good as its grade.
 
@@ -124,8 +124,8 @@ def _coarser_grade_check(
     for name in shows["beyond"]:
         parameter = ParameterName.of(name)
         usual = about.sent[parameter.group][parameter.axis]
-        off[name] = abs(found.value(name) - float(usual))
-    if angle := angle_error_explaining(found, off):
+        off[name] = abs(calibration.value(name) - float(usual))
+    if angle := angle_error_explaining(calibration, off):
         says = (
             f"{shows['because']}, which no device of {about.grade} grade has, or it is"
             f" {angle}: nothing in the recording tells which; record that position"

@@ -46,18 +46,18 @@ class WarmedFamily:
 
 
 def family_at_temperature(
-    found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
+    calibration: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
 ) -> WarmedFamily:
     """Earlier calibrations at the temperature of the present one, (1), (2).
 
     Parameters
     ----------
-    found : the present calibration
+    calibration : the present calibration
     earlier : calibrations that it is compared with, oldest first
     limits : limits of its grade
 
     """
-    now = as_thermal_point("now", found)
+    now = as_thermal_point("now", calibration)
     points = [as_thermal_point(run.taken_at, run.calibration) for run in earlier]
     known = [p for p in points if p is not None]
     if now is None or all(

@@ -21,12 +21,12 @@ SHARE = 0.1
 
 
 def harmless_scatter_note(
-    found: Calibration, limits: GradeLimits, sensor: str = "acc"
+    calibration: Calibration, limits: GradeLimits, sensor: str = "acc"
 ) -> str:
     """Part of a sentence: why a misfit does not matter; empty if it may matter."""
-    of = found.info if sensor == "acc" else found.info["gyroscopes"]
+    of = calibration.info if sensor == "acc" else calibration.info["gyroscopes"]
     scatter, unit = of.get("extra_scatter"), "m/s²" if sensor == "acc" else "rad/s"
-    doubt = max(found.info.get("bad_position", ()), default=0.0)
+    doubt = max(calibration.info.get("bad_position", ()), default=0.0)
     most = SHARE * (limits.sigma(f"{sensor}_bias") or 0.0)
     if scatter is None or not 0 < scatter <= most or doubt >= thresholds.SUSPECT:
         return ""

@@ -17,9 +17,9 @@ from fieldcal.calibration.names import group_of
 from fieldcal.core.chances import chi2_tail
 
 
-def bias_jump_warning(found: Calibration, limits: GradeLimits) -> str:
+def bias_jump_warning(calibration: Calibration, limits: GradeLimits) -> str:
     """Sentence if biases jump by more than from run to run; else empty."""
-    jump = found.info.get("jump")
+    jump = calibration.info.get("jump")
     if not jump:
         return ""
     far = {}

@@ -31,10 +31,10 @@ OTHER = {"angle_offset": "a tilt of the base", "base_tilt": "offsets of the join
 """The other kind of tilt, by the kind that a result contains."""
 
 
-def tilt_is_found(found: Calibration) -> bool:
+def tilt_is_found(calibration: Calibration) -> bool:
     """Whether the tilt is a parameter of the result, or has no effect on it."""
-    tilted = {"angle_offset", "base_tilt"} & set(found.groups)
-    return bool(tilted) or found.method == "scalar"
+    tilted = {"angle_offset", "base_tilt"} & set(calibration.groups)
+    return bool(tilted) or calibration.method == "scalar"
 
 
 def level_missing(about: Description) -> str:
@@ -53,13 +53,13 @@ def level_unknown(about: Description) -> str:
     return level_missing(about) if known <= BLIND and about.level_deg is None else ""
 
 
-def check_level(found: Calibration, about: Description) -> list[Check]:
+def check_level(calibration: Calibration, about: Description) -> list[Check]:
     """Check whether the level of the base is known: an unknown tilt acts as a bias.
 
     A stated level that the positions contradict fails.
     """
-    shown = found.info.get("tilt_shown")
-    level = found.info.get("level_sigma_deg")
+    shown = calibration.info.get("tilt_shown")
+    level = calibration.info.get("level_sigma_deg")
     if shown and chi2_tail(shown["chi2"], shown["dof"]) < DOUBTED:
         says = (
             f"the base is level to ± {level:.2g}°, as stated, but the positions show a"
@@ -68,17 +68,17 @@ def check_level(found: Calibration, about: Description) -> list[Check]:
             " leave the statement out (--level, level_deg), and the tilt is estimated"
         )
         return [Check("level", False, says)]
-    if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return list(_other_tilt_checks(found))
+    if tilt_is_found(calibration) or "acc_bias" not in calibration.groups:
+        return list(_other_tilt_checks(calibration))
     if level is None:
         return [Check("level", False, level_missing(about))]
     says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
 
 
-def _other_tilt_checks(found: Calibration) -> Iterator[Check]:
+def _other_tilt_checks(calibration: Calibration) -> Iterator[Check]:
     """Report the assumed size of the other kind of tilt."""
-    kinds = [OTHER[group] for group in found.groups if group in OTHER]
-    if kinds and (off := found.info.get("beside_tilt_sigma_deg")):
+    kinds = [OTHER[group] for group in calibration.groups if group in OTHER]
+    if kinds and (off := calibration.info.get("beside_tilt_sigma_deg")):
         says = f"each ± includes {kinds[0]} of 0 ± {off:.2g}°, beside the tilt found"
         yield Check("level", None, says)

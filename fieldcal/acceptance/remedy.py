@@ -74,7 +74,7 @@ class Remedy:
 
 
 def cheapest_remedy(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     limits: GradeLimits,
@@ -86,7 +86,7 @@ def cheapest_remedy(
 
     Parameters
     ----------
-    found : calibration that is NO-GO
+    calibration : calibration that is NO-GO
     about : description of its session
     had : positions that have a window
     limits : limits of its grade
@@ -95,23 +95,23 @@ def cheapest_remedy(
     seconds : length of a window, s
 
     """
-    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
     names = [p.name for p in about.positions]
     if doubt and doubt.name in names:
         number = names.index(doubt.name)
         which = f"position {number + 1} ({doubt.name})"
         says = f"take {which} again: it disagrees with the others"
         return Remedy(says, again=(number,), seconds=seconds)
-    over = _limit_ratios(found, limits, failed)
+    over = _limit_ratios(calibration, limits, failed)
     if not over or not all(p.oriented for p in about.positions):
         return None
     if all(sensor_of(group_of(name)) == "gyr" for name in over):
-        return _hold_longer(found, about, had, over, seconds)
-    return _further_positions(found, about, had, limits, over, sigma, seconds)
+        return _hold_longer(calibration, about, had, over, seconds)
+    return _further_positions(calibration, about, had, limits, over, sigma, seconds)
 
 
 def _limit_ratios(
-    found: Calibration, limits: GradeLimits, failed: Collection[str]
+    calibration: Calibration, limits: GradeLimits, failed: Collection[str]
 ) -> dict[str, float]:
     """Uncertainty over its limit, by full name; infinite if not determined."""
     out = {}
@@ -119,14 +119,16 @@ def _limit_ratios(
         limit = limits.sigma(group)
         for axis in "xyz" if limit is not None else "":
             name = f"{group}.{axis}"
-            sigma = found.uncertainty(name) if name in found.names else np.inf
+            sigma = (
+                calibration.uncertainty(name) if name in calibration.names else np.inf
+            )
             if limit and not sigma <= limit:
                 out[name] = float(sigma / limit)
     return out
 
 
 def _hold_longer(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     over: dict[str, float],
@@ -137,10 +139,12 @@ def _hold_longer(
     The part of the uncertainty from g-sensitivity and the mean force does not change.
     """
     force = forces(had, about.gravity).mean(axis=0)
-    stays = factory_errors_used(found).g_sensitivity * float(np.linalg.norm(force))
+    stays = factory_errors_used(calibration).g_sensitivity * float(
+        np.linalg.norm(force)
+    )
     times = 1.0
     for name, part in over.items():
-        sigma = found.uncertainty(name) if np.isfinite(part) else np.inf
+        sigma = calibration.uncertainty(name) if np.isfinite(part) else np.inf
         kept = stays if group_of(name) == "gyr_bias" else 0.0
         room = (SURE * sigma / part) ** 2 - kept**2
         times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
@@ -155,7 +159,7 @@ def _hold_longer(
 
 
 def _further_positions(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     limits: GradeLimits,
@@ -164,9 +168,9 @@ def _further_positions(
     seconds: float,
 ) -> Remedy | None:
     """Further positions of the ladder, each time the best one."""
-    tilts = [g for g in ("angle_offset", "base_tilt") if g in found.groups]
+    tilts = [g for g in ("angle_offset", "base_tilt") if g in calibration.groups]
     names = parameters(*(tilts or ["angle_offset"]))
-    held, known = list(had), _KnownErrors.of(found, sigma)
+    held, known = list(had), _KnownErrors.of(calibration, sigma)
     before = _expected_sigma(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     chosen: list[Position] = []
@@ -226,10 +230,10 @@ class _KnownErrors(NamedTuple):
     factory: FactoryErrors
 
     @classmethod
-    def of(cls, found: Calibration, sigma: float) -> _KnownErrors:
+    def of(cls, calibration: Calibration, sigma: float) -> _KnownErrors:
         """Take the errors that a result was made with."""
-        angle = np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0))
-        return cls(sigma, float(angle), factory_errors_used(found))
+        angle = np.deg2rad(float(calibration.info.get("angle_sigma_deg") or 0.0))
+        return cls(sigma, float(angle), factory_errors_used(calibration))
 
 
 def _expected_sigma(

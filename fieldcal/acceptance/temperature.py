@@ -22,13 +22,13 @@ NEAR_K = 2.0
 
 
 def effect_of_temperature_change(
-    found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
+    calibration: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
 ) -> dict[str, Any] | None:
     """Effect of the change of temperature since the last calibration.
 
     Parameters
     ----------
-    found : the present calibration
+    calibration : the present calibration
     earlier : earlier calibrations of the device, oldest first
     limits : limits of its grade
 
@@ -41,7 +41,7 @@ def effect_of_temperature_change(
     points = [
         p for run in earlier if (p := as_thermal_point(run.taken_at, run.calibration))
     ]
-    now = as_thermal_point("now", found)
+    now = as_thermal_point("now", calibration)
     if now is None or not points:
         return None
     then = points[-1]
@@ -74,9 +74,9 @@ def effect_of_temperature_change(
     return {**out, "parameters": document(changes), "says": [says]}
 
 
-def as_thermal_point(name: str, found: Calibration) -> ThermalPoint | None:
+def as_thermal_point(name: str, calibration: Calibration) -> ThermalPoint | None:
     """A calibration as a point of temperature; None if it has none, or is bad."""
     try:
-        return point(name, found)
+        return point(name, calibration)
     except InputError:
         return None

@@ -22,7 +22,7 @@ REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
 
 
 def check_uncertainty(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     windows: Sequence[Average],
@@ -32,9 +32,9 @@ def check_uncertainty(
     A recorded sensor of which no parameter was determined fails.
     """
     checks = []
-    read = {sensor_of(group_of(name)) for name in found.names} | _measured_sensors(
-        windows
-    )
+    read = {
+        sensor_of(group_of(name)) for name in calibration.names
+    } | _measured_sensors(windows)
     for group in COMPONENTS:
         limit = limits.sigma(group)
         sensor_read = sensor_of(group) in read
@@ -42,7 +42,7 @@ def check_uncertainty(
             continue
         unit = COMPONENTS[group][1]
         shown = unit_suffix(unit)
-        _, sigma = found.vector(group)
+        _, sigma = calibration.vector(group)
         lacking = [a for a, s in zip("xyz", sigma, strict=True) if not np.isfinite(s)]
         if lacking and group in REQUIRED:
             says = f"{group} {' '.join(lacking)} was not determined by these positions"
@@ -58,7 +58,7 @@ def check_uncertainty(
             if not ok and group == "acc_scale":
                 says += place_wanted(about)
             if not ok and sensor_of(group) == "acc":
-                says += _angle_setting_remedy(found, limits)
+                says += _angle_setting_remedy(calibration, limits)
             stands: bool | None = ok
             if not ok and group not in REQUIRED:
                 stands, says = None, f"{says}: it counts as not determined"
@@ -87,10 +87,10 @@ def _format_apart_from(value: float, limit: float) -> str:
     return text
 
 
-def _angle_setting_remedy(found: Calibration, limits: GradeLimits) -> str:
+def _angle_setting_remedy(calibration: Calibration, limits: GradeLimits) -> str:
     """Remedy if the setting of angles limits the uncertainty; else empty."""
-    angles = float(found.info.get("angle_sigma_deg") or 0.0)
-    if found.method == "scalar" or angles < limits.angle_setting_deg:
+    angles = float(calibration.info.get("angle_sigma_deg") or 0.0)
+    if calibration.method == "scalar" or angles < limits.angle_setting_deg:
         return ""
     return (
         f"; the angles are taken as set to ± {angles:.2g}°: if they are set better,"

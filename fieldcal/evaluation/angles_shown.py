@@ -71,7 +71,7 @@ def angle_equivalent_of_offsets(explanation: Explanation) -> float:
 
 
 def with_shown_angle_setting(
-    fit: Callable[[], Calibration], asked: dict[str, Any], shown: Explanation | None
+    fit: Callable[[], Calibration], options: dict[str, Any], shown: Explanation | None
 ) -> tuple[Calibration, list[str]]:
     """Fit with the stated uncertainty of angles, or the larger one that is shown.
 
@@ -82,7 +82,7 @@ def with_shown_angle_setting(
     Parameters
     ----------
     fit : solves with the present values in `asked`
-    asked : arguments of `solve`; the uncertainty of angles is changed in place
+    options : arguments of `solve`; the uncertainty of angles is changed in place
     shown : explanation of the recording; None if it was not examined
 
     """
@@ -90,20 +90,20 @@ def with_shown_angle_setting(
     if shown is None:
         return found, []
     notes = [*wrong_angle_sentences(shown), *of_the_setup(shown)]
-    stated, angles = float(asked["angle_sigma_deg"]), shown_angle_setting(shown)
+    stated, angles = float(options["angle_sigma_deg"]), shown_angle_setting(shown)
     if angles > stated:
-        asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
+        options["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
         wider = fit()
         if wider.info["log_evidence"] <= found.info["log_evidence"]:
-            asked["angle_sigma_deg"] = stated
+            options["angle_sigma_deg"] = stated
         elif angles <= thresholds.NO_ANGLE:
             found, notes = wider, [_worse_set(angles, stated), *notes]
         else:
-            asked["angle_sigma_deg"] = stated
+            options["angle_sigma_deg"] = stated
             warnings = (OTHER_ANGLES, *found.warnings)
             return replace(found, warnings=warnings, good=False), notes
-    if (unknown := angle_equivalent_of_offsets(shown)) > asked["angle_sigma_deg"]:
-        asked["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
+    if (unknown := angle_equivalent_of_offsets(shown)) > options["angle_sigma_deg"]:
+        options["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
         found, notes = fit(), [_may_be_angles(unknown), *notes]
     return found, notes
 

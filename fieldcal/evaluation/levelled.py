@@ -27,20 +27,22 @@ def with_tilt_shown(
     found: Calibration,
     observations: Observations,
     recorded: RecordedRows | None,
-    asked: Mapping[str, Any],
+    options: Mapping[str, Any],
 ) -> Calibration:
     """Add the tilt that the positions show without the stated level to `info`.
 
     Parameters
     ----------
     found : the result with the stated level
-    observations, recorded, asked : arguments of `solve` that it was made from
+    observations, recorded, options : arguments of `solve` that it was made from
 
     """
     level = found.info.get("level_sigma_deg")
     if level is None or found.method in ("two_position", "scalar"):
         return found
-    free = solve(observations, recorded=recorded, **{**asked, "level_sigma_deg": None})
+    free = solve(
+        observations, recorded=recorded, **{**options, "level_sigma_deg": None}
+    )
     at = [i for i, name in enumerate(free.names) if group_of(name) in TILTS]
     if not at:
         return found

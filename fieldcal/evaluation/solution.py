@@ -168,7 +168,7 @@ def solve_session(
     windows: UsableWindows,
     turns: UseTurns = "auto",
     left: Mapping[str, Any] | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Calibration:
     """Solve a session.
 
@@ -179,8 +179,8 @@ def solve_session(
     turns : whether the turns between windows are used; "yes" requires them
     left : sizes of factory errors by the keys of session.toml; they replace those of
         session.toml and the usual ones of the grade
-    asked : arguments of `fieldcal.solve.solve`; defaults for the level of the base and
-        the setting of angles come from session.toml, or from the grade
+    options : arguments of `fieldcal.solve.solve`; defaults for the level of the base
+        and the setting of angles come from session.toml, or from the grade
 
     Raises
     ------
@@ -188,43 +188,43 @@ def solve_session(
         If nothing is determined, or turns are required and there are none.
 
     """
-    return solve_prepared(PreparedSession(session, windows), turns, left, **asked)
+    return solve_prepared(PreparedSession(session, windows), turns, left, **options)
 
 
 def solve_prepared(
     prepared: PreparedSession,
     turns: UseTurns = "auto",
     left: Mapping[str, Any] | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Calibration:
     """Solve a prepared session; parameters and errors as of `solve_session`."""
-    asked = _with_defaults(prepared, asked)
+    options = _with_defaults(prepared, options)
     device = replace(prepared.session.about, **(left or {}))
-    asked["factory"] = factory_errors(device)
-    if asked.get("as_printed"):
+    options["factory"] = factory_errors(device)
+    if options.get("as_printed"):
         return _with_warnings(
-            solve(prepared.observations, **asked), prepared, turns, []
+            solve(prepared.observations, **options), prepared, turns, []
         )
     shown = prepared.explanation
     recorded = prepared.recorded_rows(turns != "no", shown)
 
     def fit() -> Calibration:
-        return solve(prepared.observations, recorded=recorded, **asked)
+        return solve(prepared.observations, recorded=recorded, **options)
 
-    stated = asked["angle_sigma_deg"]
-    found, notes = with_shown_angle_setting(fit, asked, shown)
+    stated = options["angle_sigma_deg"]
+    found, notes = with_shown_angle_setting(fit, options, shown)
     shows = _shown_grade(found, prepared.session.about)
     if shows.because:
-        asked["at_best"] = asked["factory"]
-        asked["factory"] = factory_errors(device, shows.grade)
+        options["at_best"] = options["factory"]
+        options["factory"] = factory_errors(device, shows.grade)
         found = fit()
         found = replace(found, info={**found.info, "grade_shown": asdict(shows)})
-    found = with_tilt_shown(found, prepared.observations, recorded, asked)
+    found = with_tilt_shown(found, prepared.observations, recorded, options)
     found = _with_warnings(
         found, prepared, turns, [*notes, *prepared.unexamined_warnings]
     )
     found = with_rounding_uncertainty(found, prepared.rounding)
-    if asked["angle_sigma_deg"] > stated:
+    if options["angle_sigma_deg"] > stated:
         found = replace(found, info={**found.info, "angles_stated_deg": stated})
     if shown is None:
         return replace(
@@ -235,7 +235,7 @@ def solve_prepared(
 
 
 def _with_defaults(
-    prepared: PreparedSession, asked: Mapping[str, Any]
+    prepared: PreparedSession, options: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Arguments of `solve`, with defaults from session.toml or the grade."""
     about = prepared.session.about
@@ -244,7 +244,7 @@ def _with_defaults(
         "angle_sigma_deg": angle_setting(about),
         "beside_tilt_sigma_deg": priors.BESIDE_TILT_DEG,
     }
-    return own | {name: value for name, value in asked.items() if value is not None}
+    return own | {name: value for name, value in options.items() if value is not None}
 
 
 def _with_warnings(

@@ -116,7 +116,7 @@ def average_turntable_window(
 ) -> tuple[Average, str]:
     """Average while a table turns at some rate, (3,) rad/s in device axes.
 
-    Otherwise as `take`.
+    Otherwise as `average_window`.
     """
     span = _known_span(span)
     standing, left = without_table_rotation(block.between(*span), rate)

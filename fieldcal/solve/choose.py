@@ -113,38 +113,38 @@ def solve(
     >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
     ('two_position', [1.0, 1.0, 1.0])
     """
-    asked = SolveOptions(
+    options = SolveOptions(
         method, tilt, cross, as_printed,
         level_sigma_deg, heading_sigma_deg, angle_sigma_deg, beside_tilt_sigma_deg, lot,
         factory or FactoryErrors(), at_best,
     )  # fmt: skip
     if as_printed:
-        return printed.solve(observations, asked)
+        return printed.solve(observations, options)
     return _solve_with_lot(
-        observations, asked, asked.method_for(observations), recorded
+        observations, options, options.method_for(observations), recorded
     )
 
 
 def _solve_with_lot(
     observations: Observations,
-    asked: SolveOptions,
+    options: SolveOptions,
     method: Method,
     recorded: RecordedRows | None,
 ) -> Calibration:
     """The calibration of the session alone, or with its lot if the unit fits to it."""
-    alone = replace(asked, lot=None)
+    alone = replace(options, lot=None)
     found, notes = _fit_over_earth_rates(observations, alone, method, recorded)
     told = None
-    if asked.lot is not None:
-        beside, others = _fit_over_earth_rates(observations, asked, method, recorded)
-        found, told = combine_with_lot(found, beside, asked.lot)
+    if options.lot is not None:
+        beside, others = _fit_over_earth_rates(observations, options, method, recorded)
+        found, told = combine_with_lot(found, beside, options.lot)
         notes = notes if told is None or told.refused else others
-    return build_calibration(method, observations, asked, found, notes, told)
+    return build_calibration(method, observations, options, found, notes, told)
 
 
 def _fit_over_earth_rates(
     observations: Observations,
-    asked: SolveOptions,
+    options: SolveOptions,
     method: Method,
     recorded: RecordedRows | None,
 ) -> tuple[ParameterEstimate, list[str]]:
@@ -155,7 +155,7 @@ def _fit_over_earth_rates(
     """
 
     def fitted(earth: EarthRateModel) -> tuple[ParameterEstimate, list[str]]:
-        return _SessionFit(observations, asked, method, recorded, earth).best_fit()
+        return _SessionFit(observations, options, method, recorded, earth).best_fit()
 
     found, notes = fitted("stated")
     shown = VerticalEarthRate.of(
@@ -181,7 +181,7 @@ class _SessionFit:
     Parameters
     ----------
     observations : means of the windows
-    asked : options
+    options : options
     method : chosen method
     recorded : rows of the recording; None if there are only means
     earth : Earth's rate in the gyroscopes
@@ -191,15 +191,15 @@ class _SessionFit:
     def __init__(
         self,
         observations: Observations,
-        asked: SolveOptions,
+        options: SolveOptions,
         method: Method,
         recorded: RecordedRows | None,
         earth: EarthRateModel = "stated",
     ) -> None:
-        self.observations, self.asked, self.method = observations, asked, method
+        self.observations, self.options, self.method = observations, options, method
         navigation = observations.grade == "navigation"
         base, self.earth_sigma = known_earth_rate(
-            observations.latitude, navigation, asked.heading, observations.under_way
+            observations.latitude, navigation, options.heading, observations.under_way
         )
         if earth == "another":
             self.earth_sigma = (self.earth_sigma[0], EARTH_RATE, self.earth_sigma[2])
@@ -223,7 +223,7 @@ class _SessionFit:
 
     def best_fit(self) -> tuple[ParameterEstimate, list[str]]:
         """The estimate with the model of the tilt that fits best, and remarks on it."""
-        level, tilt = self.asked.level_deg, self.asked.tilt
+        level, tilt = self.options.level_deg, self.options.tilt
         if self.method in ("scalar", "least_squares"):
             return self._fit("none"), []
         if level and tilt in ("auto", "none"):
@@ -237,7 +237,7 @@ class _SessionFit:
     @property
     def _other_tilt_deg(self) -> float:
         """Possible size of the other kind of tilt, deg; 0 if one kind is requested."""
-        return self.asked.beside_tilt_deg if self.asked.tilt == "auto" else 0.0
+        return self.options.beside_tilt_deg if self.options.tilt == "auto" else 0.0
 
     def _fit(
         self, tilt: Tilt, level: float | None = None, follow: bool = True
@@ -249,7 +249,7 @@ class _SessionFit:
         sees_earth = (
             observations.grade == "navigation" and observations.latitude is not None
         )
-        crossed = self.asked.cross or self.method == "least_squares"
+        crossed = self.options.cross or self.method == "least_squares"
         wanted = ParameterSetOptions(
             tilt,
             cross=crossed,
@@ -257,16 +257,16 @@ class _SessionFit:
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
             beside_tilt_deg=0.0 if level else self._other_tilt_deg,
-            angles_deg=self.asked.angles_deg,
-            factory=self.asked.factory,
+            angles_deg=self.options.angles_deg,
+            factory=self.options.factory,
             earth=self.earth_sigma,
             turned=turned,
-            lot=self.asked.lot,
+            lot=self.options.lot,
         )
         found = estimate_parameters(
             self.recorded, turning, self.nominal, wanted, follow
         )
-        if (stated := self.asked.at_best) is None:
+        if (stated := self.options.at_best) is None:
             return found
         chances = found.coarser_probabilities(stated)
         finer = {k: getattr(stated, k) for k, p in chances.items() if p < EVEN}

@@ -66,19 +66,19 @@ class CrossCouplingEffect:
 
 
 def largest_cross_coupling_effect(
-    found: ParameterEstimate,
+    estimate: ParameterEstimate,
 ) -> CrossCouplingEffect | None:
     """The largest effect of cross-coupling on the parameters of a set, by (1).
 
     None where the set estimates it, determines nothing of the accelerometers, or the
     positions magnify nothing.
     """
-    parameter_set = found.parameter_set
+    parameter_set = estimate.parameter_set
     if parameter_set.omitted_cross_coupling is None:
         return None
-    added = _added_sigma(found, parameter_set.omitted_cross_coupling)
+    added = _added_sigma(estimate, parameter_set.omitted_cross_coupling)
     every = []
-    for name in found.names:
+    for name in estimate.names:
         parameter = ParameterName.of(name)
         if parameter.sensor == "acc":
             moved = float(added[parameter_set.names.index(name)])
@@ -90,17 +90,17 @@ def largest_cross_coupling_effect(
     return worst if worst and worst.magnification > 1 else None
 
 
-def _added_sigma(found: ParameterEstimate, group: Group) -> Array:
+def _added_sigma(estimate: ParameterEstimate, group: Group) -> Array:
     """Uncertainty of each parameter from an unknown group, over its usual size.
 
     Returns (k,), 1 sigma, in units of the parameter.
     """
-    there = found.search.evaluated(found.parameter_set.members).state
+    there = estimate.search.evaluated(estimate.parameter_set.members).state
     inner, _ = there.rest(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
     rows = there.rows.matrix(there.columns, group.columns)
     moved = (
-        parameter_matrix(found.parameter_set, there.columns) @ there.inverse @ rows
+        parameter_matrix(estimate.parameter_set, there.columns) @ there.inverse @ rows
     )  # D
     var = np.einsum("ki,ij,kj->k", moved, unknown, moved)
     out: Array = np.sqrt(np.maximum(var, 0.0))

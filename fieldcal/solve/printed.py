@@ -32,7 +32,7 @@ FIVE = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
 """Warning about the misprints of each method."""
 
 
-def solve(observations: Observations, asked: SolveOptions) -> Calibration:
+def solve(observations: Observations, options: SolveOptions) -> Calibration:
     """Calibration by the printed formulas.
 
     Raises
@@ -41,8 +41,8 @@ def solve(observations: Observations, asked: SolveOptions) -> Calibration:
         If no formula is printed for the method, or for one of the positions.
 
     """
-    _check_supported(observations, asked)
-    parts, sentences, method = [], [], asked.method
+    _check_supported(observations, options)
+    parts, sentences, method = [], [], options.method
     still = np.flatnonzero(~observations.rotating)
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
@@ -73,11 +73,11 @@ def solve(observations: Observations, asked: SolveOptions) -> Calibration:
     )
 
 
-def _check_supported(observations: Observations, asked: SolveOptions) -> None:
+def _check_supported(observations: Observations, options: SolveOptions) -> None:
     """Refuse methods and positions for which no formula is printed."""
-    if asked.method not in ("auto", *METHODS):
+    if options.method not in ("auto", *METHODS):
         raise InputError(
-            f"the paper prints no {asked.method} method: as printed are two_position"
+            f"the paper prints no {options.method} method: as printed are two_position"
             " and five_position"
         )
     if third := [p.name for p in observations.positions if p.gamma]:

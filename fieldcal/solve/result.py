@@ -38,10 +38,10 @@ UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
 def build_calibration(
     method: Method,
     observations: Observations,
-    asked: SolveOptions,
-    found: ParameterEstimate,
+    options: SolveOptions,
+    estimate: ParameterEstimate,
     notes: Sequence[str],
-    told: LotContribution | None = None,
+    lot_contribution: LotContribution | None = None,
 ) -> Calibration:
     """Make a calibration from an estimate.
 
@@ -51,21 +51,21 @@ def build_calibration(
         If it has no parameter.
 
     """
-    names, sigma = found.names, np.sqrt(np.diag(found.covariance))
-    worst = largest_cross_coupling_effect(found)
+    names, sigma = estimate.names, np.sqrt(np.diag(estimate.covariance))
+    worst = largest_cross_coupling_effect(estimate)
     sentences = [
         words.effects_warning(
-            found.any_cause_probability,
-            found.causes,
+            estimate.any_cause_probability,
+            estimate.causes,
             names,
-            found.shift_sigmas,
-            found.valid_at_s,
+            estimate.shift_sigmas,
+            estimate.valid_at_s,
         ),
-        told.sentence if told else "",
-        *undetermined_warnings(method, observations, found),
+        lot_contribution.sentence if lot_contribution else "",
+        *undetermined_warnings(method, observations, estimate),
         worst.sentence if worst else "",
         *notes,
-        *level_warnings(method, asked, observations),
+        *level_warnings(method, options, observations),
     ]
     if not names:
         raise NotObservable(
@@ -73,24 +73,24 @@ def build_calibration(
         )
     of_acc = any(map(_is_acc, names))
     odd = [
-        *implausible_values(names, found.values, sigma, observations.nominal),
-        *misdirected_turns(_turn_names(found.contradicted_turns, observations)),
-        *_wrong_latitude(found, observations),
-        *contradiction_warnings(observations, found, of_acc),
+        *implausible_values(names, estimate.values, sigma, observations.nominal),
+        *misdirected_turns(_turn_names(estimate.contradicted_turns, observations)),
+        *_wrong_latitude(estimate, observations),
+        *contradiction_warnings(observations, estimate, of_acc),
     ]
-    sentences += agreement_warnings(method, observations, found)
-    fit = found.acc if of_acc else found.gyr
-    info = _info(method, observations, asked, found)
-    info |= {"borrowed": told.to_json()} if told else {}
+    sentences += agreement_warnings(method, observations, estimate)
+    fit = estimate.acc if of_acc else estimate.gyr
+    info = _info(method, observations, options, estimate)
+    info |= {"borrowed": lot_contribution.to_json()} if lot_contribution else {}
     return Calibration(
         method=method,
         names=names,
-        values=found.values,
-        covariance=found.covariance,
+        values=estimate.values,
+        covariance=estimate.covariance,
         units=tuple(UNITS[group_of(n)] for n in names),
         chi2=fit.chi2,
         dof=fit.dof,
-        rms=found.acc.rms,
+        rms=estimate.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
         good=not odd,
         info=info,
@@ -110,49 +110,51 @@ def _turn_names(
     return [(names[before], names[behind]) for before, behind in turns]
 
 
-def _wrong_latitude(found: ParameterEstimate, observations: Observations) -> list[str]:
+def _wrong_latitude(
+    estimate: ParameterEstimate, observations: Observations
+) -> list[str]:
     """Sentence if the gyroscopes contradict the stated latitude."""
     shown = VerticalEarthRate.of(
-        found.parameter_set, found.search, observations.latitude
+        estimate.parameter_set, estimate.search, observations.latitude
     )
     return [shown.sentence] if shown and shown.latitude_wrong else []
 
 
-def _is_harmful(wrong: WrongAngles, found: ParameterEstimate) -> bool:
+def _is_harmful(wrong: WrongAngles, estimate: ParameterEstimate) -> bool:
     """Whether wrong angles could move a parameter beyond its uncertainty."""
-    sigma = np.sqrt(np.diag(found.covariance))
+    sigma = np.sqrt(np.diag(estimate.covariance))
     return any(
         abs(wrong.moves[name]) > thresholds.MOVED_WRONG * s
-        for name, s in zip(found.names, sigma, strict=True)
+        for name, s in zip(estimate.names, sigma, strict=True)
     )
 
 
 def _carried_info(
-    observations: Observations, found: ParameterEstimate
+    observations: Observations, estimate: ParameterEstimate
 ) -> dict[str, Any]:
     """Unrequested causes in the set, and their effects on the parameters."""
-    moved = dict(zip(found.names, found.shift_sigmas.tolist(), strict=True))
-    out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
-    if found.valid_at_s is not None:
+    moved = dict(zip(estimate.names, estimate.shift_sigmas.tolist(), strict=True))
+    out: dict[str, Any] = {"causes": estimate.causes, "moved_sigmas": moved}
+    if estimate.valid_at_s is not None:
         last = (
             float(observations.temperature[-1])
             if len(observations.temperature)
             else np.nan
         )
         warm = last if np.isfinite(last) else None
-        out["as_of"] = {"since_start_s": found.valid_at_s, "temperature_degc": warm}
+        out["as_of"] = {"since_start_s": estimate.valid_at_s, "temperature_degc": warm}
     return out
 
 
 def _info(
     method: Method,
     observations: Observations,
-    asked: SolveOptions,
-    found: ParameterEstimate,
+    options: SolveOptions,
+    estimate: ParameterEstimate,
 ) -> dict[str, Any]:
     known = observations.temperature[np.isfinite(observations.temperature)]
     latitude = observations.latitude
-    wanted = found.parameter_set.options
+    wanted = estimate.parameter_set.options
     out: dict[str, Any] = {
         "conditions": {
             "positions": len(observations),
@@ -162,10 +164,10 @@ def _info(
             "temperature_sd_k": float(known.std()) if len(known) else None,
             "grade": observations.grade,
         },
-        "bad_position": [round(float(p), 4) for p in found.bad_probability],
-        "extra_scatter": window_scatter(found.mixture, (0, 1, 2)),
-        "log_evidence": found.score,
-        "angle_sigma_deg": asked.angles_deg,
+        "bad_position": [round(float(p), 4) for p in estimate.bad_probability],
+        "extra_scatter": window_scatter(estimate.mixture, (0, 1, 2)),
+        "log_evidence": estimate.score,
+        "angle_sigma_deg": options.angles_deg,
         "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
         "quadratic_sigma": wanted.factory.quadratic,
         "g_sensitivity_sigma": wanted.factory.g_sensitivity,
@@ -173,27 +175,27 @@ def _info(
         "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
         "acc_hysteresis_sigma": wanted.factory.hysteresis,
     }
-    if doubt := DoubtfulPosition.of(observations, found.bad_probability):
+    if doubt := DoubtfulPosition.of(observations, estimate.bad_probability):
         out["doubtful_position"] = doubt.to_json()
-    if np.isfinite(found.acc.held_out_rms):
-        out["left_out_rms"] = found.acc.held_out_rms
-    if found.parameter_set.options.level_deg:
-        out["level_sigma_deg"] = found.parameter_set.options.level_deg
+    if np.isfinite(estimate.acc.held_out_rms):
+        out["left_out_rms"] = estimate.acc.held_out_rms
+    if estimate.parameter_set.options.level_deg:
+        out["level_sigma_deg"] = estimate.parameter_set.options.level_deg
     if wanted.tilt != "none" and wanted.beside_tilt_deg:
         out["beside_tilt_sigma_deg"] = wanted.beside_tilt_deg
     if observations.has_gyr:
-        gyr = found.gyr
+        gyr = estimate.gyr
         out["gyroscopes"] = {
             "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
             "rms": gyr.rms if np.isfinite(gyr.rms) else None,
-            "extra_scatter": window_scatter(found.mixture, (3, 4, 5)),
+            "extra_scatter": window_scatter(estimate.mixture, (3, 4, 5)),
         }  # fmt: skip
-    if harmful := [w for w in found.wrong_angles if _is_harmful(w, found)]:
+    if harmful := [w for w in estimate.wrong_angles if _is_harmful(w, estimate)]:
         out["wrong_angles"] = [w.to_json() for w in harmful]
-    if found.causes or found.valid_at_s is not None:
-        out["carried"] = _carried_info(observations, found)
-    if found.turn_rows:
-        chi2, dof = closure_chi2(found)
-        scatter = closure_scatter(found.mixture)
+    if estimate.causes or estimate.valid_at_s is not None:
+        out["carried"] = _carried_info(observations, estimate)
+    if estimate.turn_rows:
+        chi2, dof = closure_chi2(estimate)
+        scatter = closure_scatter(estimate.mixture)
         out["turns"] = {"chi2": chi2, "dof": dof, "scatter_rad": scatter}
     return out

@@ -156,7 +156,7 @@ def propose_verification(positions: Sequence[Position]) -> Position:
     if all have a third angle, it is home.
 
     >>> from fieldcal.core.positions import FIVE
-    >>> proposed(FIVE).name
+    >>> propose_verification(FIVE).name
     'α = 0°, β = 5°'
     """
     known = [p.degrees for p in positions if p.degrees is not None]

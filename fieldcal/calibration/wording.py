@@ -23,11 +23,11 @@ TITLES = {
 def format_with_sigma(value: float, sigma: float) -> tuple[str, str]:
     """Value and sigma, with two significant digits of sigma.
 
-    >>> number(0.12345, 0.00234)
+    >>> format_with_sigma(0.12345, 0.00234)
     ('0.1235', '0.0023')
-    >>> number(123.4, 56.0)
+    >>> format_with_sigma(123.4, 56.0)
     ('123', '56')
-    >>> number(-1e-5, 0.0014)
+    >>> format_with_sigma(-1e-5, 0.0014)
     ('0.0000', '0.0014')
     """
     if not math.isfinite(sigma) or sigma <= 0:
@@ -39,7 +39,7 @@ def format_with_sigma(value: float, sigma: float) -> tuple[str, str]:
 def parameter_title(name: str) -> str:
     """Name of a parameter with its component.
 
-    >>> title("acc_bias.x"), title("base_tilt.about_x_deg")
+    >>> parameter_title("acc_bias.x"), parameter_title("base_tilt.about_x_deg")
     ('acc bias x', 'base tilt about x')
     """
     parameter = ParameterName.of(name)
@@ -51,7 +51,7 @@ def parameter_title(name: str) -> str:
 def format_unit(unit: str) -> str:
     """A unit with superscripts; empty for a plain number.
 
-    >>> pretty("m/s^2*sqrt(Hz)"), pretty("1/(m/s^2)^2"), pretty("1")
+    >>> format_unit("m/s^2*sqrt(Hz)"), format_unit("1/(m/s^2)^2"), format_unit("1")
     ('m/s²·√Hz', '1/(m/s²)²', '')
     """
     raised = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")

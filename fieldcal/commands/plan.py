@@ -116,10 +116,10 @@ def run(args: argparse.Namespace) -> int:
     grade = device.grade(seconds) if device else planner.GRADES[args.noise]
     noise = "this device" if device else args.noise
     needed = None if args.sways is None else _needed(args.sways, grade)
-    found = planner.expected_uncertainty(places, grade, seconds, gravity)
-    paper = planner.expected_uncertainty(FIVE, grade, seconds, gravity)
+    found = planner.expected(places, grade, seconds, gravity)
+    paper = planner.expected(FIVE, grade, seconds, gravity)
     further = planner.extra_position(places, ladder, gravity)
-    with_it = planner.expected_uncertainty((*places, further), grade, seconds, gravity)
+    with_it = planner.expected((*places, further), grade, seconds, gravity)
     confused = find_aliases(places, gravity)
     if args.output:
         write(args.output, tables, places, seconds)

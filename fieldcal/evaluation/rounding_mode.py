@@ -133,11 +133,11 @@ def with_rounding_uncertainty(found: Calibration, mode: RoundingMode) -> Calibra
 def cut_probability(shown: list[tuple[int, float]]) -> float:
     """Probability that values were cut toward zero, from (n0, n1) of passes, (1).
 
-    >>> round(cut_toward_zero([]), 3)
+    >>> round(cut_probability([]), 3)
     0.3
-    >>> cut_toward_zero([(80, 40.0)] * 4) > 0.99
+    >>> cut_probability([(80, 40.0)] * 4) > 0.99
     True
-    >>> cut_toward_zero([(40, 40.0)] * 4) < 0.01
+    >>> cut_probability([(40, 40.0)] * 4) < 0.01
     True
     """
     log_odds = float(np.log(CUT / (1 - CUT)))

@@ -105,7 +105,7 @@ def required_parameters(n: int) -> tuple[str, ...]:
     return parameters(*(["angle_offset"] if n >= 3 else []))
 
 
-def expected_uncertainty(
+def expected(
     positions: Sequence[Position], grade: GradeNoise, seconds: float, gravity: float
 ) -> dict[str, float]:
     """Standard uncertainty of every parameter that the positions determine.

@@ -64,7 +64,7 @@ def variants(
 def choice_at(weight: Array, u: float) -> int:
     """Index of the choice, of probabilities (k,), in which a point of 0 to 1 lies.
 
-    >>> reached(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
+    >>> choice_at(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
     1
     """
     return int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))

@@ -5,39 +5,42 @@ white noise gives it, have
 
     chi2 = sum over windows of (mean / sigma)^2,   P(chi2 or less; n)              (1)
 
-and gyroscopes whose biases return within s_b from run to run, and feel the Earth, come
-so close to zero, with an error s of each axis over all windows, with a chance of
+If biases repeat within s_b from run to run, and the gyroscopes measure the Earth's
+rate, the probability of means so close to zero, with an error s of each axis over all
+windows, is
 
     P = product over axes of min(1, 4 s / (sqrt(2 pi) sqrt(s_b^2 + w_E^2 / 3)))    (2)
 
 If a device removes the bias of its gyroscopes at rest, chi2 (1) is not significant.
-What a turn put out is removed again in some seconds, so the means are c of
+The offset after a turn is removed again within seconds, so the means are c of
 
     W(t) = c + d exp(-t / tau)                                                     (3)
 
-in each window, with the tau that all windows have the least residual with. The removal
-also takes out slow noise, so sigma is that of the noise at quick frequencies: the
-median of the periodogram over ln 2, or that of a lower octave with more than a filter
-left of it. A device that takes the mean of its first T seconds at rest for its bias
-until the next turn leaves the noise of that mean in all of a window, and before what it
-took out the last time. The means are c of
+in each window, with the tau that gives the least residual over all windows. The removal
+also suppresses slow noise, so sigma is that of the noise at high frequencies: the
+median of the periodogram over ln 2, or that of a lower octave if a filter has reduced
+the upper ones. A device may instead take the mean of its first T seconds at rest as its
+bias until the next turn. Then the noise of this mean is in the whole window, and the
+previous bias in its beginning. The means are c of
 
     W(t) = c + d (t < T'),   sigma^2 = sigma_c^2 + noise^2 / (T rate)              (4)
 
-with the T' that has the least residual, and any T. Either is so many times as likely as
-gyroscopes that keep a bias, that of the spread s_b, and feel by how they lie, e:
+with the T' of the least residual, and any T. The likelihood ratio of either to
+gyroscopes that keep a bias of spread s_b, with an error e that depends on the position,
+is
 
     B = prod N(c; 0, sigma^2) / prod N(c; 0, sigma_c^2 + e^2 + s_b^2 everywhere)   (5)
 
-over windows and axes. Gyroscopes whose bias is known have the Earth's rate w alone, in
-an unknown direction, and (5) with m = |c| in place of the second
+over windows and axes. Gyroscopes of known bias have only the Earth's rate w, in an
+unknown direction; the denominator of (5) is then, with m = |c|,
 
     p(c) = N(c; 0, sigma_c^2) exp(-w^2 / 2 sigma_c^2) sinh(x) / x,  x = m w / sigma_c^2
                                                                                    (6)
-An autopilot that tells the offset it subtracts has, as likely as not, averaged it when
-it started, over any T: a bias of s_b^2 = noise^2 / (T rate) is left while it runs.
-Of gyroscopes with a bias one in x has a B above x at most, and of all devices TRACKING
-remove it. Device axes, rad/s. Source: Markov's inequality for a likelihood ratio.
+An autopilot that reports the offset that it subtracts has, with even odds, averaged it
+over any T when it started: a bias of s_b^2 = noise^2 / (T rate) then remains. Of
+gyroscopes with a bias at most one in x has a B above x; a share TRACKING of all devices
+removes the bias.
+Device axes, rad/s. Source: Markov's inequality for a likelihood ratio.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A base that is tilted by t about a level axis changes a bias by up to g t, 0.17 m/s^2
 for one degree. Five positions determine the tilt. Two cannot distinguish it from a
-bias: there it is known to what was stated, which is part of every uncertainty, or it is
-not known.
+bias: the tilt is then known as well as the level was stated, which is part of every
+uncertainty, or it is not known.
 """
 
 from __future__ import annotations

@@ -17,10 +17,10 @@ by the same part of a step, so d = 0 and the sum in (2) is 1. For each of the fo
 probability follows from (1) and (2) of `bias_removal` over all axes, with s_b of
 accelerometers; the least of them counts, times four (Bonferroni).
 
-Whatever else was done to the samples afterwards, such as drawing new ones between them,
-moves a mean a little. Of a recording from which none was subtracted, the mean m is that
-of the force and the bias b: for m to be so small, the mean force has to be -b, and
-whatever it is spread by, about zero, the chance of that is on each axis at most
+Later changes of the samples, such as interpolation, move a mean slightly. If no mean
+was subtracted, m is the sum of the mean force and the bias b. For m to be so small, the
+mean force has to be near -b. For any normal distribution of the mean force about zero,
+the probability of that on each axis is at most
 
     x = 2 |m| / (sqrt(2 pi e) |b|),   P = x (1 + L + L^2 / 2),   L = -ln x          (3)
 

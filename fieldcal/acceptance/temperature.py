@@ -1,7 +1,7 @@
 """Error of an earlier calibration at the present temperature.
 
 Earlier calibrations of the device show how its parameters depend on temperature. If
-there are fewer than the model needs, this is said.
+there are fewer than the model needs, a sentence says so.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@
 U is the window's mean, (3,) m/s^2 in device axes, U(x) what the calibration x with
 covariance C predicts there (`model.planned`), J its derivative, C_U the window's
 covariance, s how well the angles are set, n the direction of the force. With 3 degrees
-of freedom, chi2 tells a residual from what everything known explains; its length in
-m/s^2 tells whether it matters.
+of freedom, chi2 shows whether the known errors explain the residual; its length in
+m/s^2 shows whether it matters.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
     e_i = |row i of (D^-1 M - I)| |f|      largest error over all directions of f  (3)
 
 Symbols: U raw, f true, b bias, M scale factors and cross-coupling. Device axes. Formats
-without room for cross-coupling keep b and D; (3) says what it costs.
+without room for cross-coupling keep b and D; (3) is the error that this makes.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ def with_shown_angle_setting(
 
     Parameters
     ----------
-    fit : solves with the present values in `asked`
+    fit : solves with the present values in `options`
     options : arguments of `solve`; the uncertainty of angles is changed in place
     shown : explanation of the recording; None if it was not examined
 

@@ -1,8 +1,8 @@
 """How long to average: a session solved with shorter and shorter windows.
 
-Of each window the first T is used. A parameter then has a value x(T), its ± s(T), and
-n(T), the part of that which the means leave: fixture, level and factory leave the same
-at every T,
+The first T of each window is used. A parameter then has a value x(T) with uncertainty
+s(T). n(T) is the part of s(T) from the noise of the means; the part r from fixture,
+level and factory is about the same at every T,
 
     r^2 = s^2(T) - n^2(T)                                                          (1)
 
@@ -10,7 +10,7 @@ White noise falls as 1 / sqrt(T), and nested means differ by
 
     var(x(T) - x(T')) = n^2 (1 - T/T')             n the larger of both, T < T'    (2)
 
-What wins over it first, and from which T, is one of
+The error that exceeds noise first, and from which T, is one of
 
     the fixture     r > n(T)                                                       (3)
     flicker         n^2(T) T > 2 n^2(T0) T0                 T0 the shortest time    (4)

@@ -1,4 +1,4 @@
-"""Which effects a set of positions cannot tell apart, from its own design matrix.
+"""Effects that a set of positions cannot distinguish, from its design matrix.
 
 The parameters of a calibration (bias and scale factor of each sensor) are projected out
 of the columns of every effect. An effect with no remaining column is *hidden*: the

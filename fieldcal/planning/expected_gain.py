@@ -8,8 +8,8 @@ q, and of the mean y of a window in a further position c,
     y_E = h(s, c) + T (u_E - u_s),   Cov_E(y) = T C_E T^T + R                       (1)
 
 with h what the model predicts in state s, T its columns in c, u_E and C_E the columns'
-values with their covariance, R noise, instability and how well angles are set. Part of
-y is by what the gyroscopes' turn to c misses it: a turn phi is a rate phi for a second.
+values with their covariance, R noise, instability and how well angles are set. y
+includes the closure of the turn to c: a turn phi counts as a rate phi for one second.
 Over all explanations
 
     C_qy = sum_E P(E) [Cov_E(q, y) + (q_E - q) (y_E - y)^T],   C_qq, C_yy likewise  (2)

@@ -1,15 +1,15 @@
 """Predicted uncertainty of gyroscopes on a table of known speed and unknown axis.
 
-The length of what a gyroscope triad measures is the speed v of the table. Of spins i
-with the table's axis along u_i of the device (n, 3), for small errors of biases b and
-scale factors s,
+The length of the rate measured by a gyroscope triad is the speed v of the table. For
+spins i with the table's axis along u_i of the device (n, 3), and small errors of biases
+b and scale factors s,
 
     |w_i| - v = sum_j u_ij b_j + v u_ij^2 (s_j - 1) + e_i + d                      (1)
 
-e is the error of a mean; d is common to all spins: what the speed is off by, and what
-of the Earth's rate lies along the axis, which is the same wherever the device stands on
-the table. Between the spins the device rests in any orientation and shows its biases,
-but for the Earth's rate W, of which W / sqrt(3) is in each:
+e is the error of a mean; d is common to all spins: the error of the speed, and the
+component of the Earth's rate along the axis, which is the same anywhere on the table.
+Between the spins the device rests in any orientation and shows its biases, together
+with the Earth's rate W, of which W / sqrt(3) is in each axis:
 
     m_rj = b_j + e_rj + W_rj                                                       (2)
 

@@ -33,10 +33,10 @@ class CrossCouplingEffect:
 
     Attributes
     ----------
-    name, unit : of the parameter
-    moved : 1 sigma for a coefficient of one
-    times : the same over gravity for a bias, over one for a scale factor
-    square : cross-coupling that the set counts with, 1 sigma
+    name, unit : name and unit of the parameter
+    shift_per_unit : 1 sigma of the parameter for a coefficient of one
+    magnification : `shift_per_unit` over gravity for a bias, over 1 for a scale factor
+    assumed_sigma : cross-coupling that the set assumes, 1 sigma
 
     """
 
@@ -70,8 +70,8 @@ def largest_cross_coupling_effect(
 ) -> CrossCouplingEffect | None:
     """The largest effect of cross-coupling on the parameters of a set, by (1).
 
-    None where the set estimates it, determines nothing of the accelerometers, or the
-    positions magnify nothing.
+    None if the set estimates it, if no parameter of the accelerometers is determined,
+    or if the positions do not magnify it.
     """
     parameter_set = estimate.parameter_set
     if parameter_set.omitted_cross_coupling is None:

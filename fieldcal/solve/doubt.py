@@ -44,7 +44,7 @@ class DoubtfulPosition:
 
     @property
     def sentence(self) -> str:
-        """What happened, and what to do."""
+        """The disagreement, and the remedy."""
         if self.probability > thresholds.CERTAIN:
             return (
                 f"the position {self.name} disagrees with all others and was given no"

@@ -5,7 +5,7 @@ positions are inclined enough, it can therefore be distinguished from the biases
 
     U sin(phi) = U sin(stated) - d,    d ~ N(0, U^2)                               (1)
 
-A latitude of the wrong sign shows in nothing else, since gravity is the same on both
+A latitude of the wrong sign is not visible otherwise, since gravity is the same on both
 hemispheres. Whether the latitude is wrong is decided as for any cause, by the evidence
 of the set with d and without it. A simulated device may have no Earth's rate at all;
 this is a third hypothesis, with its own fit.
@@ -34,7 +34,7 @@ class VerticalEarthRate:
     Attributes
     ----------
     stated : rate by the stated latitude, rad/s, upwards
-    shown, sigma : rad/s
+    measured, sigma : measured rate and its uncertainty, rad/s
     gain : log odds of another latitude against the stated one
 
     """
@@ -87,7 +87,7 @@ class VerticalEarthRate:
 
     @property
     def sentence(self) -> str:
-        """What is wrong, and what to do."""
+        """The contradiction, and the remedy."""
         sine = np.clip(self.measured / EARTH_RATE, -1.0, 1.0)
         degrees, stated = (
             np.rad2deg(np.arcsin(s)) for s in (sine, self.stated / EARTH_RATE)

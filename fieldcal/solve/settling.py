@@ -39,10 +39,10 @@ class SettledSet:
 
     Attributes
     ----------
-    found : the mixture of the likeliest explanation
-    gram : products of rows and columns there
-    turned : rows of the turns there
-    score : ln of its evidence from all windows, before any was left out
+    mixture : posterior of the likeliest explanation
+    gram : products of rows and columns
+    turn_rows : rows of the turns
+    score : log evidence from all windows, before any was left out
 
     """
 

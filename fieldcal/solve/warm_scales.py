@@ -2,12 +2,12 @@
 
     U_i += sum_k s_ik c_k(t) f_i,   s_ik = N(0, (r b_k / g)^2)                     (1)
 
-c_k(t) are the courses by which the temperature changes the biases, b_k how large the
-change of the biases by each is, and r the part of that which a scale factor changes by
-at 1 g. A position that is taken once cannot tell (1) from other scale factors, and the
-next flight starts with what they have become. The MPU-6050 states 0.02 %/K beside 35 mg
+c_k(t) are the courses by which the temperature changes the biases, b_k the sizes of
+these changes, and r the change of a scale factor at 1 g as a part of that of a bias.
+Positions that are taken once cannot distinguish (1) from constant scale factors, but
+the next flight starts with the changed ones. The MPU-6050 states 0.02 %/K, and 35 mg
 from 25 to 70 degC, which is r = 0.25. A smooth course of biases that no effect
-describes counts as made by the temperature: it is what changes most of them.
+describes is attributed to the temperature, the most frequent cause.
 """
 
 from __future__ import annotations

@@ -18,12 +18,12 @@ import numpy as np
 from fieldcal.acceptance.bias_removal import BiasSpread
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
 from fieldcal.acceptance.family_at_temperature import (
-    WarmedFamily,
+    FamilyAtTemperature,
     family_at_temperature,
 )
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.mean_removal import removed_bias_sentences
-from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
+from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
 from fieldcal.acceptance.temperature import effect_of_temperature_change
 from fieldcal.acceptance.verification import Verification, planned_verification, verify
 from fieldcal.calibration import Calibration
@@ -58,7 +58,7 @@ def assess(
     """
     marks = list(session.marks())
     warnings = list(calibration.warnings)
-    earlier: WarmedFamily | None = None
+    earlier: FamilyAtTemperature | None = None
     usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
     if history is not None and serial:
@@ -105,8 +105,8 @@ def with_faults(
     are warnings; wrong facts make the calibration bad.
     """
     about, of_acc = session.about, "acc_scale" in calibration.groups
-    unknown = [gravity_unknown(about)] if of_acc else []
-    wrong = [gravity_contradicted(about)] if of_acc else []
+    unknown = [gravity_missing_warning(about)] if of_acc else []
+    wrong = [gravity_contradiction(about)] if of_acc else []
     wrong += [
         _undetermined_by_omission(calibration, session, windows, limits),
         *broken(session.block.six),

@@ -22,12 +22,12 @@ from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
 from fieldcal.acceptance.factory import check_factory_errors
-from fieldcal.acceptance.growth import TIMES, Growth, growth
+from fieldcal.acceptance.growth import TIMES, NavigationErrors, navigation_errors
 from fieldcal.acceptance.harmless import harmless_scatter_note
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest_remedy
-from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
+from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
 from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
@@ -54,7 +54,7 @@ class Decision:
     """All checks, the navigation errors to expect, and a remedy after NO-GO."""
 
     checks: tuple[Check, ...]
-    growth: tuple[Growth, ...]
+    navigation_errors: tuple[NavigationErrors, ...]
     remedy: Remedy | None = None
 
     @property
@@ -125,7 +125,9 @@ def decide(
         *(Check("the run", False, doubt) for doubt in circumstances.doubts),
     ]
     g, mounting = about.gravity, about.mounting
-    grown = tuple(growth(calibration, g, mounting, seconds) for seconds in TIMES)
+    grown = tuple(
+        navigation_errors(calibration, g, mounting, seconds) for seconds in TIMES
+    )
     made = Decision(tuple(checks), grown)
     return (
         made
@@ -176,7 +178,7 @@ def with_decision(calibration: Calibration, made: Decision) -> Calibration:
     }
     if made.remedy is not None:
         decision["remedy"] = made.remedy.to_json()
-    expectation = [each.to_json() for each in made.growth]
+    expectation = [each.to_json() for each in made.navigation_errors]
     more = {"decision": decision, "expectation": expectation}
     return replace(calibration, info={**calibration.info, **more})
 
@@ -294,7 +296,7 @@ def _site_checks(calibration: Calibration, about: Description) -> list[Check]:
     """Check whether gravity is known: the scale factors refer to it."""
     if "acc_scale" not in calibration.groups:
         return []
-    wrong = gravity_unknown(about) or gravity_contradicted(about)
+    wrong = gravity_missing_warning(about) or gravity_contradiction(about)
     return [Check("site", False, wrong)] if wrong else []
 
 

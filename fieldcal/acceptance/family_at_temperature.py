@@ -31,7 +31,7 @@ from fieldcal.thermal import ThermalModel, thermal_model
 
 
 @dataclass(frozen=True, slots=True)
-class WarmedFamily:
+class FamilyAtTemperature:
     """Earlier calibrations at the present temperature.
 
     Attributes
@@ -47,7 +47,7 @@ class WarmedFamily:
 
 def family_at_temperature(
     calibration: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
-) -> WarmedFamily:
+) -> FamilyAtTemperature:
     """Earlier calibrations at the temperature of the present one, (1), (2).
 
     Parameters
@@ -63,7 +63,7 @@ def family_at_temperature(
     if now is None or all(
         abs(p.temperature - now.temperature) <= NEAR_K for p in known
     ):
-        return WarmedFamily([run.calibration for run in earlier], {})
+        return FamilyAtTemperature([run.calibration for run in earlier], {})
     try:
         model: ThermalModel | None = thermal_model(known, limits)
     except InputError:
@@ -79,7 +79,7 @@ def family_at_temperature(
         )
     names = dict.fromkeys(name for each in wide for name in each)
     sigma = {n: float(np.mean([w[n] for w in wide if n in w])) for n in names}
-    return WarmedFamily(moved, sigma)
+    return FamilyAtTemperature(moved, sigma)
 
 
 def _change(

@@ -37,7 +37,7 @@ def tilt_is_found(calibration: Calibration) -> bool:
     return bool(tilted) or calibration.method == "scalar"
 
 
-def level_missing(about: Description) -> str:
+def level_missing_warning(about: Description) -> str:
     """Sentence about a base whose level is not stated, with the remedy."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
@@ -47,10 +47,14 @@ def level_missing(about: Description) -> str:
     )
 
 
-def level_unknown(about: Description) -> str:
+def level_warning_before_run(about: Description) -> str:
     """Warning before a run that would end in NO-GO for it; empty if not needed."""
     known = sum(position.oriented for position in about.positions)
-    return level_missing(about) if known <= BLIND and about.level_deg is None else ""
+    return (
+        level_missing_warning(about)
+        if known <= BLIND and about.level_deg is None
+        else ""
+    )
 
 
 def check_level(calibration: Calibration, about: Description) -> list[Check]:
@@ -71,7 +75,7 @@ def check_level(calibration: Calibration, about: Description) -> list[Check]:
     if tilt_is_found(calibration) or "acc_bias" not in calibration.groups:
         return list(_other_tilt_checks(calibration))
     if level is None:
-        return [Check("level", False, level_missing(about))]
+        return [Check("level", False, level_missing_warning(about))]
     says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
 

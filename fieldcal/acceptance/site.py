@@ -20,7 +20,7 @@ VILLAGES = 5000.0
 """Height up to which people live, m."""
 
 
-def gravity_unknown(about: Description) -> str:
+def gravity_missing_warning(about: Description) -> str:
     """Sentence with the remedy if gravity is not stated; else empty."""
     if about.gravity_said:
         return ""
@@ -33,7 +33,7 @@ def gravity_unknown(about: Description) -> str:
     )
 
 
-def place_wanted(about: Description) -> str:
+def site_remedy(about: Description) -> str:
     """Remedy if the site is not fully stated, as part of a sentence; else empty."""
     site = about.raw.get("site", {})
     if "latitude_deg" not in site:
@@ -41,7 +41,7 @@ def place_wanted(about: Description) -> str:
     return "" if "height_m" in site else "; state the height of the site (--height)"
 
 
-def gravity_contradicted(about: Description) -> str:
+def gravity_contradiction(about: Description) -> str:
     """Sentence if the stated gravity is impossible at the site; else empty."""
     site = about.raw.get("site", {})
     if not site.get("gravity"):

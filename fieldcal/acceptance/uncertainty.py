@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.acceptance.check import Check, unit_suffix
-from fieldcal.acceptance.site import place_wanted
+from fieldcal.acceptance.site import site_remedy
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
@@ -56,7 +56,7 @@ def check_uncertainty(
                 f" {'within' if ok else 'more than'} {limit:.2g}{shown}"
             )
             if not ok and group == "acc_scale":
-                says += place_wanted(about)
+                says += site_remedy(about)
             if not ok and sensor_of(group) == "acc":
                 says += _angle_setting_remedy(calibration, limits)
             stands: bool | None = ok

@@ -21,7 +21,7 @@ NAMES = dict(
 """Full name of each channel's bias."""
 
 
-def with_jump(found: Calibration, shown: Explanation) -> Calibration:
+def with_jump(calibration: Calibration, shown: Explanation) -> Calibration:
     """Add a jump of biases that the recording shows to `info`.
 
     `jump` has the time `at_s`, and under `bias`, by full name, change and standard
@@ -36,5 +36,5 @@ def with_jump(found: Calibration, shown: Explanation) -> Calibration:
                 if channel in NAMES
             }
             info = {"at_s": told["at_s"].value, "bias": bias}
-            return replace(found, info={**found.info, "jump": info})
-    return found
+            return replace(calibration, info={**calibration.info, "jump": info})
+    return calibration

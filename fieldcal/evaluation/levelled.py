@@ -24,7 +24,7 @@ from fieldcal.solve.estimation import RecordedRows
 
 
 def with_tilt_shown(
-    found: Calibration,
+    calibration: Calibration,
     observations: Observations,
     recorded: RecordedRows | None,
     options: Mapping[str, Any],
@@ -33,21 +33,21 @@ def with_tilt_shown(
 
     Parameters
     ----------
-    found : the result with the stated level
+    calibration : the result with the stated level
     observations, recorded, options : arguments of `solve` that it was made from
 
     """
-    level = found.info.get("level_sigma_deg")
-    if level is None or found.method in ("two_position", "scalar"):
-        return found
+    level = calibration.info.get("level_sigma_deg")
+    if level is None or calibration.method in ("two_position", "scalar"):
+        return calibration
     free = solve(
         observations, recorded=recorded, **{**options, "level_sigma_deg": None}
     )
     at = [i for i, name in enumerate(free.names) if group_of(name) in TILTS]
     if not at:
-        return found
+        return calibration
     tilt = free.values[at]
     covariance = free.covariance[np.ix_(at, at)] + level**2 * np.eye(len(at))
     chi2 = float(tilt @ np.linalg.solve(covariance, tilt))  # (1)
     shown = {"chi2": chi2, "dof": len(at), "tilt_deg": float(np.linalg.norm(tilt))}
-    return replace(found, info={**found.info, "tilt_shown": shown})
+    return replace(calibration, info={**calibration.info, "tilt_shown": shown})

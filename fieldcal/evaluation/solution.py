@@ -212,26 +212,33 @@ def solve_prepared(
         return solve(prepared.observations, recorded=recorded, **options)
 
     stated = options["angle_sigma_deg"]
-    found, notes = with_shown_angle_setting(fit, options, shown)
-    shows = _shown_grade(found, prepared.session.about)
+    calibration, notes = with_shown_angle_setting(fit, options, shown)
+    shows = _shown_grade(calibration, prepared.session.about)
     if shows.because:
         options["at_best"] = options["factory"]
         options["factory"] = factory_errors(device, shows.grade)
-        found = fit()
-        found = replace(found, info={**found.info, "grade_shown": asdict(shows)})
-    found = with_tilt_shown(found, prepared.observations, recorded, options)
-    found = _with_warnings(
-        found, prepared, turns, [*notes, *prepared.unexamined_warnings]
+        calibration = fit()
+        calibration = replace(
+            calibration, info={**calibration.info, "grade_shown": asdict(shows)}
+        )
+    calibration = with_tilt_shown(calibration, prepared.observations, recorded, options)
+    calibration = _with_warnings(
+        calibration, prepared, turns, [*notes, *prepared.unexamined_warnings]
     )
-    found = with_rounding_uncertainty(found, prepared.rounding)
+    calibration = with_rounding_uncertainty(calibration, prepared.rounding)
     if options["angle_sigma_deg"] > stated:
-        found = replace(found, info={**found.info, "angles_stated_deg": stated})
+        calibration = replace(
+            calibration, info={**calibration.info, "angles_stated_deg": stated}
+        )
     if shown is None:
         return replace(
-            found, info={**found.info, "unexamined": prepared.examination[1]}
+            calibration,
+            info={**calibration.info, "unexamined": prepared.examination[1]},
         )
-    found = with_omitted_effects(with_jump(found, shown), omitted_effects(shown, found))
-    return with_description_faults(shown.prepared, found)
+    calibration = with_omitted_effects(
+        with_jump(calibration, shown), omitted_effects(shown, calibration)
+    )
+    return with_description_faults(shown.prepared, calibration)
 
 
 def _with_defaults(
@@ -248,35 +255,42 @@ def _with_defaults(
 
 
 def _with_warnings(
-    found: Calibration, prepared: PreparedSession, turns: UseTurns, notes: Sequence[str]
+    calibration: Calibration,
+    prepared: PreparedSession,
+    turns: UseTurns,
+    notes: Sequence[str],
 ) -> Calibration:
     """Add the warnings of the windows; reasons why the result is bad come first."""
     if turns == "yes":
-        _require_turns(found, prepared.session, prepared.windows)
-    ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
+        _require_turns(calibration, prepared.session, prepared.windows)
+    ahead, behind = (
+        ((), calibration.warnings) if calibration.good else (calibration.warnings, ())
+    )
     warnings = (*ahead, *prepared.windows.warnings, *notes, *behind)
-    found = with_provenance(replace(found, warnings=warnings), prepared.session.about)
-    return _in_session_order(found, prepared.order)
+    calibration = with_provenance(
+        replace(calibration, warnings=warnings), prepared.session.about
+    )
+    return _in_session_order(calibration, prepared.order)
 
 
-def _shown_grade(found: Calibration, about: Description) -> GradeShown:
+def _shown_grade(calibration: Calibration, about: Description) -> GradeShown:
     """The grade that a result shows; the stated one if the result is bad.
 
     Accelerometers are ignored if the tilt of the base is neither estimated nor stated:
     it may have been taken for their bias and scale factor.
     """
-    if not found.good:
+    if not calibration.good:
         return GradeShown(about.grade)
-    levelled = found.method == "scalar" or "level_sigma_deg" in found.info
-    levelled |= bool({*TILTS} & {*found.groups})
-    told = [levelled or sensor_of(group_of(n)) != "acc" for n in found.names]
-    names = [name for name, tells in zip(found.names, told, strict=True) if tells]
-    values, sigma = found.values[told], found.sigma[told]
+    levelled = calibration.method == "scalar" or "level_sigma_deg" in calibration.info
+    levelled |= bool({*TILTS} & {*calibration.groups})
+    told = [levelled or sensor_of(group_of(n)) != "acc" for n in calibration.names]
+    names = [name for name, tells in zip(calibration.names, told, strict=True) if tells]
+    values, sigma = calibration.values[told], calibration.sigma[told]
     return GradeShown.of(about.grade, names, values, sigma, about.sent)
 
 
 def _require_turns(
-    found: Calibration, session: Session, windows: UsableWindows
+    calibration: Calibration, session: Session, windows: UsableWindows
 ) -> None:
     """Refuse a result that does not use turns.
 
@@ -291,19 +305,19 @@ def _require_turns(
             "no position was held at rest, so there is no turn between two; leave"
             " out --turns"
         )
-    if "turns" not in found.info:
+    if "turns" not in calibration.info:
         raise NotObservable(
             "no turn between two positions was recorded whole, so the gyroscopes have "
             "no scale factor: record on while the device is turned"
         )
 
 
-def _in_session_order(found: Calibration, order: list[int]) -> Calibration:
+def _in_session_order(calibration: Calibration, order: list[int]) -> Calibration:
     """Put the probabilities of bad positions in the order of session.toml."""
-    bad = found.info.get("bad_position")
+    bad = calibration.info.get("bad_position")
     if bad is None:
-        return found
+        return calibration
     listed = [0.0] * len(bad)
     for i, p in zip(order, bad, strict=True):
         listed[i] = p
-    return replace(found, info={**found.info, "bad_position": listed})
+    return replace(calibration, info={**calibration.info, "bad_position": listed})

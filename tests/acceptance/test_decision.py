@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
 
 from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
-from fieldcal.acceptance.growth import growth
+from fieldcal.acceptance.growth import navigation_errors
 from fieldcal.acceptance.verification import propose_verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.document import schema
@@ -241,7 +241,7 @@ def test_the_growth_of_errors_is_that_of_a_navigator(axes: tuple[str, ...]) -> N
         attitude = Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * now)
         velocity += (attitude.apply(f) - up) * t / steps
     end = (Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * t)).as_rotvec()
-    told = growth(found, G, p, t)
+    told = navigation_errors(found, G, p, t)
     assert told.level == pytest.approx(velocity[:, [0, 2]].std(axis=0).max(), rel=0.07)
     assert told.vertical == pytest.approx(velocity[:, 1].std(), rel=0.07)
     assert told.tilt == pytest.approx(end[:, [0, 2]].std(axis=0).max(), rel=0.07)
@@ -249,7 +249,9 @@ def test_the_growth_of_errors_is_that_of_a_navigator(axes: tuple[str, ...]) -> N
 
 
 def test_growth_is_not_told_of_what_was_not_determined() -> None:
-    told = growth(_only(calibration(), ("acc_bias",)), G, np.eye(3), 60.0).to_json()
+    told = navigation_errors(
+        _only(calibration(), ("acc_bias",)), G, np.eye(3), 60.0
+    ).to_json()
     assert told["heading_sigma_deg"] is None and told["tilt_sigma_deg"] is None
     assert told["vertical_velocity_sigma_m_s"] is not None
 

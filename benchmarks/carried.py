@@ -22,8 +22,8 @@ from benchmarks.concealed.sessions import Session as Played
 from benchmarks.concealed.sessions import plain
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 
 USUAL, SEED = 120, 83_000_000
@@ -81,7 +81,7 @@ def pulls(played: Played, seed: int) -> tuple[dict[str, float], Calibration]:
     moved = (block.six - bare.record(seed).six)[inside]
     session = Session(Path("carried"), played.about)
     session.__dict__["block"] = block
-    found = solved(session, rests(session), angle_sigma_deg=0.0)
+    found = solve_session(session, usable_windows(session), angle_sigma_deg=0.0)
     truth = played.profile.truth
     out = {}
     for name, value, sigma in zip(found.names, found.values, found.sigma, strict=True):

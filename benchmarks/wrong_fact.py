@@ -23,8 +23,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 
@@ -129,7 +129,7 @@ def of_solve(told: Told, played: Played) -> tuple[bool, float]:
     session = Session(Path("wrong-fact"), told.about)
     session.__dict__["block"] = told.block
     try:
-        found: Calibration = solved(session, rests(session))
+        found: Calibration = solve_session(session, usable_windows(session))
     except FieldcalError:
         return False, 0.0
     pairs = zip(found.values, found.sigma, strict=True)

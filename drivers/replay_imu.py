@@ -24,7 +24,7 @@ from fieldcal.drivers.codec import open_codec
 from fieldcal.drivers.driver import Driver, Health
 from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.pace import Pace, speed
-from fieldcal.evaluation.observations import grain_of
+from fieldcal.evaluation.observations import reported_grain
 from fieldcal.session.folder import Session
 from fieldcal.session.sample_files import ENDINGS, read
 
@@ -104,7 +104,7 @@ class _ReplayedSamples(Driver):
     def _load(self, place: Path, options: Options) -> Block:
         if place.is_dir():
             session = Session.open(place)
-            self._grain = grain_of(session)
+            self._grain = reported_grain(session)
             return session.block
         if place.is_file() and not place.name.endswith(ENDINGS):
             block, self._grain = decoded(place, options)

@@ -18,13 +18,13 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import CalibrationFailed, Skipped
 from fieldcal.core.positions import TWO, Position, forces, ladder
+from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import angle_setting
-from fieldcal.evaluation.so_far import SoFar
 from fieldcal.model import thresholds
-from fieldcal.planning.expected_gain import COMMON, ExpectedGain, Worth
+from fieldcal.planning.expected_gain import COMMON, ExpectedGain, PositionGains
 from fieldcal.planning.holding import (
     hold_each,
     hold_until_still,
@@ -64,11 +64,11 @@ def plan(
     refused = {p.degrees for i, p in enumerate(positions) if i not in held}
     content = False
     while True:
-        so_far: SoFar = yield Judge(quick=True)
+        so_far: InterimResult = yield Judge(quick=True)
         worth, places = _worth(so_far, about, positions, refused)
         allowed = most(about, "adaptive") or MOST
         end = _end(so_far, worth, len(positions), allowed, content)
-        if end and so_far.quick:  # it ends by nothing but a search in full
+        if end and so_far.incremental:  # it ends by nothing but a search in full
             so_far = yield Judge()
             worth, places = _worth(so_far, about, positions, refused)
             end = _end(so_far, worth, len(positions), allowed, content)
@@ -85,7 +85,7 @@ def plan(
         except Skipped as skipped:
             yield from note(str(skipped))
             refused.add(one.degrees)
-            content = so_far.enough
+            content = so_far.sufficient
 
 
 def _run(about: Description) -> dict[str, Any]:
@@ -105,11 +105,11 @@ def candidates(about: Description) -> list[Position]:
 
 
 def _worth(
-    so_far: SoFar,
+    so_far: InterimResult,
     about: Description,
     positions: Sequence[Position],
     refused: Collection[tuple[float, float] | None],
-) -> tuple[Worth | None, list[Position]]:
+) -> tuple[PositionGains | None, list[Position]]:
     """What each position that is left to choose would tell; None if nobody knows."""
     places = [p for p in candidates(about) if p.degrees not in refused]
     explanation = so_far.explanation
@@ -123,14 +123,18 @@ def _worth(
     return gain.of(places), places
 
 
-def _allowed(so_far: SoFar) -> dict[str, float]:
+def _allowed(so_far: InterimResult) -> dict[str, float]:
     """Uncertainty that is allowed of each parameter that has to be known."""
     names = [f"{g}.{a}" for g in REQUIRED for a in "xyz"]
     return {n: so_far.limits.sigma(group_of(n)) or np.inf for n in names}
 
 
 def _end(
-    so_far: SoFar, worth: Worth | None, held: int, most: int, content: bool
+    so_far: InterimResult,
+    worth: PositionGains | None,
+    held: int,
+    most: int,
+    content: bool,
 ) -> str:
     """Why it ends here, for the operator; empty if it goes on.
 
@@ -138,12 +142,15 @@ def _end(
     """
     count = f"after {held} positions"
     if worth is None:
-        why = so_far.laid.examined[1] or "there is none left to choose from"
+        why = (
+            so_far.prepared_session.examination[1]
+            or "there is none left to choose from"
+        )
         return f"{count} nothing can be said of a further one: {why}"
     little = float(worth.gain.max()) < LITTLE
-    if so_far.enough and little:
+    if so_far.sufficient and little:
         return f"{count} all is known that was asked for"
-    if so_far.enough and content:
+    if so_far.sufficient and content:
         return "it is GO, and what would tell more was left out"
     name = _named(so_far)
     if name and not _uncertain(so_far):
@@ -153,28 +160,34 @@ def _end(
     return ""
 
 
-def _uncertain(so_far: SoFar) -> bool:
+def _uncertain(so_far: InterimResult) -> bool:
     """Whether what fails is that something is not known well enough."""
-    return so_far.found is None or any(
-        n.endswith("uncertainty") or n == "level" for n in so_far.failed
+    return so_far.calibration is None or any(
+        n.endswith("uncertainty") or n == "level" for n in so_far.failed_checks
     )
 
 
-def _named(so_far: SoFar) -> str:
+def _named(so_far: InterimResult) -> str:
     """The cause that is certain, and nothing else may stand in its place.
 
     What a calibration finds anyway, the tilt of the base among it, is not wrong.
     """
-    if so_far.enough or so_far.explanation is None:
+    if so_far.sufficient or so_far.explanation is None:
         return ""
-    own = {group_of(name) for name in so_far.found.names} if so_far.found else set()
+    own = (
+        {group_of(name) for name in so_far.calibration.names}
+        if so_far.calibration
+        else set()
+    )
     own |= COMMON.keys()
     wrong = [s for s in so_far.explanation.standing if s.name not in own]
     sure = [s for s in wrong if s.probability > thresholds.CERTAIN and not s.aliases]
     return ", ".join(s.name for s in sure) if len(sure) == len(wrong) else ""
 
 
-def _choice(worth: Worth | None, places: Sequence[Position], last: Position) -> int:
+def _choice(
+    worth: PositionGains | None, places: Sequence[Position], last: Position
+) -> int:
     """The place worth most; of those alike the one nearest to the last position."""
     if worth is None:
         raise CalibrationFailed("there is no position left to choose from")
@@ -184,19 +197,19 @@ def _choice(worth: Worth | None, places: Sequence[Position], last: Position) -> 
     return nearest
 
 
-def _why(so_far: SoFar, worth: Worth | None, place: int) -> str:
+def _why(so_far: InterimResult, worth: PositionGains | None, place: int) -> str:
     """Why the next position is asked for."""
-    told = worth.foremost(place) if worth else ""
-    what = f"the {title(told)}" if "." in told else f"whether there is {told}"
-    if so_far.enough:
+    told = worth.most_improved(place) if worth else ""
+    what = f"the {parameter_title(told)}" if "." in told else f"whether there is {told}"
+    if so_far.sufficient:
         return f"GO so far; the next position tells {what}; s pressed twice ends here"
-    lacking = ", ".join(so_far.failed).replace("_", " ") or so_far.says
+    lacking = ", ".join(so_far.failed_checks).replace("_", " ") or so_far.failure
     return f"not GO yet ({lacking}); the next position tells {what}"
 
 
 def _ended(
-    so_far: SoFar, positions: Sequence[Position], held: dict[int, Average]
+    so_far: InterimResult, positions: Sequence[Position], held: dict[int, Average]
 ) -> Calibration:
-    if so_far.found is None:
-        raise CalibrationFailed(so_far.says)
-    return with_skipped_positions(so_far.found, positions, held)
+    if so_far.calibration is None:
+        raise CalibrationFailed(so_far.failure)
+    return with_skipped_positions(so_far.calibration, positions, held)

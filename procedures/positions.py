@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import WIDE, Position
-from fieldcal.evaluation.observations import angle_setting, observations
+from fieldcal.evaluation.observations import angle_setting, build_observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
 from fieldcal.session.description import Description
@@ -23,7 +23,7 @@ def plan(
 ) -> Plan[Calibration]:
     """Hold the positions of `about` for `seconds` each and solve."""
     held = yield from hold_each(about.positions, seconds, sigma)
-    seen = observations(about, list(held.values()), list(held))
+    seen = build_observations(about, list(held.values()), list(held))
     found = solve(
         seen,
         level_sigma_deg=about.level_deg,

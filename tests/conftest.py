@@ -77,7 +77,7 @@ SPREAD = frozenset(
         "test_in_motion",
         "test_levelled",
         "test_nested_windows",
-        "test_not_carried",
+        "test_omitted_effects",
         "test_twin",
     ]
 )

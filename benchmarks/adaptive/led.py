@@ -16,7 +16,7 @@ from benchmarks.concealed.sessions import Session
 from fieldcal.calibration import limits
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.so_far import SoFar
+from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.planning.steps import Add, Hold, Judge
 from fieldcal.run import plan_file
 from fieldcal.run.judging import judged
@@ -117,16 +117,19 @@ def led(bench: Bench, run: Mapping[str, Any], places: Any, seed: int) -> Run:
             one.run(driver)
         end = judged(folder, bounds)
     named = _named(bench.session, end)
-    found = end.found
+    found = end.calibration
     if found is None:
-        held = len(end.laid.still.rows)
+        held = len(end.prepared_session.windows.position_numbers)
         return Run(held, np.nan, False, named, 0.0, np.nan, ())
     go = found.good and bool(found.info["decision"]["go"])
     error = _held_out(
         bench, virtual, hand, dict(zip(found.names, found.values, strict=True))
     )
     off = _off(bench.session, found)
-    held, choices = len(end.laid.still.rows), tuple(one.choices)
+    held, choices = (
+        len(end.prepared_session.windows.position_numbers),
+        tuple(one.choices),
+    )
     until_go = float(np.fmin(one.until_go, held if go else np.nan))
     return Run(held, until_go, go, named, off, error, choices)
 
@@ -150,15 +153,15 @@ class Timed(SessionRun):
                     self.choices.append(time.process_time() - since)
                     since = np.nan
                 reply = yield step
-                if isinstance(reply, SoFar) and reply.enough:
-                    now = len(reply.laid.still.rows)
+                if isinstance(reply, InterimResult) and reply.sufficient:
+                    now = len(reply.prepared_session.windows.position_numbers)
                     self.until_go = float(np.fmin(self.until_go, now))
                 step = plan.send(reply)
         except StopIteration as done:
             return done.value
 
 
-def _named(session: Session, end: SoFar) -> bool:
+def _named(session: Session, end: InterimResult) -> bool:
     """Whether what is concealed is named, or an alias of it, and nothing else."""
     if end.explanation is None:
         return False

@@ -21,8 +21,8 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import profile as device
@@ -115,7 +115,7 @@ def calibrated(block: Block) -> Calibration:
         with Recorder(Path(folder) / "pier", about) as recorder:
             recorder.append(block)
         session = Session.open(Path(folder) / "pier")
-        return solved(session, rests(session), "no", PERFECT)
+        return solve_session(session, usable_windows(session), "no", PERFECT)
 
 
 def biases(found: Calibration, names: Sequence[str]) -> tuple[Array, Array]:

@@ -1,10 +1,10 @@
 """Whether wrong angles would be noticed.
 
-A calibration is only as good as the angles that were set. `solve.reliability` states
-for each kind of mistake, at its largest size, by how much it shows in the fit, l (the
-root of the non-centrality of chi-squared), and by how much it moves a parameter, d. A
-mistake is harmful if it moves the parameter by more than five standard uncertainties s
-and still shows by less than L. If all sizes from 0 to the largest are equally likely,
+A calibration is only as good as the angles that were set. For each kind of mistake at
+its largest size, `solve.reliability` states how well it shows in the fit, l (the root
+of the non-centrality of chi-squared), and the shift d of a parameter. A mistake is
+harmful if it moves the parameter by more than five standard uncertainties s while its l
+is less than L. If all sizes from 0 to the largest are equally likely,
 
     part = max(0, min(1, L / l) - 5 s / d)                                         (1)
 
@@ -34,7 +34,7 @@ SHOWN = 5.0
 """L of (1). With ten degrees of freedom, chi-squared of 25 above its mean is rarer than
 1e-4, which is NO-GO."""
 
-REMEDY = (
+ANGLES_REMEDY = (
     "state how well the angles are set (--angles, or [site] angle_setting_deg in"
     " session.toml), or record a check that needs no angles: three or more other faces"
     " (each a [[position]] without angles), or a verification position in which all"
@@ -42,38 +42,38 @@ REMEDY = (
 )
 
 FACES, UPRIGHT = 3, 0.5
-"""Faces without angles that check those of the others, and part of g that an axis has
-to feel for its own to be checked: of small ladders one feels a tenth."""
+"""Number of faces without angles that check the other angles, and part of g that an
+axis must measure to be checked: on small ladders one axis measures a tenth."""
 
 UNSEEN = 0.1
-"""Largest part (1) of the mistakes of one kind that is accepted."""
+"""Largest accepted part (1) of harmful mistakes of one kind."""
 
 VIRTUAL = "virtual"
-"""The mover whose angles are no one's statement: it is told them by us."""
+"""Mover without a stated uncertainty of angles: its angles are set by this program."""
 
 
-def unwitnessed(
-    found: Calibration,
+def unnoticed_angle_error(
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     verification: Verification | None,
     family: Sequence[Calibration] | None,
 ) -> str:
-    """Sentence if wrong angles would not be noticed; else empty."""
+    """Sentence about wrong angles that would not be noticed; else empty."""
     if about.angles_from or _set_by_program(about):
         return ""
     worst, part, most, sigmas = None, UNSEEN, "", 0.0
-    for each in found.info.get("wrong_angles", ()):
+    for each in calibration.info.get("wrong_angles", ()):
         wrong = WrongAngles.from_json(each)
         shows = float(
             np.sqrt(
                 wrong.shows**2
                 + _shown_by_verification(wrong, verification)
-                + _shown_by_family(wrong, found, limits, family)
+                + _shown_by_family(wrong, calibration, limits, family)
             )
         )
         off = {
-            n: abs(d) / found.uncertainty(n)
+            n: abs(d) / calibration.uncertainty(n)
             for n, d in wrong.moves.items()
             if limits.sigma(group_of(n)) is not None
         }
@@ -86,34 +86,34 @@ def unwitnessed(
     if worst is None:
         return ""
     return (
-        f"wrong angles would not be noticed: {worst.says} could move {most} by up to"
-        f" {sigmas:.0f} σ"
+        f"wrong angles would not be noticed: {worst.description} could move {most} by"
+        f" up to {sigmas:.0f} σ"
     )
 
 
-def would_explain(found: Calibration, off: Mapping[str, float]) -> str:
-    """A mistake of an angle that moves a parameter as far unnoticed; else empty.
+def angle_error_explaining(calibration: Calibration, off: Mapping[str, float]) -> str:
+    """Unnoticed mistake of an angle that could explain a change, in words; else empty.
 
     Parameters
     ----------
-    found : the calibration
-    off : by full name, how far each parameter is from nominal
+    calibration : the calibration
+    off : difference of each parameter from nominal, by full name
 
     """
-    for each in found.info.get("wrong_angles", ()):
+    for each in calibration.info.get("wrong_angles", ()):
         wrong = WrongAngles.from_json(each)
         for name, size in off.items():
             most = abs(wrong.moves.get(name, 0.0))
             if size <= most and wrong.shows * size / most < SHOWN:
-                return wrong.says
+                return wrong.description
     return ""
 
 
-def unstated(about: Description) -> str:
-    """Warning before a run whose angles nobody vouches for; empty if it needs none.
+def unstated_angles_warning(about: Description) -> str:
+    """Warning before a run if the uncertainty of angles is not stated; else empty.
 
-    It needs none where each axis is to point up or down, or three faces beside the
-    ladder are to be held: gravity measures the angles there.
+    It is also empty if each axis is to point up or down, or if three faces besides the
+    ladder are planned: gravity checks the angles there.
     """
     said = about.angle_setting_deg is not None or about.angles_from
     oriented = [p for p in about.positions if p.oriented]
@@ -130,14 +130,16 @@ def unstated(about: Description) -> str:
     )
 
 
-def stated(found: Calibration, about: Description, limits: GradeLimits) -> bool:
-    """Whether somebody said how well the angles are set, in the session or to solve."""
-    used = float(found.info.get("angle_sigma_deg") or 0.0)
+def angles_are_stated(
+    calibration: Calibration, about: Description, limits: GradeLimits
+) -> bool:
+    """Whether the uncertainty of angles is stated, in the session or as an option."""
+    used = float(calibration.info.get("angle_sigma_deg") or 0.0)
     return about.angle_setting_deg is not None or used < limits.angle_setting_deg
 
 
 def _set_by_program(about: Description) -> bool:
-    """Whether a program sets the angles, and nobody states them."""
+    """Whether this program sets the angles of a virtual device."""
     run = about.raw.get("run", {})
     mover = run.get("mover", {}) if isinstance(run, dict) else {}
     return isinstance(mover, dict) and mover.get("kind") == VIRTUAL
@@ -146,17 +148,17 @@ def _set_by_program(about: Description) -> bool:
 def _shown_by_verification(
     wrong: WrongAngles, verification: Verification | None
 ) -> float:
-    """l^2 that a position adds that was not fitted."""
-    return 0.0 if verification is None else verification.shows(wrong)
+    """Contribution to l^2 of a position that was not fitted."""
+    return 0.0 if verification is None else verification.noncentrality(wrong)
 
 
 def _shown_by_family(
     wrong: WrongAngles,
-    found: Calibration,
+    calibration: Calibration,
     limits: GradeLimits,
     family: Sequence[Calibration] | None,
 ) -> float:
-    """l^2 that earlier calibrations add: what differs from all of them is seen."""
+    """Contribution to l^2 of earlier calibrations, which would differ from this one."""
     seen = [0.0]
     for name, moved in wrong.moves.items():
         earlier = [c for c in family or () if name in c.names]
@@ -168,5 +170,5 @@ def _shown_by_family(
             np.array([c.uncertainty(name) for c in earlier]),
             repeat,
         )
-        seen.append((moved / usual.sigma(found.uncertainty(name))) ** 2)
+        seen.append((moved / usual.sigma(calibration.uncertainty(name))) ** 2)
     return max(seen)

@@ -1,8 +1,8 @@
 """GO or NO-GO of a recorded session and its calibration; stores it in the history.
 
-What is not in the calibration is read from the session: temperatures and missing
-samples of the windows, the position that was not fitted, the counts of the link, and
-what the operator insisted on.
+Facts that are not in the calibration are read from the session: temperatures and
+missing samples of the windows, the verification position, the counts of the link, and
+positions that the operator accepted in spite of a warning.
 """
 
 from __future__ import annotations
@@ -15,19 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.centred import biases_taken_out
+from fieldcal.acceptance.bias_removal import BiasSpread
 from fieldcal.acceptance.decision import Circumstances, decide, with_decision
-from fieldcal.acceptance.jump import jumps_too_far
-from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
-from fieldcal.acceptance.temperature import since_last
-from fieldcal.acceptance.tracked import BiasSpread
-from fieldcal.acceptance.verification import Verification, planned, verify
-from fieldcal.acceptance.warmed import WarmedFamily, warmed
+from fieldcal.acceptance.family_at_temperature import (
+    FamilyAtTemperature,
+    family_at_temperature,
+)
+from fieldcal.acceptance.jump import bias_jump_warning
+from fieldcal.acceptance.mean_removal import removed_bias_sentences
+from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
+from fieldcal.acceptance.temperature import effect_of_temperature_change
+from fieldcal.acceptance.verification import Verification, planned_verification, verify
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join
-from fieldcal.evaluation.observations import Rests
+from fieldcal.evaluation.observations import UsableWindows
 from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.session.installed import tells_an_offset
@@ -36,26 +39,26 @@ from fieldcal.windows.dead_axis import broken
 
 
 def assess(
-    found: Calibration,
+    calibration: Calibration,
     session: Session,
-    still: Rests,
+    windows: UsableWindows,
     limits: GradeLimits,
     history: History | None,
 ) -> Calibration:
-    """The calibration with the decision about it, and where and when it was taken.
+    """The calibration with its decision, site and time.
 
     Parameters
     ----------
-    found : calibration of the session
+    calibration : calibration of the session
     session : the recording
-    still : its windows
-    limits : of the device's grade
-    history : of earlier calibrations, None for none
+    windows : its usable windows
+    limits : limits of the device's grade
+    history : earlier calibrations; None without a history
 
     """
     marks = list(session.marks())
-    warnings = list(found.warnings)
-    earlier: WarmedFamily | None = None
+    warnings = list(calibration.warnings)
+    earlier: FamilyAtTemperature | None = None
     usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
     if history is not None and serial:
@@ -63,64 +66,76 @@ def assess(
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
             usual = family(runs)
-            earlier = warmed(found, usual, limits)
+            earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
     dead = broken(session.block.six)
-    taken_out = _taken_out(found, session, still, limits)
+    taken_out = _removed_biases(calibration, session, windows, limits)
     circumstances = Circumstances(
-        temperatures=[a.temperature for a in still.averages],
-        link=_link(session, still.averages, marks),
-        verification=_verification(found, session, marks, limits),
+        temperatures=[a.temperature for a in windows.averages],
+        link=_link(session, windows.averages, marks),
+        verification=_verification(calibration, session, marks, limits),
         family=earlier.calibrations if earlier else None,
-        warmth=earlier.sigma if earlier else {},
-        doubts=[*_doubts(marks), *dead, *taken_out],
-        windows=still.at_rest(session).averages,
-        held=[session.about.positions[i] for i in still.rows],
+        temperature_sigma=earlier.sigma if earlier else {},
+        doubts=[*_insisted_positions(marks), *dead, *taken_out],
+        windows=windows.at_rest(session).averages,
+        held_positions=[session.about.positions[i] for i in windows.position_numbers],
     )
-    warnings += [w for w in _restarts(marks) if w not in warnings]
-    made = decide(found, session.about, limits, circumstances)
+    warnings += [w for w in _restart_warnings(marks) if w not in warnings]
+    made = decide(calibration, session.about, limits, circumstances)
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
-    info = {**found.info, "site": site, "taken_at": start_time(marks)}
-    if (costs := since_last(found, usual, limits)) is not None:
+    info = {**calibration.info, "site": site, "taken_at": start_time(marks)}
+    if (costs := effect_of_temperature_change(calibration, usual, limits)) is not None:
         info["temperature_change"] = costs
-    return with_decision(replace(found, warnings=tuple(warnings), info=info), made)
+    return with_decision(
+        replace(calibration, warnings=tuple(warnings), info=info), made
+    )
 
 
-def unassessed(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+def with_faults(
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> Calibration:
-    """The calibration of a session that nobody is to fly with, with what is wrong.
+    """The calibration without a decision, with warnings about faults of the session.
 
-    There is no GO: a recording from elsewhere need not meet limits. What cannot be
-    known of it is said, and facts that are wrong make it bad.
+    A recording from elsewhere need not meet limits, so there is no GO. Missing facts
+    are warnings; wrong facts make the calibration bad.
     """
-    about, of_acc = session.about, "acc_scale" in found.groups
-    unknown = [gravity_unknown(about)] if of_acc else []
-    wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
-    wrong += [jumps_too_far(found, limits)]
-    wrong += _taken_out(found, session, still, limits)
+    about, of_acc = session.about, "acc_scale" in calibration.groups
+    unknown = [gravity_missing_warning(about)] if of_acc else []
+    wrong = [gravity_contradiction(about)] if of_acc else []
+    wrong += [
+        _undetermined_by_omission(calibration, session, windows, limits),
+        *broken(session.block.six),
+    ]
+    wrong += [bias_jump_warning(calibration, limits)]
+    wrong += _removed_biases(calibration, session, windows, limits)
     wrong = [w for w in wrong if w]
-    warnings = (*wrong, *found.warnings, *filter(None, unknown))
-    return replace(found, warnings=warnings, good=found.good and not wrong)
+    warnings = (*wrong, *calibration.warnings, *filter(None, unknown))
+    return replace(calibration, warnings=warnings, good=calibration.good and not wrong)
 
 
-def _lacking(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+def _undetermined_by_omission(
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> str:
-    """What is not determined where positions had to be left out; empty for nothing.
+    """Sentence about parameters that are undetermined because positions were left out.
 
-    That is what is known no better than of any unit of the grade. A person who recorded
-    so few on purpose knows what they do not show.
+    A parameter counts as undetermined if its uncertainty is no smaller than the
+    tolerance of the grade. Empty if no position was left out: a session with few
+    positions may be intended.
     """
-    out = len(session.positions) - len(still.rows)
+    out = len(session.positions) - len(windows.position_numbers)
     lost = [
         f"{group}.{axis}"
         for group in ("acc_bias", "acc_scale")
-        if group in found.groups
-        for axis, s in zip("xyz", found.vector(group)[1], strict=True)
+        if group in calibration.groups
+        for axis, s in zip("xyz", calibration.vector(group)[1], strict=True)
         if not s < (limits.tolerance(group) or np.inf)
     ]
     if not out or not lost:
@@ -134,31 +149,36 @@ def _lacking(
     )
 
 
-def _taken_out(
-    found: Calibration, session: Session, still: Rests, limits: GradeLimits
+def _removed_biases(
+    calibration: Calibration,
+    session: Session,
+    windows: UsableWindows,
+    limits: GradeLimits,
 ) -> list[str]:
-    """Whether biases were subtracted, where they are as large as those found."""
-    held = still.at_rest(session).averages
-    seen = np.nan_to_num(found.vector("acc_bias")[0])
+    """Sentences if biases of the size found were subtracted from the recording."""
+    held = windows.at_rest(session).averages
+    seen = np.nan_to_num(calibration.vector("acc_bias")[0])
     gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
     repeat = limits.acc_bias_repeat, gyroscopes
-    return biases_taken_out(held, session.block, repeat, seen, limits.fit_chance)
+    return removed_bias_sentences(held, session.block, repeat, seen, limits.fit_chance)
 
 
-def store_in_history(history: History, session: Session, found: Calibration) -> str:
+def store_in_history(
+    history: History, session: Session, calibration: Calibration
+) -> str:
     """Store a calibration in the history; returns a sentence for the operator."""
     if not session.about.device.get("serial"):
         return ""
-    at = str(found.info.get("taken_at") or start_time([]))
+    at = str(calibration.info.get("taken_at") or start_time([]))
     try:
-        history.add(at, session.folder, found)
+        history.add(at, session.folder, calibration)
     except FieldcalError as error:
         return f"the calibration is not stored in the history: {error}"
     return ""
 
 
 def start_time(marks: Sequence[Mapping[str, Any]]) -> str:
-    """When the first position was asked for, ISO 8601 in UTC; now without marks."""
+    """Time of the first mark, ISO 8601 in UTC; the present time without marks."""
     times = [m["host_s"] for m in marks if isinstance(m.get("host_s"), int | float)]
     at = datetime.fromtimestamp(times[0], UTC) if times else datetime.now(UTC)
     return at.isoformat(timespec="seconds")
@@ -167,7 +187,7 @@ def start_time(marks: Sequence[Mapping[str, Any]]) -> str:
 def verification_window(
     marks: Sequence[Mapping[str, Any]], number: int
 ) -> tuple[float, float] | None:
-    """Window of the position numbered behind the fitted ones, s of device time."""
+    """Window of the position after the fitted ones, by its number, s of device time."""
     windows = [
         (float(m["start_s"]), float(m["end_s"]))
         for m in marks
@@ -177,12 +197,12 @@ def verification_window(
 
 
 def _verification(
-    found: Calibration,
+    calibration: Calibration,
     session: Session,
     marks: Sequence[Mapping[str, Any]],
     limits: GradeLimits,
 ) -> Verification | None:
-    position = planned(session.about)
+    position = planned_verification(session.about)
     window = verification_window(marks, len(session.positions))
     if position is None or window is None:
         return None
@@ -191,15 +211,15 @@ def _verification(
     except FieldcalError:
         return None
     angle = float(np.deg2rad(limits.angle_setting_deg))
-    return verify(found, session.about, position, held, angle)
+    return verify(calibration, session.about, position, held, angle)
 
 
 def _link(
     session: Session, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
 ) -> dict[str, int]:
-    """Samples in the windows, those missing there, and frames refused in all.
+    """Samples and missing samples in the windows, and refused frames of the run.
 
-    What is missing between the pieces of a window is no part of it.
+    Gaps between the used pieces of a window do not count as missing.
     """
     samples = missing = 0
     block, gaps = session.block, session.about.without
@@ -216,7 +236,7 @@ def _link(
     return {"samples": samples, "missing": missing, "bad": bad}
 
 
-def _doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
+def _insisted_positions(marks: Sequence[Mapping[str, Any]]) -> list[str]:
     """Positions that the operator confirmed although they looked wrong."""
     insisted: dict[int, str] = {}
     for mark in marks:
@@ -233,8 +253,8 @@ def _doubts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _restarts(marks: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Say that windows come from before and after a restart of the device."""
+def _restart_warnings(marks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Warnings that the windows come from before and after a restart of the device."""
     taken: list[int] = []
     said = []
     for mark in marks:

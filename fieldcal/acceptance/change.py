@@ -1,6 +1,6 @@
-"""Whether a calibration is of one family with earlier ones of the same device.
+"""Compares a calibration with earlier ones of the same device.
 
-The history is compared with; nothing of it enters the calibration.
+The history does not influence the calibration.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fieldcal.acceptance.check import Check, shown_unit
+from fieldcal.acceptance.check import Check, unit_suffix
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName, group_of
@@ -17,20 +17,20 @@ from fieldcal.history.family import expected
 
 
 def check_change(
-    found: Calibration,
+    calibration: Calibration,
     limits: GradeLimits,
     family: Sequence[Calibration] | None,
     warmth: Mapping[str, float],
 ) -> list[Check]:
-    """Compare each group with what the history lets expect, by its worst parameter.
+    """Compare each group with earlier calibrations, by its most unusual parameter.
 
     Parameters
     ----------
-    found : the calibration
-    limits : of its grade
-    family : earlier ones, at its temperature; None without a history
-    warmth : by how much parameters may differ because earlier ones were taken at
-        other temperatures, 1 sigma by full name
+    calibration : the calibration
+    limits : limits of its grade
+    family : earlier calibrations at its temperature; None without a history
+    warmth : additional uncertainty for the change of temperature since, 1 sigma, by
+        full name
 
     """
     if family is None:
@@ -39,12 +39,12 @@ def check_change(
     if not family:
         says = "no comparison: this is the first calibration of this device"
         return [Check("change", None, says)]
-    known = [n for n in found.names if limits.repeat(group_of(n)) is not None]
+    known = [n for n in calibration.names if limits.repeat(group_of(n)) is not None]
     checks = []
     for group in dict.fromkeys(group_of(n) for n in known):
         names = [n for n in known if group_of(n) == group]
         made = [
-            _compared(found, n, limits, family, len(known), warmth.get(n, 0.0))
+            _compared(calibration, n, limits, family, len(known), warmth.get(n, 0.0))
             for n in names
         ]
         checks += sorted(filter(None, made), key=lambda c: c.value or 0.0)[:1]
@@ -52,7 +52,7 @@ def check_change(
 
 
 def _compared(
-    found: Calibration,
+    calibration: Calibration,
     name: str,
     limits: GradeLimits,
     family: Sequence[Calibration],
@@ -65,8 +65,8 @@ def _compared(
     repeat = limits.repeat(parameter.group)
     if not earlier or repeat is None:
         return None
-    value = found.value(name)
-    sigma = float(np.hypot(found.uncertainty(name), warmth))
+    value = calibration.value(name)
+    sigma = float(np.hypot(calibration.uncertainty(name), warmth))
     usual = expected(
         np.array([c.value(name) for c in earlier]),
         np.array([c.uncertainty(name) for c in earlier]),
@@ -74,7 +74,7 @@ def _compared(
     )
     chance, limit = usual.chance(value, sigma), limits.family_chance / together
     ok = chance >= limit
-    unit = shown_unit(found.units[found.names.index(name)])
+    unit = unit_suffix(calibration.units[calibration.names.index(name)])
     says = (
         f"{parameter.group} {parameter.component} differs from {usual.runs} earlier"
         f" calibration{'s' if usual.runs > 1 else ''}"

@@ -12,11 +12,11 @@ class Check:
 
     Attributes
     ----------
-    name : of what was checked
-    ok : whether it is within the limit; None where it could not be checked
-    says : one sentence
-    value, limit : None where there is no number
-    unit : of both
+    name : name of the check
+    ok : whether the value is within the limit; None if it could not be checked
+    says : sentence with the result
+    value, limit : compared numbers; None if there are none
+    unit : unit of both
 
     """
 
@@ -28,13 +28,13 @@ class Check:
     unit: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """As it stands in the document."""
+        """Return the object of result.json."""
         out: dict[str, Any] = {"name": self.name, "ok": self.ok, "says": self.says}
         if self.value is not None:
             out |= {"value": self.value, "limit": self.limit, "unit": self.unit}
         return out
 
 
-def shown_unit(unit: str) -> str:
-    """What stands behind a number; nothing behind one without a unit."""
+def unit_suffix(unit: str) -> str:
+    """Unit to be written after a number, with a space; empty for a plain number."""
     return "" if unit == "1" else f" {unit.replace('^2', '²')}"

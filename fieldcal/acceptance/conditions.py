@@ -14,7 +14,7 @@ from fieldcal.calibration.limits import GradeLimits
 def check_temperature(
     temperatures: np.ndarray[Any, Any], limits: GradeLimits
 ) -> list[Check]:
-    """Whether windows were taken in the allowed range, and at one temperature."""
+    """Check the range of temperatures, and the change between windows."""
     known = temperatures[np.isfinite(temperatures)]
     if not len(known):
         return [Check("temperature", None, "the device reports no temperature")]
@@ -40,7 +40,7 @@ def check_temperature(
 
 
 def check_link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Check]:
-    """Whether the link lost or damaged no more than is allowed."""
+    """Check the shares of lost samples and of refused frames."""
     if not link or not link.get("samples"):
         return [Check("link", None, "losses of the link were not recorded")]
     samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))

@@ -1,8 +1,8 @@
 """GO or NO-GO: a calibration against the limits of its grade, with reasons.
 
-Each check says in a sentence what was measured and what is allowed. A check that could
-not be made, without a thermometer or earlier calibrations, is reported and is no reason
-for NO-GO. The history is compared with; nothing of it enters the calibration.
+Each check states in a sentence what was measured and what is allowed. A check that
+could not be made, for lack of a thermometer or of earlier calibrations, is reported and
+is not a reason for NO-GO. The history does not influence the calibration.
 """
 
 from __future__ import annotations
@@ -13,21 +13,29 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.acceptance.angles import REMEDY, stated, unwitnessed
+from fieldcal.acceptance.angles import (
+    ANGLES_REMEDY,
+    angles_are_stated,
+    unnoticed_angle_error,
+)
 from fieldcal.acceptance.change import check_change
 from fieldcal.acceptance.check import Check
 from fieldcal.acceptance.conditions import check_link, check_temperature
-from fieldcal.acceptance.factory import relies_on_factory
-from fieldcal.acceptance.growth import TIMES, Growth, growth
-from fieldcal.acceptance.harmless import harmless
-from fieldcal.acceptance.jump import jumps_too_far
+from fieldcal.acceptance.factory import check_factory_errors
+from fieldcal.acceptance.growth import TIMES, NavigationErrors, navigation_errors
+from fieldcal.acceptance.harmless import harmless_scatter_note
+from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.level import check_level
-from fieldcal.acceptance.remedy import Remedy, cheapest
-from fieldcal.acceptance.site import gravity_contradicted, gravity_unknown
-from fieldcal.acceptance.turned import turns_disagree
+from fieldcal.acceptance.remedy import Remedy, cheapest_remedy
+from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
+from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
-from fieldcal.acceptance.witnesses import has_witnesses, left_out, witnesses
+from fieldcal.acceptance.witnesses import (
+    has_witnesses,
+    rejected_positions,
+    witness_sentence,
+)
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.chances import chi2_tail
@@ -38,15 +46,15 @@ from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.windows import Average
 
 ANGLES = "angles"
-"""Name of the check that wrong angles would be noticed."""
+"""Name of the check whether wrong angles would be noticed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """All checks, and what the calibration means for a navigator."""
+    """All checks, the navigation errors to expect, and a remedy after NO-GO."""
 
     checks: tuple[Check, ...]
-    growth: tuple[Growth, ...]
+    navigation_errors: tuple[NavigationErrors, ...]
     remedy: Remedy | None = None
 
     @property
@@ -68,13 +76,13 @@ class Circumstances:
     ----------
     temperatures : mean of each window, deg C, nan where unknown
     link : counts of `driver.Health`; empty where unknown
-    verification : of a position that was not fitted, if one was held
+    verification : residual of a position that was not fitted; None without one
     family : earlier calibrations of the device at this temperature, oldest first; None
         without a history
-    warmth : by how much they may differ for having been taken at others, 1 sigma
-    doubts : sentences about what happened on the way that make it NO-GO
-    windows : that it was made of
-    held : positions that have one; empty where all have
+    temperature_sigma : uncertainty added to these for the change of temperature
+    doubts : sentences about events of the run, each a reason for NO-GO
+    windows : windows of the calibration
+    held_positions : positions that have a window; empty if all have
 
     """
 
@@ -82,58 +90,64 @@ class Circumstances:
     link: Mapping[str, int] | None = None
     verification: Verification | None = None
     family: Sequence[Calibration] | None = None
-    warmth: Mapping[str, float] = field(default_factory=dict)
+    temperature_sigma: Mapping[str, float] = field(default_factory=dict)
     doubts: Sequence[str] = ()
     windows: Sequence[Average] = ()
-    held: Sequence[Position] = ()
+    held_positions: Sequence[Position] = ()
 
 
 def decide(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
 ) -> Decision:
     """Check a calibration against limits."""
-    verification = _verification(circumstances.verification, limits)
+    verification = _verification_check(circumstances.verification, limits)
     checks = [
-        _fit(found, limits),
-        *_examined(found),
-        *_odd_positions(found, verification.ok is True),
-        *_gyroscopes(found, limits),
-        *_turns(found, limits),
-        *_jump(found, limits),
-        *_angles(found, about, limits, circumstances),
-        *relies_on_factory(found, about, limits),
-        *check_level(found, about),
-        *check_uncertainty(found, about, limits, circumstances.windows),
-        *_site(found, about),
-        *check_change(found, limits, circumstances.family, circumstances.warmth),
+        _fit_check(calibration, limits),
+        *_examination_checks(calibration),
+        *_doubtful_position_checks(calibration, verification.ok is True),
+        *_gyroscope_checks(calibration, limits),
+        *_turn_checks(calibration, limits),
+        *_jump_checks(calibration, limits),
+        *_angle_checks(calibration, about, limits, circumstances),
+        *check_factory_errors(calibration, about, limits),
+        *check_level(calibration, about),
+        *check_uncertainty(calibration, about, limits, circumstances.windows),
+        *_site_checks(calibration, about),
+        *check_change(
+            calibration, limits, circumstances.family, circumstances.temperature_sigma
+        ),
         verification,
         *check_temperature(np.asarray(circumstances.temperatures, float), limits),
         *check_link(circumstances.link, limits),
         *(Check("the run", False, doubt) for doubt in circumstances.doubts),
     ]
     g, mounting = about.gravity, about.mounting
-    grown = tuple(growth(found, g, mounting, seconds) for seconds in TIMES)
+    grown = tuple(
+        navigation_errors(calibration, g, mounting, seconds) for seconds in TIMES
+    )
     made = Decision(tuple(checks), grown)
     return (
         made
         if made.go
-        else replace(made, remedy=_remedy(found, about, limits, circumstances, checks))
+        else replace(
+            made, remedy=_find_remedy(calibration, about, limits, circumstances, checks)
+        )
     )
 
 
-def _remedy(
-    found: Calibration,
+def _find_remedy(
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
     checks: Sequence[Check],
 ) -> Remedy | None:
-    """The cheapest remedy, where windows tell what one is worth.
+    """The cheapest remedy; None if it cannot be predicted from the windows.
 
-    More positions of the same fixture bear no witness to its angles.
+    More positions of the same fixture do not check its angles.
     """
     windows = circumstances.windows
     if not windows or any(c.name == ANGLES and c.ok is False for c in checks):
@@ -148,12 +162,15 @@ def _remedy(
         for check in checks
         if check.ok is False and check.name.endswith(UNCERTAINTY)
     ]
-    length, held = float(np.ceil(seconds)), circumstances.held or about.positions
-    return cheapest(found, about, held, limits, failed, sigma, length)
+    length, held = (
+        float(np.ceil(seconds)),
+        circumstances.held_positions or about.positions,
+    )
+    return cheapest_remedy(calibration, about, held, limits, failed, sigma, length)
 
 
-def with_decision(found: Calibration, made: Decision) -> Calibration:
-    """The calibration with the decision among its information."""
+def with_decision(calibration: Calibration, made: Decision) -> Calibration:
+    """The calibration with the decision in its `info`."""
     decision: dict[str, Any] = {
         "go": made.go,
         "reasons": list(made.reasons),
@@ -161,39 +178,43 @@ def with_decision(found: Calibration, made: Decision) -> Calibration:
     }
     if made.remedy is not None:
         decision["remedy"] = made.remedy.to_json()
-    expectation = [each.to_json() for each in made.growth]
+    expectation = [each.to_json() for each in made.navigation_errors]
     more = {"decision": decision, "expectation": expectation}
-    return replace(found, info={**found.info, **more})
+    return replace(calibration, info={**calibration.info, **more})
 
 
-def _fit(found: Calibration, limits: GradeLimits) -> Check:
-    if not found.good:
-        return Check("fit", False, "the estimate is bad: " + _first(found))
-    if found.dof <= 0 or not np.isfinite(found.chi2):
+def _fit_check(calibration: Calibration, limits: GradeLimits) -> Check:
+    if not calibration.good:
+        return Check(
+            "fit", False, "the estimate is bad: " + _first_warning(calibration)
+        )
+    if calibration.dof <= 0 or not np.isfinite(calibration.chi2):
         return Check("fit", None, "no degree of freedom is left to check the fit")
-    return _agreement("fit", "positions", found.chi2, found.dof, found, limits)
+    return _agreement_check(
+        "fit", "positions", calibration.chi2, calibration.dof, calibration, limits
+    )
 
 
-def _gyroscopes(found: Calibration, limits: GradeLimits) -> list[Check]:
-    """Whether the gyroscopes' means agree, where others measured beside them."""
-    gyr = found.info.get("gyroscopes", {})
+def _gyroscope_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
+    """Check the agreement of the gyroscopes' means, if accelerometers were measured."""
+    gyr = calibration.info.get("gyroscopes", {})
     chi2, dof = float(gyr.get("chi2", 0.0)), int(gyr.get("dof", 0))
-    if dof <= 0 or "acc_bias" not in found.groups:
+    if dof <= 0 or "acc_bias" not in calibration.groups:
         return []
     what = "gyroscopes at rest"
-    return [_agreement("gyroscopes", what, chi2, dof, found, limits, "gyr")]
+    return [_agreement_check("gyroscopes", what, chi2, dof, calibration, limits, "gyr")]
 
 
-def _agreement(
+def _agreement_check(
     name: str,
     what: str,
     chi2: float,
     dof: int,
-    found: Calibration,
+    calibration: Calibration,
     limits: GradeLimits,
     sensor: str = "acc",
 ) -> Check:
-    """Whether means of a sensor agree, or by how little they do not."""
+    """Check the agreement of the means of a sensor; a harmless scatter passes."""
     chance = chi2_tail(chi2, dof)
     agree = chance >= limits.fit_chance
     word = "agree" if agree else "do not agree"
@@ -202,15 +223,15 @@ def _agreement(
         f" {dof} degrees of freedom, probability {chance:.2g}, required"
         f" {limits.fit_chance:.2g}"
     )
-    if not agree and (small := harmless(found, limits, sensor)):
+    if not agree and (small := harmless_scatter_note(calibration, limits, sensor)):
         says += f"; {small}"
         agree = True
     return Check(name, agree, says, chance, limits.fit_chance, "1")
 
 
-def _examined(found: Calibration) -> list[Check]:
-    """No GO by means alone: samples and turns might contradict them."""
-    why = found.info.get("unexamined")
+def _examination_checks(calibration: Calibration) -> list[Check]:
+    """NO-GO if only means were used: samples and turns might contradict them."""
+    why = calibration.info.get("unexamined")
     if not why:
         return []
     says = (
@@ -220,73 +241,78 @@ def _examined(found: Calibration) -> list[Check]:
     return [Check("recording", False, says)]
 
 
-def _odd_positions(found: Calibration, verified: bool) -> list[Check]:
-    """Name a position that does not fit the others; without witnesses it is NO-GO."""
-    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+def _doubtful_position_checks(calibration: Calibration, verified: bool) -> list[Check]:
+    """Report a doubtful position; NO-GO if too few others confirm the result."""
+    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
     checks = [Check("positions", None, doubt.sentence)] if doubt else []
-    if verified or not left_out(found):
+    if verified or not rejected_positions(calibration):
         return checks
-    return [*checks, Check("witnesses", has_witnesses(found), witnesses(found))]
+    return [
+        *checks,
+        Check("witnesses", has_witnesses(calibration), witness_sentence(calibration)),
+    ]
 
 
-def _turns(found: Calibration, limits: GradeLimits) -> list[Check]:
-    """Whether the gyroscopes were turned as the positions say."""
-    apart = turns_disagree(found, limits)
+def _turn_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
+    """Check whether the turns measured by the gyroscopes agree with the positions."""
+    apart = turn_disagreement(calibration, limits)
     return [Check("turns", False, apart)] if apart else []
 
 
-def _jump(found: Calibration, limits: GradeLimits) -> list[Check]:
-    """Whether it is one device all the time."""
-    far = jumps_too_far(found, limits)
+def _jump_checks(calibration: Calibration, limits: GradeLimits) -> list[Check]:
+    """Check whether biases jump as if another device had been recorded."""
+    far = bias_jump_warning(calibration, limits)
     return [Check("jump", False, far)] if far else []
 
 
-def _angles(
-    found: Calibration,
+def _angle_checks(
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     circumstances: Circumstances,
 ) -> list[Check]:
-    """Whether wrong angles would be noticed."""
+    """Check whether wrong angles would be noticed."""
     given = (circumstances.verification, circumstances.family)
     if about.angles_from:
         says = f"the angles are certified by {one_line(about.angles_from)}"
         return [Check(ANGLES, True, says)]
-    unseen = unwitnessed(found, about, limits, *given)
+    unseen = unnoticed_angle_error(calibration, about, limits, *given)
     if not unseen:
         return []
-    if not stated(found, about, limits):
-        return [Check(ANGLES, False, f"{unseen}; {REMEDY}")]
-    said = found.info.get("angle_sigma_deg") or 0.0
-    shown = "angles_stated_deg" in found.info
+    if not angles_are_stated(calibration, about, limits):
+        return [Check(ANGLES, False, f"{unseen}; {ANGLES_REMEDY}")]
+    said = calibration.info.get("angle_sigma_deg") or 0.0
+    shown = "angles_stated_deg" in calibration.info
     how = "as the recording shows" if shown else "as stated"
     relied = f"the result relies on angles set to ± {said:.2g}°, {how}: {unseen}"
     return [Check(ANGLES, None, relied)]
 
 
-def _first(found: Calibration) -> str:
-    return found.warnings[0] if found.warnings else "see the fit"
+def _first_warning(calibration: Calibration) -> str:
+    return calibration.warnings[0] if calibration.warnings else "see the fit"
 
 
-def _site(found: Calibration, about: Description) -> list[Check]:
-    """Whether gravity is known, which every accelerometer's scale is measured by."""
-    if "acc_scale" not in found.groups:
+def _site_checks(calibration: Calibration, about: Description) -> list[Check]:
+    """Check whether gravity is known: the scale factors refer to it."""
+    if "acc_scale" not in calibration.groups:
         return []
-    wrong = gravity_unknown(about) or gravity_contradicted(about)
+    wrong = gravity_missing_warning(about) or gravity_contradiction(about)
     return [Check("site", False, wrong)] if wrong else []
 
 
-def _verification(verification: Verification | None, limits: GradeLimits) -> Check:
+def _verification_check(
+    verification: Verification | None, limits: GradeLimits
+) -> Check:
     if verification is None:
         says = "no verification position was recorded (--verify)"
         return Check("verification", None, says)
-    far = verification.largest > limits.verification_residual
+    far = verification.residual_size > limits.verification_residual
     odd = verification.chance < limits.verification_chance
     sigma = float(np.linalg.norm(verification.sigma))
     says = (
         f"at {verification.position.name}, which was not fitted, the accelerometers"
-        f" differ from the prediction by {verification.largest:.2g} ± {sigma:.2g} m/s²,"
-        f" allowed {limits.verification_residual:.2g} m/s²"
+        f" differ from the prediction by {verification.residual_size:.2g} ±"
+        f" {sigma:.2g} m/s², allowed {limits.verification_residual:.2g} m/s²"
     )
     if odd:
         says += (
@@ -295,5 +321,10 @@ def _verification(verification: Verification | None, limits: GradeLimits) -> Che
         )
     limit = limits.verification_residual
     return Check(
-        "verification", not (far or odd), says, verification.largest, limit, "m/s^2"
+        "verification",
+        not (far or odd),
+        says,
+        verification.residual_size,
+        limit,
+        "m/s^2",
     )

@@ -1,7 +1,7 @@
-"""What a result relies on that the factory made: errors that are not estimated.
+"""Errors left by the factory that a result assumes and does not estimate.
 
-Hardly anything in few positions would contradict more of them than are usual. Whoever
-decides has to know what is relied on.
+A few positions rarely contradict errors that are larger than usual. The decision
+therefore names what the result relies on.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from fieldcal.acceptance.angles import would_explain
+from fieldcal.acceptance.angles import angle_error_explaining
 from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits, read
@@ -23,32 +23,32 @@ DEG_H = math.radians(1) / 3600
 """rad/s of one degree an hour."""
 
 
-def counted(found: Calibration) -> FactoryErrors:
-    """What a result was made with, of its information."""
+def factory_errors_used(calibration: Calibration) -> FactoryErrors:
+    """Sizes of factory errors that a result was made with, from its `info`."""
     keys = (
         "square_sigma", "quadratic_sigma", "g_sensitivity_sigma",
         "acc_bias_per_k_sigma", "gyr_bias_per_k_sigma", "acc_hysteresis_sigma",
     )  # fmt: skip
-    return FactoryErrors(*(float(found.info.get(key) or 0.0) for key in keys))
+    return FactoryErrors(*(float(calibration.info.get(key) or 0.0) for key in keys))
 
 
-def relies_on_factory(
-    found: Calibration, about: Description, limits: GradeLimits
+def check_factory_errors(
+    calibration: Calibration, about: Description, limits: GradeLimits
 ) -> list[Check]:
-    """How large errors were taken to be that were not estimated."""
-    return list(_checks(found, about, limits))
+    """Report the assumed sizes of errors that were not estimated."""
+    return list(_factory_checks(calibration, about, limits))
 
 
-def _checks(
-    found: Calibration, about: Description, limits: GradeLimits
+def _factory_checks(
+    calibration: Calibration, about: Description, limits: GradeLimits
 ) -> Iterator[Check]:
-    left, usual = counted(found), limits.factory
-    measured = {sensor_of(group_of(n)) for n in found.names}
+    left, usual = factory_errors_used(calibration), limits.factory
+    measured = {sensor_of(group_of(n)) for n in calibration.names}
     of_grade = "as usual for the grade"
-    if shows := found.info.get("grade_shown"):
+    if shows := calibration.info.get("grade_shown"):
         usual = read(shows["grade"]).factory
         of_grade = f"as usual for {shows['grade']} grade"
-        yield _coarser(found, about, shows)
+        yield _coarser_grade_check(calibration, about, shows)
 
     def whose(kind: str, said: float | None = None) -> str:
         size = getattr(left, kind)
@@ -90,13 +90,13 @@ def _checks(
             " state it, and hold each axis up and down"
         )
         yield Check("g-sensitivity", None, says)
-    yield from _per_k(left, measured, whose)
+    yield from _warm_up_check(left, measured, whose)
 
 
-def _per_k(
+def _warm_up_check(
     left: FactoryErrors, measured: set[str], whose: Callable[[str], str]
 ) -> Iterator[Check]:
-    """How much biases were taken to change by, while the device warms up."""
+    """Report the assumed change of biases while the device warms up."""
     sizes = {
         "acc": (left.acc_per_k, f"{1e3 * left.acc_per_k / G0:.2g} mg"),
         "gyr": (left.gyr_per_k, f"{float(f'{left.gyr_per_k / DEG_H:.2g}'):g} deg/h"),
@@ -112,18 +112,20 @@ def _per_k(
         yield Check("warm-up", None, says)
 
 
-def _coarser(found: Calibration, about: Description, shows: Mapping[str, str]) -> Check:
-    """What is said of a device that is not as good as its grade.
+def _coarser_grade_check(
+    calibration: Calibration, about: Description, shows: Mapping[str, str]
+) -> Check:
+    """Report a device that is not as good as its grade.
 
-    It is no GO if a wrong angle may be all that there is: one parameter is then far
-    from nominal, and everything agrees.
+    NO-GO if a wrong angle could explain it: one parameter is then far from nominal, and
+    everything else agrees.
     """
     off = {}
     for name in shows["beyond"]:
         parameter = ParameterName.of(name)
         usual = about.sent[parameter.group][parameter.axis]
-        off[name] = abs(found.value(name) - float(usual))
-    if angle := would_explain(found, off):
+        off[name] = abs(calibration.value(name) - float(usual))
+    if angle := angle_error_explaining(calibration, off):
         says = (
             f"{shows['because']}, which no device of {about.grade} grade has, or it is"
             f" {angle}: nothing in the recording tells which; record that position"

@@ -40,7 +40,7 @@ LEVEL, DOWN = [0, 2], 1
 
 
 @dataclass(frozen=True, slots=True)
-class Growth:
+class NavigationErrors:
     """Standard deviations of the errors after some time; nan where not determined.
 
     Attributes
@@ -68,9 +68,9 @@ class Growth:
         }
 
 
-def growth(
+def navigation_errors(
     calibration: Calibration, gravity: float, mounting: Array, seconds: float
-) -> Growth:
+) -> NavigationErrors:
     """Errors after `seconds` by (1)-(5).
 
     Parameters
@@ -90,7 +90,7 @@ def growth(
     heading = gyr[DOWN, DOWN] * t**2  # (3)
     level = 2 * bias * t**2 + g**2 * rate[::-1] * t**4 / 4  # (4)
     vertical = _vertical(calibration, g, mounting) * t**2  # (5)
-    return Growth(
+    return NavigationErrors(
         t,
         float(np.sqrt(tilt.max())),
         float(np.sqrt(heading)),

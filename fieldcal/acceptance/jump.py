@@ -1,12 +1,12 @@
-"""Whether biases jump within a session by more than those of one device do.
+"""Whether biases jump within a session by more than from run to run.
 
-A device that was switched off in between has the biases of another run. Those of two
-runs differ, with a standard deviation s_r from run to run and an uncertainty s, by
+A device that was switched off meanwhile has the biases of another run. With the
+standard deviation s_r from run to run and the uncertainty s of the jump,
 
     chi2 = sum over biases of jump^2 / (2 s_r^2 + s^2),   P(chi2 or more)          (1)
 
-and more than that is another device, or one that was damaged: its scale factors are
-others as well, which positions before and after the jump share in the fit.
+A larger jump means another device, or damage: the scale factors have then changed as
+well, although the fit assumes them to be the same before and after the jump.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from fieldcal.calibration.names import group_of
 from fieldcal.core.chances import chi2_tail
 
 
-def jumps_too_far(found: Calibration, limits: GradeLimits) -> str:
+def bias_jump_warning(calibration: Calibration, limits: GradeLimits) -> str:
     """Sentence if biases jump by more than from run to run; else empty."""
-    jump = found.info.get("jump")
+    jump = calibration.info.get("jump")
     if not jump:
         return ""
     far = {}

@@ -2,8 +2,8 @@
 
 A base that is tilted by t about a level axis changes a bias by up to g t, 0.17 m/s^2
 for one degree. Five positions determine the tilt. Two cannot distinguish it from a
-bias: there it is known to what was stated, which is part of every uncertainty, or it is
-not known.
+bias: the tilt is then known as well as the level was stated, which is part of every
+uncertainty, or it is not known.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from fieldcal.core.chances import chi2_tail
 from fieldcal.session.description import Description
 
 BLIND = 2
-"""Positions with known angles that cannot tell a tilt from a bias."""
+"""Number of positions with known angles that cannot distinguish a tilt from a bias."""
 
 
 DOUBTED = 0.01
-"""Probability of what the positions show below which a stated level is not believed. A
-bias is off by half as many of its sigmas again as the tilt is of its own, and nothing
-is lost without the statement: the tilt is then estimated."""
+"""Probability of the tilt that the positions show, below which a stated level is not
+accepted. The error of a bias, in its sigmas, is then half as large again as that of the
+tilt. Without the statement the tilt is estimated."""
 
 
 OTHER = {"angle_offset": "a tilt of the base", "base_tilt": "offsets of the joints"}
-"""What may be there beside the tilt of a result."""
+"""The other kind of tilt, by the kind that a result contains."""
 
 
-def tilt_is_found(found: Calibration) -> bool:
+def tilt_is_found(calibration: Calibration) -> bool:
     """Whether the tilt is a parameter of the result, or has no effect on it."""
-    tilted = {"angle_offset", "base_tilt"} & set(found.groups)
-    return bool(tilted) or found.method == "scalar"
+    tilted = {"angle_offset", "base_tilt"} & set(calibration.groups)
+    return bool(tilted) or calibration.method == "scalar"
 
 
-def level_missing(about: Description) -> str:
-    """Sentence for a base whose level was not stated, with the remedy."""
+def level_missing_warning(about: Description) -> str:
+    """Sentence about a base whose level is not stated, with the remedy."""
     bias = about.gravity * np.deg2rad(1.0)
     return (
         "these positions do not show how level the base is, and a tilt of 1° changes a"
@@ -47,19 +47,23 @@ def level_missing(about: Description) -> str:
     )
 
 
-def level_unknown(about: Description) -> str:
-    """Warning before a run that will be NO-GO for it; empty if the tilt is known."""
+def level_warning_before_run(about: Description) -> str:
+    """Warning before a run that would end in NO-GO for it; empty if not needed."""
     known = sum(position.oriented for position in about.positions)
-    return level_missing(about) if known <= BLIND and about.level_deg is None else ""
+    return (
+        level_missing_warning(about)
+        if known <= BLIND and about.level_deg is None
+        else ""
+    )
 
 
-def check_level(found: Calibration, about: Description) -> list[Check]:
-    """Whether the level of the base is known: an unseen tilt acts as a bias.
+def check_level(calibration: Calibration, about: Description) -> list[Check]:
+    """Check whether the level of the base is known: an unknown tilt acts as a bias.
 
-    A stated level that the positions contradict is not.
+    A stated level that the positions contradict fails.
     """
-    shown = found.info.get("tilt_shown")
-    level = found.info.get("level_sigma_deg")
+    shown = calibration.info.get("tilt_shown")
+    level = calibration.info.get("level_sigma_deg")
     if shown and chi2_tail(shown["chi2"], shown["dof"]) < DOUBTED:
         says = (
             f"the base is level to ± {level:.2g}°, as stated, but the positions show a"
@@ -68,17 +72,17 @@ def check_level(found: Calibration, about: Description) -> list[Check]:
             " leave the statement out (--level, level_deg), and the tilt is estimated"
         )
         return [Check("level", False, says)]
-    if tilt_is_found(found) or "acc_bias" not in found.groups:
-        return list(_beside(found))
+    if tilt_is_found(calibration) or "acc_bias" not in calibration.groups:
+        return list(_other_tilt_checks(calibration))
     if level is None:
-        return [Check("level", False, level_missing(about))]
+        return [Check("level", False, level_missing_warning(about))]
     says = f"the base is level to ± {level:.2g}°, as stated, and each ± includes this"
     return [Check("level", True, says)]
 
 
-def _beside(found: Calibration) -> Iterator[Check]:
-    """What the result has of the other kind of tilt."""
-    kinds = [OTHER[group] for group in found.groups if group in OTHER]
-    if kinds and (off := found.info.get("beside_tilt_sigma_deg")):
+def _other_tilt_checks(calibration: Calibration) -> Iterator[Check]:
+    """Report the assumed size of the other kind of tilt."""
+    kinds = [OTHER[group] for group in calibration.groups if group in OTHER]
+    if kinds and (off := calibration.info.get("beside_tilt_sigma_deg")):
         says = f"each ± includes {kinds[0]} of 0 ± {off:.2g}°, beside the tilt found"
         yield Check("level", None, says)

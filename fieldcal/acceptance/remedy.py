@@ -1,4 +1,4 @@
-"""What would turn NO-GO into GO, as cheaply as the ladder of the session allows.
+"""The cheapest way from NO-GO to GO that the ladder of the session allows.
 
 If an uncertainty is too large: further positions. The covariance from n positions is
 
@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal.acceptance.factory import counted
+from fieldcal.acceptance.factory import factory_errors_used
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import Position, forces, ladder
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
-from fieldcal.planning.planner import sigma_of
+from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 
@@ -47,14 +47,14 @@ STEP = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """What to hold, and what that would decide.
+    """Positions to record in order to reach GO.
 
     Attributes
     ----------
     says : one sentence
-    again : numbers of positions to take once more, from 0
-    positions : alpha and beta of those to hold besides, deg
-    seconds : how long each
+    again : numbers of positions to repeat, from 0
+    positions : alpha and beta of further positions, deg
+    seconds : time at each, s
 
     """
 
@@ -73,8 +73,8 @@ class Remedy:
         }
 
 
-def cheapest(
-    found: Calibration,
+def cheapest_remedy(
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     limits: GradeLimits,
@@ -82,65 +82,69 @@ def cheapest(
     sigma: float,
     seconds: float,
 ) -> Remedy | None:
-    """The cheapest remedy that a person at the ladder can do; None if there is none.
+    """The cheapest remedy that is possible at the ladder; None if there is none.
 
     Parameters
     ----------
-    found : calibration that is NO-GO
-    about : its positions and where it was
-    had : those that have a window
-    limits : of its grade
-    failed : groups whose uncertainty is more than its limit
-    sigma : error of the mean of a window, m/s^2
-    seconds : that a window took
+    calibration : calibration that is NO-GO
+    about : description of its session
+    had : positions that have a window
+    limits : limits of its grade
+    failed : groups whose uncertainty is above its limit
+    sigma : standard error of the mean of a window, m/s^2
+    seconds : length of a window, s
 
     """
-    doubt = DoubtfulPosition.from_json(found.info.get("doubtful_position"))
+    doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
     names = [p.name for p in about.positions]
     if doubt and doubt.name in names:
         number = names.index(doubt.name)
         which = f"position {number + 1} ({doubt.name})"
         says = f"take {which} again: it disagrees with the others"
         return Remedy(says, again=(number,), seconds=seconds)
-    over = _over(found, limits, failed)
+    over = _limit_ratios(calibration, limits, failed)
     if not over or not all(p.oriented for p in about.positions):
         return None
     if all(sensor_of(group_of(name)) == "gyr" for name in over):
-        return _longer(found, about, had, over, seconds)
-    return _besides(found, about, had, limits, over, sigma, seconds)
+        return _hold_longer(calibration, about, had, over, seconds)
+    return _further_positions(calibration, about, had, limits, over, sigma, seconds)
 
 
-def _over(
-    found: Calibration, limits: GradeLimits, failed: Collection[str]
+def _limit_ratios(
+    calibration: Calibration, limits: GradeLimits, failed: Collection[str]
 ) -> dict[str, float]:
-    """Uncertainty over its limit, by full name; infinite where not determined."""
+    """Uncertainty over its limit, by full name; infinite if not determined."""
     out = {}
     for group in failed:
         limit = limits.sigma(group)
         for axis in "xyz" if limit is not None else "":
             name = f"{group}.{axis}"
-            sigma = found.uncertainty(name) if name in found.names else np.inf
+            sigma = (
+                calibration.uncertainty(name) if name in calibration.names else np.inf
+            )
             if limit and not sigma <= limit:
                 out[name] = float(sigma / limit)
     return out
 
 
-def _longer(
-    found: Calibration,
+def _hold_longer(
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     over: dict[str, float],
     seconds: float,
 ) -> Remedy | None:
-    """Gyroscopes average out wherever they rest: longer where the device stands.
+    """Remedy for gyroscopes: a longer mean in the present position.
 
-    What they feel of the mean force of the positions (their g-sensitivity) stays.
+    The part of the uncertainty from g-sensitivity and the mean force does not change.
     """
     force = forces(had, about.gravity).mean(axis=0)
-    stays = counted(found).g_sensitivity * float(np.linalg.norm(force))
+    stays = factory_errors_used(calibration).g_sensitivity * float(
+        np.linalg.norm(force)
+    )
     times = 1.0
     for name, part in over.items():
-        sigma = found.uncertainty(name) if np.isfinite(part) else np.inf
+        sigma = calibration.uncertainty(name) if np.isfinite(part) else np.inf
         kept = stays if group_of(name) == "gyr_bias" else 0.0
         room = (SURE * sigma / part) ** 2 - kept**2
         times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
@@ -154,8 +158,8 @@ def _longer(
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
 
 
-def _besides(
-    found: Calibration,
+def _further_positions(
+    calibration: Calibration,
     about: Description,
     had: Sequence[Position],
     limits: GradeLimits,
@@ -163,19 +167,19 @@ def _besides(
     sigma: float,
     seconds: float,
 ) -> Remedy | None:
-    """Further positions of the ladder, the best one after the other."""
-    tilts = [g for g in ("angle_offset", "base_tilt") if g in found.groups]
+    """Further positions of the ladder, each time the best one."""
+    tilts = [g for g in ("angle_offset", "base_tilt") if g in calibration.groups]
     names = parameters(*(tilts or ["angle_offset"]))
-    held, known = list(had), _Known.of(found, sigma)
-    before = _expected(names, held, about, known)
+    held, known = list(had), _KnownErrors.of(calibration, sigma)
+    before = _expected_sigma(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     chosen: list[Position] = []
     for _ in range(MOST):
         ratios = []
         candidates = [Position.deg(a, b) for a, b in ladder(about.positions)]
         for one in candidates:
-            then = _expected(names, [*held, *chosen, one], about, known)
-            ratios.append(_worst(names, over, before, then, allowed))
+            then = _expected_sigma(names, [*held, *chosen, one], about, known)
+            ratios.append(_largest_limit_ratio(names, over, before, then, allowed))
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
         if ratios[best] <= SURE:
@@ -193,21 +197,21 @@ def _as_remedy(
     if not np.isfinite(over[worst]):
         now = "not determined yet"
     says = (
-        f"{word} more for {seconds:.0f} s, {where}: then GO is expected ({title(worst)}"
-        f" is {now})"
+        f"{word} more for {seconds:.0f} s, {where}: then GO is expected"
+        f" ({parameter_title(worst)} is {now})"
     )
     angles = tuple(p.degrees or (0.0, 0.0) for p in chosen)
     return Remedy(says, positions=angles, seconds=seconds)
 
 
-def _worst(
+def _largest_limit_ratio(
     names: Sequence[str],
     over: dict[str, float],
     before: Array,
     then: Array,
     allowed: Sequence[float],
 ) -> float:
-    """Largest part of its limit that a parameter then has."""
+    """Largest ratio of an expected uncertainty to its limit."""
     parts = [0.0]
     for name, part in over.items():
         if name in names:
@@ -218,27 +222,27 @@ def _worst(
     return max(parts)
 
 
-class _Known(NamedTuple):
-    """What is known before: error of a mean, m/s^2, angles, rad, the factory's."""
+class _KnownErrors(NamedTuple):
+    """Assumed errors: of a mean, m/s^2, of an angle, rad, and of the factory."""
 
     sigma: float
     angle: float
     factory: FactoryErrors
 
     @classmethod
-    def of(cls, found: Calibration, sigma: float) -> _Known:
-        """As a result was made with."""
-        angle = np.deg2rad(float(found.info.get("angle_sigma_deg") or 0.0))
-        return cls(sigma, float(angle), counted(found))
+    def of(cls, calibration: Calibration, sigma: float) -> _KnownErrors:
+        """Take the errors that a result was made with."""
+        angle = np.deg2rad(float(calibration.info.get("angle_sigma_deg") or 0.0))
+        return cls(sigma, float(angle), factory_errors_used(calibration))
 
 
-def _expected(
+def _expected_sigma(
     names: Sequence[str],
     positions: Sequence[Position],
     about: Description,
-    known: _Known,
+    known: _KnownErrors,
 ) -> Array:
-    """Sigma of each parameter, (k,), by (1); infinite where not determined."""
+    """Expected sigma of each parameter by (1), (k,); infinite if not determined."""
     left = {name: size for name, size in known.factory.by_effect.items() if size}
     more = [name for name in parameters(*left) if name not in names]
     every = [*names, *more]
@@ -252,13 +256,13 @@ def _expected(
     sizes = np.array([left[group_of(name)] for name in more])
     before = np.eye(len(every))[len(names) :] / sizes[:, None]
     whitened = np.vstack([whitened, before])
-    return sigma_of(whitened)[: len(names)]  # (1)
+    return parameter_sigma(whitened)[: len(names)]  # (1)
 
 
 def _force_slopes(
     positions: Sequence[Position], about: Description, alpha: float, beta: float
 ) -> Array:
-    """How the forces, device axes, move with an angle, (n, 3) m/s^2/rad."""
+    """Derivative of the forces in device axes by an angle, (n, 3) m/s^2/rad."""
     off = [
         Position(p.name, (p.alpha or 0.0) + alpha, (p.beta or 0.0) + beta)
         for p in positions

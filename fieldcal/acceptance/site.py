@@ -14,14 +14,14 @@ from fieldcal.core.gravity import gravity
 from fieldcal.session.description import Description
 
 ANOMALY = 4e-3
-"""How far gravity may be from the normal one of a place, m/s^2."""
+"""Largest difference of gravity from the normal gravity of a place, m/s^2."""
 
 VILLAGES = 5000.0
 """Height up to which people live, m."""
 
 
-def gravity_unknown(about: Description) -> str:
-    """Sentence where nobody said how strong gravity is, with the remedy; else empty."""
+def gravity_missing_warning(about: Description) -> str:
+    """Sentence with the remedy if gravity is not stated; else empty."""
     if about.gravity_said:
         return ""
     least, most = gravity(0.0), gravity(90.0)
@@ -33,16 +33,16 @@ def gravity_unknown(about: Description) -> str:
     )
 
 
-def place_wanted(about: Description) -> str:
-    """Remedy where the place would say gravity better; empty where it is said."""
+def site_remedy(about: Description) -> str:
+    """Remedy if the site is not fully stated, as part of a sentence; else empty."""
     site = about.raw.get("site", {})
     if "latitude_deg" not in site:
         return "; the stated gravity is not checked: state the site (--latitude)"
     return "" if "height_m" in site else "; state the height of the site (--height)"
 
 
-def gravity_contradicted(about: Description) -> str:
-    """Sentence where the gravity that is stated cannot be that of the place."""
+def gravity_contradiction(about: Description) -> str:
+    """Sentence if the stated gravity is impossible at the site; else empty."""
     site = about.raw.get("site", {})
     if not site.get("gravity"):
         return ""

@@ -1,7 +1,7 @@
 """Error of an earlier calibration at the present temperature.
 
 Earlier calibrations of the device show how its parameters depend on temperature. If
-there are fewer than the model needs, this is said.
+there are fewer than the model needs, a sentence says so.
 """
 
 from __future__ import annotations
@@ -11,35 +11,37 @@ from typing import Any
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import InputError
 from fieldcal.history.store import HistoryRun
 from fieldcal.thermal import ThermalPoint, point, thermal_model
 from fieldcal.thermal.wording import costs, document
 
 NEAR_K = 2.0
-"""Difference up to which temperatures count as equal, K: a room's from day to day."""
+"""Difference up to which temperatures count as equal, K, as of a room on two days."""
 
 
-def since_last(
-    found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
+def effect_of_temperature_change(
+    calibration: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
 ) -> dict[str, Any] | None:
     """Effect of the change of temperature since the last calibration.
 
     Parameters
     ----------
-    found : the calibration of now
-    earlier : of the device's family, oldest first
-    limits : of its grade
+    calibration : the present calibration
+    earlier : earlier calibrations of the device, oldest first
+    limits : limits of its grade
 
     Returns
     -------
-    Temperatures, changes with their ± where the history tells them, and sentences; None
-    where nothing changed or no temperature is known.
+    Temperatures, changes with their ± if the history determines them, and sentences;
+    None if the temperature has not changed, or is not known.
 
     """
-    points = [p for run in earlier if (p := as_point(run.taken_at, run.calibration))]
-    now = as_point("now", found)
+    points = [
+        p for run in earlier if (p := as_thermal_point(run.taken_at, run.calibration))
+    ]
+    now = as_thermal_point("now", calibration)
     if now is None or not points:
         return None
     then = points[-1]
@@ -68,13 +70,13 @@ def since_last(
     if not told:
         says = f"{about}: no parameter changes measurably with it"
     elif rest:
-        says += f"; no change is seen in {', '.join(map(title, rest))}"
+        says += f"; no change is seen in {', '.join(map(parameter_title, rest))}"
     return {**out, "parameters": document(changes), "says": [says]}
 
 
-def as_point(name: str, found: Calibration) -> ThermalPoint | None:
-    """A calibration as a point; None where it has no temperature or is no good."""
+def as_thermal_point(name: str, calibration: Calibration) -> ThermalPoint | None:
+    """A calibration as a point of temperature; None if it has none, or is bad."""
     try:
-        return point(name, found)
+        return point(name, calibration)
     except InputError:
         return None

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.acceptance.check import Check, shown_unit
-from fieldcal.acceptance.site import place_wanted
+from fieldcal.acceptance.check import Check, unit_suffix
+from fieldcal.acceptance.site import site_remedy
 from fieldcal.calibration import COMPONENTS, Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
@@ -18,29 +18,31 @@ UNCERTAINTY = " uncertainty"
 """End of a check's name, after the group whose uncertainty it compares."""
 
 REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
-"""Groups whose uncertainty must be known and small; a sensor not read is excused."""
+"""Groups that must be determined within their limit, if their sensor was recorded."""
 
 
 def check_uncertainty(
-    found: Calibration,
+    calibration: Calibration,
     about: Description,
     limits: GradeLimits,
     windows: Sequence[Average],
 ) -> list[Check]:
-    """Whether each group that has a limit is known well enough.
+    """Check the uncertainty of each group that has a limit.
 
-    It is not if a sensor was recorded and none of its parameters was determined.
+    A recorded sensor of which no parameter was determined fails.
     """
     checks = []
-    read = {sensor_of(group_of(name)) for name in found.names} | _measured(windows)
+    read = {
+        sensor_of(group_of(name)) for name in calibration.names
+    } | _measured_sensors(windows)
     for group in COMPONENTS:
         limit = limits.sigma(group)
         sensor_read = sensor_of(group) in read
         if limit is None or not sensor_read:
             continue
         unit = COMPONENTS[group][1]
-        shown = shown_unit(unit)
-        _, sigma = found.vector(group)
+        shown = unit_suffix(unit)
+        _, sigma = calibration.vector(group)
         lacking = [a for a, s in zip("xyz", sigma, strict=True) if not np.isfinite(s)]
         if lacking and group in REQUIRED:
             says = f"{group} {' '.join(lacking)} was not determined by these positions"
@@ -49,13 +51,14 @@ def check_uncertainty(
             worst = int(np.argmax(sigma))
             ok = bool(sigma[worst] <= limit)
             says = (
-                f"{group} {'xyz'[worst]} is known to ± {_apart(sigma[worst], limit)}"
-                f"{shown}, {'within' if ok else 'more than'} {limit:.2g}{shown}"
+                f"{group} {'xyz'[worst]} is known to ±"
+                f" {_format_apart_from(sigma[worst], limit)}{shown},"
+                f" {'within' if ok else 'more than'} {limit:.2g}{shown}"
             )
             if not ok and group == "acc_scale":
-                says += place_wanted(about)
+                says += site_remedy(about)
             if not ok and sensor_of(group) == "acc":
-                says += _by_angles(found, limits)
+                says += _angle_setting_remedy(calibration, limits)
             stands: bool | None = ok
             if not ok and group not in REQUIRED:
                 stands, says = None, f"{says}: it counts as not determined"
@@ -64,17 +67,17 @@ def check_uncertainty(
     return checks
 
 
-def _measured(windows: Sequence[Average]) -> set[str]:
-    """Sensors whose three axes a window has, as in `names.sensor_of`."""
+def _measured_sensors(windows: Sequence[Average]) -> set[str]:
+    """Sensors with three axes in some window, as in `names.sensor_of`."""
     has = [np.isfinite(window.mean) for window in windows]
     sides = {"acc": slice(0, 3), "gyr": slice(3, 6)}
     return {name for name, s in sides.items() if any(h[s].all() for h in has)}
 
 
-def _apart(value: float, limit: float) -> str:
-    """A value with as many digits as tell it from its limit.
+def _format_apart_from(value: float, limit: float) -> str:
+    """A value with enough digits to distinguish it from its limit.
 
-    >>> _apart(0.02041, 0.02), _apart(0.03123, 0.02)
+    >>> _format_apart_from(0.02041, 0.02), _format_apart_from(0.03123, 0.02)
     ('0.0204', '0.031')
     """
     for digits in range(2, 7):
@@ -84,10 +87,10 @@ def _apart(value: float, limit: float) -> str:
     return text
 
 
-def _by_angles(found: Calibration, limits: GradeLimits) -> str:
-    """Remedy where the setting of the angles limits the uncertainty."""
-    angles = float(found.info.get("angle_sigma_deg") or 0.0)
-    if found.method == "scalar" or angles < limits.angle_setting_deg:
+def _angle_setting_remedy(calibration: Calibration, limits: GradeLimits) -> str:
+    """Remedy if the setting of angles limits the uncertainty; else empty."""
+    angles = float(calibration.info.get("angle_sigma_deg") or 0.0)
+    if calibration.method == "scalar" or angles < limits.angle_setting_deg:
         return ""
     return (
         f"; the angles are taken as set to ± {angles:.2g}°: if they are set better,"

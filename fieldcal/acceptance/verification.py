@@ -5,8 +5,8 @@
 U is the window's mean, (3,) m/s^2 in device axes, U(x) what the calibration x with
 covariance C predicts there (`model.planned`), J its derivative, C_U the window's
 covariance, s how well the angles are set, n the direction of the force. With 3 degrees
-of freedom, chi2 tells a residual from what everything known explains; its length in
-m/s^2 tells whether it matters.
+of freedom, chi2 shows whether the known errors explain the residual; its length in
+m/s^2 shows whether it matters.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class Verification:
 
     Attributes
     ----------
-    position : where
+    position : the position
     residual : (3,) measured less predicted, m/s^2, device axes
-    sigma : (3,) standard uncertainty of that
-    chance : probability of such a residual if the calibration holds
+    sigma : (3,) standard uncertainty of the residual
+    chance : probability of such a residual if the calibration is correct
     covariance : (3, 3) of the residual, S
-    slope : (3,) m/s^2 by each parameter, full name
-    turned : (3, 2) m/s^2 by the position's alpha and beta, rad
+    parameter_slopes : (3,) derivative of outputs by each parameter, by full name
+    angle_slopes : (3, 2) derivative by the position's alpha and beta, m/s^2/rad
 
     """
 
@@ -51,22 +51,22 @@ class Verification:
     sigma: Array
     chance: float
     covariance: Array
-    slope: Mapping[str, Array]
-    turned: Array
+    parameter_slopes: Mapping[str, Array]
+    angle_slopes: Array
 
     @property
-    def largest(self) -> float:
+    def residual_size(self) -> float:
         """Length of the residual, m/s^2."""
         return float(np.linalg.norm(self.residual))
 
-    def shows(self, wrong: WrongAngles) -> float:
-        """Non-centrality by which wrong angles of the session show here, r^T S^-1 r."""
+    def noncentrality(self, wrong: WrongAngles) -> float:
+        """Non-centrality r^T S^-1 r that wrong angles of the session produce here."""
         if self.position.alpha is None or self.position.beta is None:
             return 0.0
-        off = wrong.off_at(self.position.alpha, self.position.beta)
-        moved: Array = self.turned @ off
+        off = wrong.error_at(self.position.alpha, self.position.beta)
+        moved: Array = self.angle_slopes @ off
         for name, by in wrong.moves.items():
-            moved = moved - by * self.slope.get(name, 0.0)
+            moved = moved - by * self.parameter_slopes.get(name, 0.0)
         return float(moved @ np.linalg.solve(self.covariance, moved))
 
 
@@ -77,15 +77,15 @@ def verify(
     average: Average,
     angle_sigma: float = 0.0,
 ) -> Verification:
-    """Compare a window with what the calibration predicts.
+    """Compare a window with the prediction of the calibration.
 
     Parameters
     ----------
     calibration : not fitted to this window
     about : site and mounting
-    position : where it was held
-    average : of the window
-    angle_sigma : how well its angles are set, rad
+    position : position of the window
+    average : average of the window
+    angle_sigma : uncertainty of the set angles, rad
 
     """
     names, x, covariance = _parameters(calibration, about)
@@ -100,15 +100,15 @@ def verify(
     turned = np.column_stack([
         (forces([moved], about.gravity) - forces([position], about.gravity))[0]
         @ about.mounting / STEP
-        for moved in (_turned(position, STEP, 0.0), _turned(position, 0.0, STEP))
+        for moved in (_rotated(position, STEP, 0.0), _rotated(position, 0.0, STEP))
     ])  # fmt: skip
     return Verification(
         position, residual, np.sqrt(np.diag(s)), chance, s, slope, turned
     )
 
 
-def _turned(position: Position, alpha: float, beta: float) -> Position:
-    """A position with other angles, rad more."""
+def _rotated(position: Position, alpha: float, beta: float) -> Position:
+    """The position with angles increased by alpha and beta, rad."""
     return replace(
         position,
         alpha=(position.alpha or 0.0) + alpha,
@@ -119,9 +119,9 @@ def _turned(position: Position, alpha: float, beta: float) -> Position:
 def _parameters(
     calibration: Calibration, about: Description
 ) -> tuple[tuple[str, ...], Array, Array]:
-    """Names, values and covariance of what reaches the accelerometers.
+    """Names, values and covariance of parameters that affect the accelerometers.
 
-    Exact where it was not fitted.
+    Parameters that were not fitted have their nominal values without uncertainty.
     """
     reach = ("angle_offset", "base_tilt", "cross_coupling")
     names = parameters(*(g for g in reach if g in calibration.groups))
@@ -136,27 +136,27 @@ def _parameters(
     return names, x, covariance
 
 
-def planned(about: Description) -> Position | None:
-    """The position that session.toml or a plan wants held and not fitted, if any."""
+def planned_verification(about: Description) -> Position | None:
+    """The verification position of session.toml or of a plan; None if there is none."""
     table = about.raw.get("verification")
     if isinstance(table, Mapping) and {"alpha_deg", "beta_deg"} <= set(table):
         name = str(table.get("name", ""))
         return Position.deg(table["alpha_deg"], table["beta_deg"], name)
     run = about.raw.get("run")
     if isinstance(run, Mapping) and run.get("verify") is True:
-        return proposed(about.positions)
+        return propose_verification(about.positions)
     return None
 
 
-def proposed(positions: Sequence[Position]) -> Position:
-    """A position to verify with, from the joint angles that the set uses anyway.
+def propose_verification(positions: Sequence[Position]) -> Position:
+    """A position for verification, from the joint angles that the set uses.
 
-    Of all combinations that are not in the set, the one farthest from its nearest
-    neighbour; if there is none, the first position turned back half-way to the last,
-    and home if all have a third angle.
+    Of all combinations that are not in the set, it is the one farthest from its nearest
+    neighbour. If there is none, it is half-way between the first and the last position;
+    if all have a third angle, it is home.
 
     >>> from fieldcal.core.positions import FIVE
-    >>> proposed(FIVE).name
+    >>> propose_verification(FIVE).name
     'α = 0°, β = 5°'
     """
     known = [p.degrees for p in positions if p.degrees is not None]

@@ -1,4 +1,4 @@
-"""Whether a result can be trusted for which positions were left out.
+"""Whether a result from which positions were left out can be trusted.
 
 The position that disagrees with all others may be the only right one: a gauge that is
 too long spoils all positions but the level one. The remaining positions are trusted if
@@ -16,41 +16,44 @@ from fieldcal.calibration import Calibration
 from fieldcal.model import thresholds
 
 
-def left_out(found: Calibration) -> int:
-    """How many positions were given no weight."""
+def rejected_positions(calibration: Calibration) -> int:
+    """Number of positions that were given no weight."""
     return sum(
-        chance > thresholds.CERTAIN for chance in found.info.get("bad_position", ())
+        chance > thresholds.CERTAIN
+        for chance in calibration.info.get("bad_position", ())
     )
 
 
-def has_witnesses(found: Calibration) -> bool:
+def has_witnesses(calibration: Calibration) -> bool:
     """Whether half of the positions that were used would determine everything, (1)."""
-    return _kept(found) >= 2 * _needed(found)
+    return _kept(calibration) >= 2 * _needed(calibration)
 
 
-def witnesses(found: Calibration) -> str:
-    """How many positions were left out and used, with the remedy if too few are."""
-    out = left_out(found)
+def witness_sentence(calibration: Calibration) -> str:
+    """Sentence with the numbers of positions left out and used, and the remedy."""
+    out = rejected_positions(calibration)
     verb = "were" if out > 1 else "was"
     says = (
         f"{out} position{'s' if out > 1 else ''} disagreed and {verb} not used;"
-        f" {_kept(found)} others were used, and {_needed(found)} of them would"
-        " determine all parameters"
+        f" {_kept(calibration)} others were used, and {_needed(calibration)} of them"
+        " would determine all parameters"
     )
-    if has_witnesses(found):
+    if has_witnesses(calibration):
         return says
     return (
-        f"{says}: with fewer than {2 * _needed(found)} the others may be the wrong"
-        " ones; repeat positions, add positions, or record a verification position"
-        " (--verify)"
+        f"{says}: with fewer than {2 * _needed(calibration)} the others may be the"
+        " wrong ones; repeat positions, add positions, or record a verification"
+        " position (--verify)"
     )
 
 
-def _kept(found: Calibration) -> int:
-    return len(found.info.get("bad_position", ())) - left_out(found)
+def _kept(calibration: Calibration) -> int:
+    return len(calibration.info.get("bad_position", ())) - rejected_positions(
+        calibration
+    )
 
 
-def _needed(found: Calibration) -> int:
-    """A window of known angles gives three numbers, one of unknown angles a length."""
-    of_acc = [name for name in found.names if not name.startswith("gyr")]
-    return -(-len(of_acc) // (1 if found.method == "scalar" else 3))
+def _needed(calibration: Calibration) -> int:
+    """Positions needed: each gives 3 numbers, or 1 if its angles are unknown."""
+    of_acc = [name for name in calibration.names if not name.startswith("gyr")]
+    return -(-len(of_acc) // (1 if calibration.method == "scalar" else 3))

@@ -10,7 +10,7 @@ from fieldcal.against.result import (
     RealAndSimulated,
     SimulatorPrediction,
 )
-from fieldcal.calibration.wording import pretty
+from fieldcal.calibration.wording import format_unit
 from fieldcal.diagnosis.result import Quantity, Verdict
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
@@ -161,7 +161,7 @@ def line(one: Difference) -> tuple[str, str, str, str]:
         what,
         SHORT[one.direction],
         f"{name}: {both}{also}",
-        pretty(signed(pair.difference)),
+        format_unit(signed(pair.difference)),
     )
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration.parameters import Calibration
 
 SIGNIFICANT = 3.0
-"""Standard uncertainties from which a single difference counts as one."""
+"""Standard uncertainties beyond which a single difference is significant."""
 
 
 @dataclass(frozen=True, slots=True)

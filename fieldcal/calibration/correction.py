@@ -4,8 +4,8 @@
     df = -M^-1 (db + dM f),  cov f = J C J^T
 
 U raw and f true, (n, 3), device axes; C the covariance of the parameters in b and M.
-Large arrays are done in pieces that stay in the processor's cache: the subtraction then
-costs little beside the product.
+Large arrays are calculated in pieces that stay in the processor's cache: the
+subtraction then costs little compared with the product.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from fieldcal.calibration.names import ParameterName
 from fieldcal.core.samples import Array
 
 PIECE = 16384
-"""Rows done at once."""
+"""Number of rows that are calculated at once."""
 
 
-def corrected(raw: Array, bias: Array, matrix: Array) -> Array:
-    """Calibrated values of raw ones, (n, 3).
+def calibrated_samples(raw: Array, bias: Array, matrix: Array) -> Array:
+    """Calibrated values of raw samples, (n, 3).
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def corrected(raw: Array, bias: Array, matrix: Array) -> Array:
     return out
 
 
-def spread(
+def calibrated_sigma(
     raw: Array,
     bias: Array,
     matrix: Array,
@@ -62,8 +62,10 @@ def spread(
 
     """
     inverse = np.linalg.inv(matrix)
-    true = corrected(raw, bias, matrix)
-    known = [(i, *place) for i, n in enumerate(names) if (place := _place(n, sensor))]
+    true = calibrated_samples(raw, bias, matrix)
+    known = [
+        (i, *place) for i, n in enumerate(names) if (place := _matrix_place(n, sensor))
+    ]
     rows = [i for i, *_ in known]
     variance = np.zeros((len(raw), 3))
     c = covariance[np.ix_(rows, rows)]
@@ -80,7 +82,7 @@ def spread(
     return np.sqrt(np.maximum(variance, 0.0))
 
 
-def _place(name: str, sensor: str) -> tuple[int, int] | None:
+def _matrix_place(name: str, sensor: str) -> tuple[int, int] | None:
     """Row of a parameter, and 0 for the bias or 1 + column of the matrix."""
     parameter = ParameterName.of(name)
     cross = "cross_coupling" if sensor == "acc" else "gyro_cross_coupling"

@@ -5,7 +5,7 @@
     e_i = |row i of (D^-1 M - I)| |f|      largest error over all directions of f  (3)
 
 Symbols: U raw, f true, b bias, M scale factors and cross-coupling. Device axes. Formats
-without room for cross-coupling keep b and D; (3) says what it costs.
+without room for cross-coupling keep b and D; (3) is the error that this makes.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from fieldcal.calibration.parameters import Calibration, Nominal
 from fieldcal.core.samples import Array
 
 
-class Diagonal(NamedTuple):
+class DiagonalCalibration(NamedTuple):
     """Bias and scale factor of three axes.
 
     Attributes
     ----------
     bias, scale : (3,) of U = bias + scale f, SI
-    left_out : (3,) error that dropping the cross-coupling makes, as a share of |f|, (3)
+    cross_coupling_error : (3,) error without the cross-coupling, as a share of |f|, (3)
 
     """
 
     bias: Array
     scale: Array
-    left_out: Array
+    cross_coupling_error: Array
 
 
-def diagonal(
+def reduce_to_diagonal(
     calibration: Calibration, sensor: str, nominal: Nominal | None = None
-) -> Diagonal:
-    """Return what is left of a calibration without cross-coupling.
+) -> DiagonalCalibration:
+    """Reduce the calibration of one sensor to bias and scale factor.
 
     Parameters
     ----------
-    calibration : of the device
+    calibration : calibration of the device
     sensor : ``"acc"`` or ``"gyr"``
     nominal : values for what was not determined; bias 0 and scale 1 if not given
 
@@ -53,4 +53,4 @@ def diagonal(
     )
     scale = np.diag(matrix).copy()
     rest = matrix / scale[:, None] - np.eye(3)  # (2)
-    return Diagonal(bias, scale, np.linalg.norm(rest, axis=1))  # (3)
+    return DiagonalCalibration(bias, scale, np.linalg.norm(rest, axis=1))  # (3)

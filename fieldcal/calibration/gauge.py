@@ -1,7 +1,7 @@
 """Scale of outputs in volts or counts, and a calibration in their unit.
 
-A device may put out volts or counts U = b + M f. All is calculated with outputs u that
-are m/s^2 and rad/s but for what a calibration corrects,
+A device may put out volts or counts U = b + M f. All calculations use outputs u in
+m/s^2 and rad/s, before calibration,
 
     u = U / c,   b_u = b / c,   M_u = M / c                                         (1)
 
@@ -23,7 +23,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 
 KEY = "gauge"
-"""Of `Calibration.info`, where outputs are volts or counts."""
+"""Key in `Calibration.info` if outputs are volts or counts."""
 
 SI = ("m/s^2", "rad/s")
 
@@ -37,17 +37,17 @@ GROUPS = {
     "gyro_cross_coupling": (1, 1, "1"),
     "gyro_products": (1, 2, "s/rad"),
 }
-"""Sensor, power of the input that the output is over, and the unit in SI."""
+"""Index of the sensor, power of the input that the output is divided by, SI unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """Output units in one m/s^2 and in one rad/s.
+    """Scale of the outputs: their units in one m/s^2 and in one rad/s.
 
     Attributes
     ----------
     size : c of (1), accelerometers and gyroscopes
-    units : of the outputs
+    units : units of the outputs
 
     """
 
@@ -55,12 +55,12 @@ class Gauge:
     units: tuple[str, str] = SI
 
     @property
-    def plain(self) -> bool:
+    def is_si(self) -> bool:
         """Whether the outputs are m/s^2 and rad/s."""
         return self.units == SI
 
     def of(self, group: str) -> tuple[float, str] | None:
-        """Factor and unit of a group in the outputs' unit; None where it has none."""
+        """Factor and unit of a group in the outputs' unit; None if it is in SI."""
         if group not in GROUPS:
             return None
         sensor, power, _ = GROUPS[group]
@@ -71,17 +71,17 @@ class Gauge:
         return size, unit + over
 
     def table(self) -> dict[str, Any]:
-        """As `Calibration.info` and ``result.json`` keep it."""
+        """Return the table of `Calibration.info` and ``result.json``."""
         return {"size": list(self.size), "units": list(self.units)}
 
     @classmethod
     def read(cls, table: Any) -> Gauge:
-        """From such a table.
+        """Read such a table.
 
         Raises
         ------
         InputError
-            If it is none.
+            If it is not valid.
 
         """
         try:
@@ -96,16 +96,16 @@ class Gauge:
 
 
 def in_sample_units(calibration: Calibration) -> Calibration:
-    """The calibration in the unit of the samples."""
-    return _changed(calibration, 1)
+    """The calibration converted to the unit of the samples."""
+    return _in_unit(calibration, 1)
 
 
 def in_si_units(calibration: Calibration) -> Calibration:
-    """The calibration for outputs in m/s^2 and rad/s, from one of the samples' unit."""
-    return _changed(calibration, -1)
+    """The calibration converted from the unit of the samples to m/s^2 and rad/s."""
+    return _in_unit(calibration, -1)
 
 
-def _changed(calibration: Calibration, power: int) -> Calibration:
+def _in_unit(calibration: Calibration, power: int) -> Calibration:
     table: Mapping[str, Any] | None = calibration.info.get(KEY)
     if table is None:
         return calibration

@@ -1,11 +1,11 @@
-"""The grade that a device has by its biases and scale factors, whatever it is called.
+"""The grade that biases and scale factors of a device show, whatever is stated.
 
-One process makes all errors of a device: a factory that leaves a bias of 50 mg or a
-scale factor of 2 % does not make axes square to 0.1 %. A parameter may be as far from
-nominal as units of the stated grade are (``..._tolerance`` in ``limits.toml``) and have
-moved since by what is usual from run to run (``..._repeat``). Beyond that, by more than
-its uncertainty explains, what is not estimated has the size of a coarser grade. Noise
-and grain tell grades less well: accelerometers of 60 to 140 ug/sqrt(Hz) are sold in
+All errors of a device come from one process: a factory that leaves a bias of 50 mg or a
+scale factor of 2 % does not make axes square to 0.1 %. A parameter may differ from
+nominal by the tolerance of the stated grade (``..._tolerance`` in ``limits.toml``) and
+by the usual change from run to run (``..._repeat``). If it differs by significantly
+more, errors that are not estimated have the size of a coarser grade. Noise and grain
+distinguish grades less well: accelerometers of 60 to 140 ug/sqrt(Hz) are sold in
 both, and either may put out 16 bits.
 """
 
@@ -25,14 +25,13 @@ from fieldcal.core.sentences import join
 
 @dataclass(frozen=True, slots=True)
 class GradeShown:
-    """A grade, and why it is not the stated one.
+    """The grade that a device shows, and the reason if it is not the stated one.
 
     Attributes
     ----------
-    grade : by which what is not estimated is sized
-    because : which parameters are beyond the stated grade, in words; empty where none
-        is
-    beyond : their full names
+    grade : grade from which the sizes of errors that are not estimated are taken
+    because : parameters beyond the stated grade, in words; empty if there are none
+    beyond : full names of these parameters
 
     """
 
@@ -49,14 +48,14 @@ class GradeShown:
         sigma: Array,
         nominal: Mapping[str, Array],
     ) -> GradeShown:
-        """The best grade, from the stated one on, that has units like this one.
+        """The best grade that has such parameters; never better than the stated one.
 
         Parameters
         ----------
-        stated : what the device is said to be
+        stated : stated grade of the device
         names : (k,) full names
         values, sigma : (k,) as a `Calibration` has them
-        nominal : (3,) by group, that they are changes from, as the device sends it
+        nominal : (3,) nominal values by group, as the device sends them
 
         """
         coarser = GRADES[GRADES.index(stated) :: -1]
@@ -78,7 +77,7 @@ def _beyond(
     sigma: Array,
     nominal: Mapping[str, Array],
 ) -> Iterator[tuple[str, str]]:
-    """Each parameter that no unit of a grade has, and the same in words."""
+    """Parameters that no device of a grade has, each with a description."""
     bounds = limits.read(grade)
     for name, value, s in zip(names, values, sigma, strict=True):
         parameter = ParameterName.of(name)

@@ -57,7 +57,7 @@ class GradeLimits:
 
     @property
     def factory(self) -> FactoryErrors:
-        """What the factory leaves of errors that are not estimated."""
+        """Sizes of the errors that the factory leaves and that are not estimated."""
         # a device that warms up faster than allowed is waited for: 2 sigma
         warming_k = self.temperature_rate_k_min / 2 * WARM_UP_S / 60
         return FactoryErrors(
@@ -74,7 +74,7 @@ class GradeLimits:
         return float(getattr(self, f"{group}_per_k", 0.0))
 
     def repeat(self, group: str) -> float | None:
-        """Spread of a group from run to run while no history tells; None unknown."""
+        """Spread of a group from run to run if there is no history; None if not set."""
         return getattr(self, f"{group}_repeat", None)
 
     def tolerance(self, group: str) -> float | None:

@@ -1,9 +1,10 @@
-"""What a unit's parameters are, by the units that it was made with.
+"""Prior of a unit's parameters from other units of its production lot.
 
     theta ~ (1 - sum p) N(m, P) + sum_j p_j N(m, P + (K^2 - 1) P_jj e_j e_j^T)      (1)
 
-m and P are what its lot says of the next unit: what units differ by, and what is not
-known of their mean and spread. A unit may be odd in any one parameter, or in all.
+m and P are mean and covariance of the next unit: they include the differences between
+units, and the uncertainty of mean and spread. A unit may be an outlier in any one
+parameter, or in all.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from fieldcal.core.samples import Array
 
 @dataclass(frozen=True, slots=True)
 class LotPrior:
-    """What a lot says of its next unit.
+    """Prior of the parameters of the next unit of a lot.
 
     Attributes
     ----------
-    label : which lot, as somebody asked for it
+    label : the lot, as it was requested
     names : (k,) parameters by full name
     mean : (k,) m, in the parameters' units
     covariance : (k, k) P
-    odd : (k,) p, chance that a unit is odd in each
-    times : K; how much further off an odd one is
-    units : (k,) units that each parameter is known of
+    outlier_probability : (k,) p, probability that a unit is an outlier in each
+    outlier_factor : K, factor on the standard deviation of an outlier
+    units : (k,) number of units with a value of each parameter
 
     """
 
@@ -36,8 +37,8 @@ class LotPrior:
     names: tuple[str, ...]
     mean: Array
     covariance: Array
-    odd: Array
-    times: float
+    outlier_probability: Array
+    outlier_factor: float
     units: tuple[int, ...]
 
     @property
@@ -45,15 +46,15 @@ class LotPrior:
         """Standard uncertainty of the next unit's value, (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    def only(self, names: Sequence[str]) -> LotPrior:
-        """The part of it that is about some parameters, in its own order."""
+    def subset(self, names: Sequence[str]) -> LotPrior:
+        """The prior of some of the parameters, in its own order."""
         at = [i for i, name in enumerate(self.names) if name in names]
         return LotPrior(
             self.label,
             tuple(self.names[i] for i in at),
             self.mean[at],
             self.covariance[np.ix_(at, at)],
-            self.odd[at],
-            self.times,
+            self.outlier_probability[at],
+            self.outlier_factor,
             tuple(self.units[i] for i in at),
         )

@@ -1,4 +1,4 @@
-"""Words for each parameter against the averaging time: console and report say it alike.
+"""Text about each parameter against the averaging time, for console and report.
 
 The content is that of `evaluation.nested_windows`, as result.json has it.
 """
@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fieldcal.calibration.wording import pretty, title
+from fieldcal.calibration.wording import format_unit, parameter_title
 
 MOST = 5
-"""Times that are shown: the shortest, the longest, and those evenly between."""
+"""Number of times that are shown: shortest, longest, and evenly between."""
 
 WINS = {
     "fixture": "what fixture and factory leave is more than noise from {} s on",
     "flicker": "flicker or walk is more than white noise from {} s on",
     "drift": "a disturbance or a drift moves them by more than noise from {} s on",
 }
-"""What wins over noise."""
+"""Text for the error that exceeds noise."""
 
 NOISE = "noise is most of the ±, and longer windows are better"
 
@@ -31,26 +31,30 @@ def heading(told: Mapping[str, Any]) -> list[str]:
 
 
 def rows(told: Mapping[str, Any]) -> list[list[str]]:
-    """A row for each parameter: its ± at each time."""
+    """One row for each parameter, with its ± at each time."""
     at = _shown(len(told["seconds"]))
     return [
-        [title(name), *(f"{one['sigma'][i]:.2g}" for i in at), pretty(one["unit"])]
+        [
+            parameter_title(name),
+            *(f"{one['sigma'][i]:.2g}" for i in at),
+            format_unit(one["unit"]),
+        ]
         for name, one in told["parameters"].items()
     ]
 
 
 def sentences(told: Mapping[str, Any]) -> list[str]:
-    """What wins over noise and from when, with the parameters that have it so."""
+    """Sentences about the error that exceeds noise, and from which time."""
     alike: dict[str, list[str]] = {}
     for name, one in told["parameters"].items():
         wins, what = one["wins"], NOISE
         if wins is not None:
             what = WINS[wins["what"]].format(f"{wins['from_s']:.3g}")
-        alike.setdefault(what, []).append(title(name))
+        alike.setdefault(what, []).append(parameter_title(name))
     return [f"{what}: {', '.join(names)}" for what, names in alike.items()]
 
 
 def _shown(count: int) -> list[int]:
-    """Which of some times are shown."""
+    """Indices of the times that are shown."""
     few = min(count, MOST)
     return sorted({round(i * (count - 1) / max(few - 1, 1)) for i in range(few)})

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fieldcal.calibration.correction import corrected, spread
+from fieldcal.calibration.correction import calibrated_samples, calibrated_sigma
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
@@ -175,8 +175,8 @@ class Calibration:
         start = nominal or Nominal()
         return replace(
             block,
-            acc=corrected(block.acc, *self.accelerometers(start)),
-            gyr=corrected(block.gyr, *self.gyroscopes(start)),
+            acc=calibrated_samples(block.acc, *self.accelerometers(start)),
+            gyr=calibrated_samples(block.gyr, *self.gyroscopes(start)),
         )
 
     def uncertainty_of(self, block: Block, nominal: Nominal | None = None) -> Array:
@@ -187,7 +187,7 @@ class Calibration:
         """
         start = nominal or Nominal()
         parts = [
-            spread(values, *model, self.names, self.covariance, sensor)
+            calibrated_sigma(values, *model, self.names, self.covariance, sensor)
             for sensor, values, model in (
                 ("acc", block.acc, self.accelerometers(start)),
                 ("gyr", block.gyr, self.gyroscopes(start)),

@@ -1,10 +1,10 @@
-"""What no sensor shows in the declared axes and units.
+"""Values that no sensor has in the declared axes and units.
 
-A scale factor far from nominal is another unit or full scale, a bias of half a g a
-device or a driver that takes its mean out, a scale factor of the other sign an axis
-that points the other way, a base out of level by tens of degrees another mounting,
-turns that lead elsewhere other axes: facts that are wrong, however well everything else
-agrees.
+They show that a stated fact is wrong, however well everything else agrees: a scale
+factor far from nominal means another unit or full scale; a bias of half a g, a device
+or driver that subtracts its mean; a scale factor of the opposite sign, an axis that
+points the other way; a tilt of tens of degrees, another mounting; turns that contradict
+the positions, other axes.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join
 
 LEAST, UNSEEN = 0.1, 5.0
-"""Share of the nominal scale factor, and standard deviations: less is none."""
+"""A scale factor below this part of nominal, and below so many standard deviations,
+counts as zero."""
 
 UNREAL = {"acc_scale": 0.1, "gyr_scale": 0.1, "acc_bias": 5.0, "gyr_bias": 0.5}
-"""Change from nominal that no sensor has: 10 %, three times what consumer grade is sold
-with; half a g; 30 deg/s."""
+"""Difference from nominal that no sensor has: 10 %, three times the tolerance of
+consumer grade; half a g; 30 deg/s."""
 
 STEEP = 10.0
-"""Tilt in degrees from which it is none: session.toml takes no larger one for a level
-either."""
+"""Largest plausible tilt of a base, deg; session.toml accepts no larger level."""
 
 MENTIONED = 3
-"""Turns that are named one by one."""
+"""Largest number of turns that are named."""
 
 
-def senseless(
+def implausible_values(
     names: Sequence[str], values: Array, sigma: Array, nominal: Nominal
 ) -> list[str]:
     """Sentences about values that no sensor has in the declared axes and units."""
@@ -50,12 +50,12 @@ def senseless(
     return said
 
 
-def elsewhere(turns: Sequence[tuple[str, str]]) -> list[str]:
-    """A sentence about turns that lead elsewhere than from one position to the next.
+def misdirected_turns(turns: Sequence[tuple[str, str]]) -> list[str]:
+    """A sentence about turns whose measured rotation contradicts the positions.
 
     Parameters
     ----------
-    turns : names of the positions that each goes from and to
+    turns : names of the positions before and after each turn
 
     """
     if not turns:

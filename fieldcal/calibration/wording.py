@@ -17,17 +17,17 @@ TITLES = {
     "angle_offset": "joints' offset",
     "base_tilt": "base tilt",
 }
-"""What a group of parameters is called."""
+"""Name of each group of parameters."""
 
 
-def number(value: float, sigma: float) -> tuple[str, str]:
-    """Value and sigma with as many digits as sigma has two of.
+def format_with_sigma(value: float, sigma: float) -> tuple[str, str]:
+    """Value and sigma, with two significant digits of sigma.
 
-    >>> number(0.12345, 0.00234)
+    >>> format_with_sigma(0.12345, 0.00234)
     ('0.1235', '0.0023')
-    >>> number(123.4, 56.0)
+    >>> format_with_sigma(123.4, 56.0)
     ('123', '56')
-    >>> number(-1e-5, 0.0014)
+    >>> format_with_sigma(-1e-5, 0.0014)
     ('0.0000', '0.0014')
     """
     if not math.isfinite(sigma) or sigma <= 0:
@@ -36,10 +36,10 @@ def number(value: float, sigma: float) -> tuple[str, str]:
     return f"{value:z.{digits}f}", f"{sigma:.{digits}f}"
 
 
-def title(name: str) -> str:
-    """What a parameter with its component is called.
+def parameter_title(name: str) -> str:
+    """Name of a parameter with its component.
 
-    >>> title("acc_bias.x"), title("base_tilt.about_x_deg")
+    >>> parameter_title("acc_bias.x"), parameter_title("base_tilt.about_x_deg")
     ('acc bias x', 'base tilt about x')
     """
     parameter = ParameterName.of(name)
@@ -48,10 +48,10 @@ def title(name: str) -> str:
     return f"{TITLES.get(group, group.replace('_', ' '))} {label}".strip()
 
 
-def pretty(unit: str) -> str:
-    """A unit with raised figures; none for a plain number.
+def format_unit(unit: str) -> str:
+    """A unit with superscripts; empty for a plain number.
 
-    >>> pretty("m/s^2*sqrt(Hz)"), pretty("1/(m/s^2)^2"), pretty("1")
+    >>> format_unit("m/s^2*sqrt(Hz)"), format_unit("1/(m/s^2)^2"), format_unit("1")
     ('m/s²·√Hz', '1/(m/s²)²', '')
     """
     raised = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
@@ -61,7 +61,7 @@ def pretty(unit: str) -> str:
 
 
 def position_numbers(indices: Iterable[int]) -> str:
-    """Numbers of positions, from 1, with runs of them shortened.
+    """Numbers of positions, from 1; consecutive ones are written as a range.
 
     >>> position_numbers((0, 1, 2, 5, 7, 8))
     '1–3, 6, 8–9'

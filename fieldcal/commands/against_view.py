@@ -7,7 +7,7 @@ from typing import IO
 from fieldcal.against.motion.wording import aligned_as
 from fieldcal.against.result import Match
 from fieldcal.against.wording import lines
-from fieldcal.calibration.wording import position_numbers, pretty
+from fieldcal.calibration.wording import format_unit, position_numbers
 from fieldcal.commands.diagnosis_view import STYLES
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
@@ -66,7 +66,7 @@ def _prediction(found: Match) -> object:
     from rich.table import Table
 
     table = Table(title="What was not fitted, predicted", title_justify="left")
-    names = ("", *(f"rms {pretty(unit)}" for unit in UNITS), "χ²/dof")
+    names = ("", *(f"rms {format_unit(unit)}" for unit in UNITS), "χ²/dof")
     for name in names:
         table.add_column(name, justify="right" if name else "left")
     for label, one in (("simulator", found.before), ("patched", found.after)):
@@ -103,7 +103,7 @@ def _recordings(found: Match) -> object:
     for name, unit in zip(("step_acc", "step_gyr"), UNITS, strict=True):
         steps = [getattr(one, name) for one in both]
         shown = [f"{s:.3g}" if s == s else "none" for s in steps]
-        table.add_row(f"step, {pretty(unit)}", *shown)
+        table.add_row(f"step, {format_unit(unit)}", *shown)
     for name, axes in found.real.calibration.items() if found.aligned else ():
         for axis, told in axes.items():
             table.add_row(f"{name} {axis}", pretty_quantity(told), "reference")

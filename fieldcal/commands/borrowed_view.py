@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
 
 
 def show_borrowed(found: Calibration) -> None:
@@ -24,7 +24,9 @@ def show_borrowed(found: Calibration) -> None:
     units = dict(zip(found.names, found.units, strict=True))
     for name, one in told["parameters"].items():
         alone = "none" if one["own_sigma"] is None else f"{one['own_sigma']:.2g}"
-        lot = " ± ".join(number(one["lot_value"], one["lot_sigma"]))
+        lot = " ± ".join(format_with_sigma(one["lot_value"], one["lot_sigma"]))
         both = f"{one['sigma']:.2g}"
-        table.add_row(title(name), lot, alone, both, pretty(units.get(name, "")))
+        table.add_row(
+            parameter_title(name), lot, alone, both, format_unit(units.get(name, ""))
+        )
     ShownConsole().print(table)

@@ -53,16 +53,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _instances(args: argparse.Namespace) -> int:
     """Hold the IMUs of one log against each other and g."""
-    from fieldcal.evaluation.instances import compared
-    from fieldcal.evaluation.observations import rests
+    from fieldcal.evaluation.instances import compare_instances
+    from fieldcal.evaluation.observations import usable_windows
     from fieldcal.session.folder import Session
 
     sessions = {one.name: Session.open(one) for one in _folders(args.paths)}
     means = {
-        name: np.array([a.mean[:3] for a in rests(one).averages])
+        name: np.array([a.mean[:3] for a in usable_windows(one).averages])
         for name, one in sessions.items()
     }
-    found = compared(means, next(iter(sessions.values())).gravity)
+    found = compare_instances(means, next(iter(sessions.values())).gravity)
     if args.json:
         sys.stdout.write(json.dumps([one.document() for one in found]) + "\n")
     else:
@@ -123,14 +123,14 @@ def read(path: Path) -> Calibration:
 
 def table(found: Comparison) -> str:
     """Lines of a comparison, a parameter each."""
-    from fieldcal.calibration.wording import number
+    from fieldcal.calibration.wording import format_with_sigma
 
     width = max(len(n) for n in found.names)
     lines = [f"{'parameter':{width}}  second - first      ± 1σ       difference/σ"]
     for name, d, s, z in zip(
         found.names, found.difference, found.sigma, found.z, strict=True
     ):
-        value, sigma = number(-float(d), float(s))
+        value, sigma = format_with_sigma(-float(d), float(s))
         mark = "  changed" if name in found.changed else ""
         lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:12.1f}{mark}")
     for which, names in (("first", found.only_first), ("second", found.only_second)):

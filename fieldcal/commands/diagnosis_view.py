@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import IO, TYPE_CHECKING
 
-from fieldcal.calibration.wording import position_numbers, pretty
+from fieldcal.calibration.wording import format_unit, position_numbers
 from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
@@ -154,7 +154,7 @@ def _picture(diagnosis: Diagnosis) -> list[RenderableType]:
     names = [n for n in before if before[n] > 0 and after.get(n, 0.0) > 0]
     if not names:
         return []
-    legend = f"held-out rms, {pretty(UNITS[0])} and {pretty(UNITS[1])}"
+    legend = f"held-out rms, {format_unit(UNITS[0])} and {format_unit(UNITS[1])}"
     grid = Table.grid(padding=(0, 2))
     triads = [[n for n in names if n[0] == triad] for triad in "ag"]
     for pair in zip_longest(*(t for t in triads if t)):
@@ -284,7 +284,7 @@ def _fit(diagnosis: Diagnosis) -> object:
 def _calibration(diagnosis: Diagnosis) -> object:
     from rich.table import Table
 
-    from fieldcal.calibration.wording import TITLES, number
+    from fieldcal.calibration.wording import TITLES, format_with_sigma
 
     table = Table(title="Calibration with it", title_justify="left")
     for name in ("parameter", "value", "± 1σ", "unit", "change"):
@@ -295,7 +295,7 @@ def _calibration(diagnosis: Diagnosis) -> object:
             "xyz", group.value, group.sigma, group.change, strict=True
         ):
             if value == value:
-                shown = number(value, sigma)
+                shown = format_with_sigma(value, sigma)
                 moved = f"{change / sigma:+.1f} σ" if sigma > 0 else ""
                 table.add_row(f"{TITLES[name]} {axis}", *shown, group.unit, moved)
     return table

@@ -207,7 +207,7 @@ def lines(points: Sequence[TrendPoint]) -> list[str]:
     The strip spans all values with twice their uncertainty; ``o`` is the value, ``-``
     its ± 2 sigma.
     """
-    from fieldcal.calibration.wording import number
+    from fieldcal.calibration.wording import format_with_sigma
 
     low = min(p.value - 2 * p.sigma for p in points)
     high = max(p.value + 2 * p.sigma for p in points)
@@ -219,7 +219,7 @@ def lines(points: Sequence[TrendPoint]) -> list[str]:
         first, last = (round((end - low) / step) for end in ends)
         cells[first : last + 1] = "-" * (last + 1 - first)
         cells[round((p.value - low) / step)] = "o"
-        value, sigma = number(p.value, p.sigma)
+        value, sigma = format_with_sigma(p.value, p.sigma)
         word = "OUT" if p.odd else "no-go" if p.run.go is False else ""
         word = "accepted" if p.run.accepted else word
         out.append(

@@ -313,9 +313,9 @@ def _bring_means(
 
 def _say_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
     """Say which of several IMUs in one log is out."""
-    from fieldcal.evaluation.instances import compared
+    from fieldcal.evaluation.instances import compare_instances
 
-    found = compared(rests, gravity)
+    found = compare_instances(rests, gravity)
     for one in found if any(one.out for one in found) else []:
         sys.stderr.write(f"{folder}: {one.sentence()}\n")
 

@@ -40,11 +40,11 @@ def with_installed(calibration: Calibration, session: Session) -> Calibration:
 
 def lines(calibration: Calibration) -> list[str]:
     """What to install, as an operator types it, with its ± and what it was."""
-    from fieldcal.calibration.wording import number
+    from fieldcal.calibration.wording import format_with_sigma
 
     told = []
     for name, of in calibration.info.get("install", {}).items():
-        value, sigma = number(of["value"], of["sigma"])
+        value, sigma = format_with_sigma(of["value"], of["sigma"])
         unit = "" if of["unit"] == "1" else f" {of['unit']}"
         was = f"(it was {of['was']:.6g}{unit})"
         told.append(f"install {name} = {value} ± {sigma}{unit} {was}")

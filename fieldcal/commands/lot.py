@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show(found: Lot) -> None:
-    from fieldcal.calibration.wording import number, pretty
+    from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     say = sys.stdout.write
     share, low, high = (100 * part for part in found.share)
@@ -93,9 +93,9 @@ def _show(found: Lot) -> None:
     )
     say(f"{'parameter':24}{'mean ± of it':>24}{'spread (95 %)':>32}{'Cpk':>14}\n")
     for one in found.parameters.values():
-        mean = " ± ".join(number(one.about.mean, one.about.mean_sigma))
+        mean = " ± ".join(format_with_sigma(one.about.mean, one.about.mean_sigma))
         wide = f"{one.about.spread:.2g} ({one.about.low:.2g} to {one.about.high:.2g})"
-        unit = pretty(one.unit)
+        unit = format_unit(one.unit)
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
         say(f"{one.name:24}{mean:>24}{f'{wide} {unit}':>32}{cpk:>14}\n")
     for line in statements(found):
@@ -104,22 +104,23 @@ def _show(found: Lot) -> None:
 
 def statements(found: Lot) -> list[str]:
     """What is odd, what has shifted, and which chart is beyond its limits."""
-    from fieldcal.calibration.wording import number, pretty
+    from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     out = []
     for odd in found.odd[:SHOWN]:
-        unit = pretty(found.parameters[odd.parameter].unit)
+        unit = format_unit(found.parameters[odd.parameter].unit)
         out.append(
             f"odd: {one_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
-            f" {' ± '.join(number(odd.off, odd.sigma))} {unit}".rstrip()
+            f" {' ± '.join(format_with_sigma(odd.off, odd.sigma))} {unit}".rstrip()
         )
     if len(found.odd) > SHOWN:
         out.append(f"odd: and {len(found.odd) - SHOWN} more (--json)")
     for shift in found.shifts:
-        unit = pretty(found.parameters[shift.parameter].unit)
+        unit = format_unit(found.parameters[shift.parameter].unit)
         groups = zip(shift.labels, shift.values, shift.sigmas, strict=True)
         told = "; ".join(
-            f"{one_line(label)} {' ± '.join(number(float(v), float(s)))} {unit}"
+            f"{one_line(label)} {' ± '.join(format_with_sigma(float(v), float(s)))}"
+            f" {unit}"
             for label, v, s in groups
         )
         out.append(

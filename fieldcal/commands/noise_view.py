@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import IO, TYPE_CHECKING
 
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate, Size
 from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
@@ -42,8 +42,8 @@ def show(
         some = [c for n, c in model.channels.items() if n[0] == triad]
         if some:
             scale, prefix = _scale(some)
-            _sizes(console, what, some, scale, prefix + pretty(some[0].unit))
-            _windows(console, some, scale, prefix + pretty(some[0].unit))
+            _sizes(console, what, some, scale, prefix + format_unit(some[0].unit))
+            _windows(console, some, scale, prefix + format_unit(some[0].unit))
     _follows(console, found)
 
 
@@ -55,7 +55,7 @@ def _scale(channels: list[ChannelEstimate]) -> tuple[float, str]:
 
 def _cell(size: Size | None, below: Size | None, scale: float) -> str:
     if size is not None:
-        return " ± ".join(number(size.value / scale, size.sigma / scale))
+        return " ± ".join(format_with_sigma(size.value / scale, size.sigma / scale))
     return "–" if below is None else f"< {below.value / scale:.2g}"
 
 
@@ -90,16 +90,17 @@ def _more(channel: ChannelEstimate, scale: float, unit: str) -> list[str]:
         what = OTHERS.get(name[0])
         if what:
             ending = {"Q": "·s", "R": "/s"}.get(name[0], "")
-            value, sigma = number(size.value / scale, size.sigma / scale)
+            value, sigma = format_with_sigma(size.value / scale, size.sigma / scale)
             text = f"{what} {value} ± {sigma} {unit}{ending}"
             if name[0] == "G":
-                text += f", over {' ± '.join(number(size.time, size.time_sigma))} s"
+                time = " ± ".join(format_with_sigma(size.time, size.time_sigma))
+                text += f", over {time} s"
             out.append(text)
         elif size.time_sigma < size.time < math.inf:
-            time, sigma = number(size.time, size.time_sigma)
+            time, sigma = format_with_sigma(size.time, size.time_sigma)
             out.append(f"flicker {name} up to {time} ± {sigma} s")
     if channel.temperature is not None:
-        each = " ± ".join(number(*(v / scale for v in channel.temperature)))
+        each = " ± ".join(format_with_sigma(*(v / scale for v in channel.temperature)))
         out.append(f"temperature {each} {unit}/K, taken out")
     if math.isfinite(channel.filtered_hz):
         out.append(f"above {channel.filtered_hz:.3g} Hz it is filtered, or hums")
@@ -126,7 +127,7 @@ def _windows(
     for channel in some:
         found = channel.averaging
         cells = [
-            " ± ".join(number(v / scale, s / scale))
+            " ± ".join(format_with_sigma(v / scale, s / scale))
             if seconds <= found.seconds[-1]
             else "too short"
             for seconds in PAPERS
@@ -156,7 +157,7 @@ def _follows(console: Console, found: NoiseResult) -> None:
     for program in ("kalibr", "ardupilot", "px4"):
         console.print(f"{program}:", style="bold")
         for name, (value, sigma, unit) in found.programs[program].items():
-            text = f"{value_or_bound(value, sigma)} {pretty(unit)}"
+            text = f"{value_or_bound(value, sigma)} {format_unit(unit)}"
             console.print(f"  {name:30} {text}")
     for text in follows(found):
         _line(console, f"  {text}")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fieldcal.core.positions import Position
     from fieldcal.planning.aliasing import Aliases
     from fieldcal.planning.device_noise import DeviceNoise
-    from fieldcal.planning.planner import Grade
+    from fieldcal.planning.planner import GradeNoise
 
 RARE = (
     *("name", "serial", "lot", "station", "operator"),
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
     from fieldcal.core.positions import FIVE
     from fieldcal.planning import planner
-    from fieldcal.planning.aliasing import aliases
+    from fieldcal.planning.aliasing import find_aliases
     from fieldcal.session import description
 
     tables = {"format": description.FORMAT, **site_tables(args, "device")}
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
     paper = planner.expected(FIVE, grade, seconds, gravity)
     further = planner.extra_position(places, ladder, gravity)
     with_it = planner.expected((*places, further), grade, seconds, gravity)
-    confused = aliases(places, gravity)
+    confused = find_aliases(places, gravity)
     if args.output:
         write(args.output, tables, places, seconds)
     if args.json:
@@ -143,7 +143,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _needed(hz: float, grade: Grade) -> float:
+def _needed(hz: float, grade: GradeNoise) -> float:
     """Seconds that a position needs on a swaying base.
 
     Raises
@@ -152,11 +152,11 @@ def _needed(hz: float, grade: Grade) -> float:
         If it does not sway.
 
     """
-    from fieldcal.planning.swaying_base import seconds_needed
+    from fieldcal.planning.swaying_base import window_seconds_needed
 
     if not hz > 0:
         raise PlanError("--sways is a frequency in Hz, above 0")
-    return seconds_needed(hz, grade)
+    return window_seconds_needed(hz, grade)
 
 
 def _spins(args: argparse.Namespace) -> int:
@@ -181,7 +181,7 @@ def _device(path: Path) -> DeviceNoise:
 
     """
     from fieldcal.core.errors import SessionError
-    from fieldcal.planning.device_noise import of_document
+    from fieldcal.planning.device_noise import device_noise_from
     from fieldcal.session.noise_file import read_noise
 
     content = read_noise(path)
@@ -189,7 +189,7 @@ def _device(path: Path) -> DeviceNoise:
         raise SessionError(
             f"{path}: has no noise.json; run fieldcal noise on a recording at rest"
         )
-    return of_document(content)
+    return device_noise_from(content)
 
 
 def _seconds(minutes: float, n: int) -> float:
@@ -204,7 +204,7 @@ def _seconds(minutes: float, n: int) -> float:
     return float(min(LONGEST, round(each)))
 
 
-def _worth(grade: Grade) -> str:
+def _worth(grade: GradeNoise) -> str:
     """How long a device of a grade is worth averaging."""
     return (
         f"flicker wins over white noise from {grade.acc_seconds:.0f} s"
@@ -235,7 +235,7 @@ def _show(
     chosen: Sequence[Position],
     seconds: float,
     noise: str,
-    grade: Grade,
+    grade: GradeNoise,
     found: Mapping[str, float],
     paper: Mapping[str, float],
     with_it: Mapping[str, float],

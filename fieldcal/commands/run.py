@@ -292,14 +292,14 @@ def _record(
 def _unsaid(task: Task) -> list[str]:
     """What nobody said of base, site and angles, without which it is NO-GO."""
     from fieldcal import procedures
-    from fieldcal.acceptance.angles import unstated
-    from fieldcal.acceptance.level import level_unknown
-    from fieldcal.acceptance.site import gravity_unknown
+    from fieldcal.acceptance.angles import unstated_angles_warning
+    from fieldcal.acceptance.level import level_warning_before_run
+    from fieldcal.acceptance.site import gravity_missing_warning
 
-    unsaid = [unstated(task.about)]
+    unsaid = [unstated_angles_warning(task.about)]
     if procedures.most(task.about, task.procedure) is None:
-        unsaid.append(level_unknown(task.about))
-    unsaid.append(gravity_unknown(task.about))  # what matters most is said last
+        unsaid.append(level_warning_before_run(task.about))
+    unsaid.append(gravity_missing_warning(task.about))  # what matters most is said last
     return [sentence for sentence in unsaid if sentence]
 
 

@@ -37,12 +37,12 @@ def concluded(
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
     from fieldcal.commands.installing import with_installed
-    from fieldcal.evaluation.observations import rests
-    from fieldcal.evaluation.solution import solved
+    from fieldcal.evaluation.observations import usable_windows
+    from fieldcal.evaluation.solution import solve_session
     from fieldcal.session.folder import RESULT
 
-    still = rests(session)
-    found = with_installed(solved(session, still, method=method), session)
+    still = usable_windows(session)
+    found = with_installed(solve_session(session, still, method=method), session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := store_in_history(history, session, found):
@@ -103,7 +103,7 @@ def write_junit(
     path: Path, task: Task, folder: Path, result: Any, said: str = ""
 ) -> None:
     """Write what happened as JUnit XML; `result` is None where the run broke off."""
-    from fieldcal.acceptance.verification import planned
+    from fieldcal.acceptance.verification import planned_verification
     from fieldcal.core.positions import Position
     from fieldcal.run import junit
     from fieldcal.session.description import with_more
@@ -116,7 +116,7 @@ def write_junit(
         Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
         for m in more if int(m["position"]) >= len(about.positions)
     ])  # fmt: skip
-    positions = [*about.positions, *filter(None, [planned(about)])]
+    positions = [*about.positions, *filter(None, [planned_verification(about)])]
     junit.write(path, task.procedure, positions, marks, result, said)
 
 

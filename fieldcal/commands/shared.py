@@ -90,7 +90,7 @@ def lines(one: SharedFinding) -> list[str]:
 
     Groups are in the order of what they show, by the largest value in its sigmas.
     """
-    from fieldcal.calibration.wording import number, pretty
+    from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     name, part = one.effect.key
     shape = f", {one.effect.shape}" if one.effect.shape else ""
@@ -107,8 +107,8 @@ def lines(one: SharedFinding) -> list[str]:
         told = []
         rows = zip(one.effect.columns, one.values[g], one.sigmas[g], strict=True)
         for column, value, sigma in rows:
-            shown = " ± ".join(number(float(value), float(sigma)))
-            told.append(f"{column.name} {shown} {pretty(column.unit)}".rstrip())
+            shown = " ± ".join(format_with_sigma(float(value), float(sigma)))
+            told.append(f"{column.name} {shown} {format_unit(column.unit)}".rstrip())
         out.append(f"  {one_line(groups[g])}: {'; '.join(told)}")
     if len(groups) > GROUPS:
         out.append(f"  and {len(groups) - GROUPS} more, which show less (--json)")

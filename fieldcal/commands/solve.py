@@ -16,7 +16,7 @@ from fieldcal.core.factory import FACTORY
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.calibration.lot_prior import LotPrior
-    from fieldcal.evaluation.observations import Rests
+    from fieldcal.evaluation.observations import UsableWindows
     from fieldcal.session.folder import Session
 
 RARE = ("as_printed", "method", "heading", "history", "lot")
@@ -91,14 +91,14 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.installing import with_installed
     from fieldcal.commands.over_time_view import show_over_time
     from fieldcal.commands.table import show
-    from fieldcal.evaluation.not_carried import mended
-    from fieldcal.evaluation.observations import rests
+    from fieldcal.evaluation.observations import usable_windows
+    from fieldcal.evaluation.omitted_effects import with_repaired_bytes
     from fieldcal.session.folder import RESULT, Session
 
     session = Session.open(args.session)
     if not args.as_printed:
-        session, repaired = mended(session)
-    still = rests(session)
+        session, repaired = with_repaired_bytes(session)
+    still = usable_windows(session)
     found = _solved(args, session, still)
     if not args.as_printed:
         found = replace(found, warnings=(*repaired, *found.warnings))
@@ -122,11 +122,13 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.good and go else 1
 
 
-def _solved(args: argparse.Namespace, session: Session, still: Rests) -> Calibration:
+def _solved(
+    args: argparse.Namespace, session: Session, still: UsableWindows
+) -> Calibration:
     """What windows, turns and lot say, estimated as the options want it."""
-    from fieldcal.evaluation.solution import solved
+    from fieldcal.evaluation.solution import solve_session
 
-    return solved(
+    return solve_session(
         session,
         still,
         args.turns,
@@ -151,9 +153,9 @@ def _over_time(session: Session) -> dict[str, Any]:
         If its windows cannot be cut.
 
     """
-    from fieldcal.evaluation.nested_windows import nested
+    from fieldcal.evaluation.nested_windows import solve_nested_windows
 
-    found = nested(session)
+    found = solve_nested_windows(session)
     if found is None:
         raise InputError(
             "--over-time needs windows of 5 s or more with samples: leave it out"
@@ -183,16 +185,16 @@ def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
 
 
 def _decided(
-    args: argparse.Namespace, found: Calibration, session: Session, still: Rests
+    args: argparse.Namespace, found: Calibration, session: Session, still: UsableWindows
 ) -> Calibration:
     """GO or NO-GO, where the session was a recalibration or limits are given."""
-    from fieldcal.acceptance.assessment import assess, limits_path, unassessed
+    from fieldcal.acceptance.assessment import assess, limits_path, with_faults
     from fieldcal.calibration import limits
     from fieldcal.history.place import default_place
     from fieldcal.history.store import History
 
     bounds = limits.read(session.grade, limits_path(session, args.limits))
     if args.limits is None and "run" not in session.about.raw:
-        return unassessed(found, session, still, bounds)
+        return with_faults(found, session, still, bounds)
     history = History(args.history or default_place())
     return assess(found, session, still, bounds, history)

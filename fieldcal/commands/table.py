@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING, Any
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import number, title
+from fieldcal.calibration.wording import format_with_sigma, parameter_title
 from fieldcal.commands.installing import lines
 
 if TYPE_CHECKING:
@@ -55,10 +55,13 @@ def show(
         group = group_of(name)
         if before and group != before:
             table.add_section()
-        cells = [title(name), *number(value, sigma), unit]
+        cells = [parameter_title(name), *format_with_sigma(value, sigma), unit]
         if name in concealed:
             true = concealed[name]
-            cells += [number(true, sigma)[0], f"{(value - true) / sigma:+.1f} σ"]
+            cells += [
+                format_with_sigma(true, sigma)[0],
+                f"{(value - true) / sigma:+.1f} σ",
+            ]
         table.add_row(*cells)
         before = group
     console.print(table)

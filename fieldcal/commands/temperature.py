@@ -169,7 +169,11 @@ def _at(found: ThermalModel, to: float, last: ThermalPoint) -> dict[str, Any]:
 
 
 def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
-    from fieldcal.calibration.wording import number, pretty, title
+    from fieldcal.calibration.wording import (
+        format_unit,
+        format_with_sigma,
+        parameter_title,
+    )
     from fieldcal.thermal.wording import TOLD, costs
 
     say = sys.stdout.write
@@ -184,11 +188,13 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
     say(f"{'parameter':24}{head}  {'from run to run':>16}  order\n")
     values = {t: found.at(t) for t in shown}
     for name, curve in found.curves.items():
-        cells = "".join(f"{' ± '.join(number(*values[t][name])):>24}" for t in shown)
+        cells = "".join(
+            f"{' ± '.join(format_with_sigma(*values[t][name])):>24}" for t in shown
+        )
         order = f"{curve.order} (P = {curve.orders[curve.order]:.2f})"
-        unit = pretty(curve.unit)
+        unit = format_unit(curve.unit)
         spread = f"± {curve.spread:.2g} {unit}"
-        say(f"{title(name):24}{cells}  {spread:>16}  {order}\n")
+        say(f"{parameter_title(name):24}{cells}  {spread:>16}  {order}\n")
     if at is not None:
         told, rest = costs(found.change(at, last.temperature))
         say(
@@ -197,7 +203,10 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
         )
         say("".join(f"  {line}\n" for line in told))
         if rest:
-            say(f"  less than {TOLD:.0f} of its ±: {', '.join(map(title, rest))}\n")
+            say(
+                f"  less than {TOLD:.0f} of its ±:"
+                f" {', '.join(map(parameter_title, rest))}\n"
+            )
 
 
 def _parameters(

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.parameters import Nominal
-from fieldcal.calibration.plausible import elsewhere, senseless
+from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.samples import CHANNELS, GYR, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings import found_effects, mismatches
@@ -166,13 +166,13 @@ def _impossible(explanation: Explanation) -> list[str]:
     """Values that no sensor has, and turns that lead elsewhere: some fact is wrong."""
     found = calibrated(explanation, explanation.best.set)
     nominal = explanation.prepared.source.about.nominal
-    values = senseless(
+    values = implausible_values(
         tuple(found),
         np.array([value for value, _, _ in found.values()]),
         np.array([sigma for _, sigma, _ in found.values()]),
         Nominal(**{k: tuple(v.tolist()) for k, v in nominal.items()}),
     )
-    return values + elsewhere(_unexplained_turns(explanation))
+    return values + misdirected_turns(_unexplained_turns(explanation))
 
 
 def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:

@@ -1,12 +1,12 @@
-"""How well a recording shows that angles are set.
+"""Uncertainty of set angles as a recording shows it.
 
-It shows it by their scatter, which a diagnosis finds; and what accelerometers are
-off by from position to position for no known reason may be an angle too:
+The diagnosis finds the scatter of the angles. Offsets of the accelerometers from
+position to position without a known cause may be errors of angles as well:
 
     sigma = max_c sqrt(mean_p o_pc^2) / g                                          (1)
 
-with the offset o_pc of output c in position p. The accelerometers cannot tell which of
-the two it is, and the turns between the positions are off by an angle alone.
+with the offset o_pc of output c in position p. The accelerometers cannot distinguish
+the two; in the turns between positions only errors of angles show.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import sizes
 from fieldcal.diagnosis.wording.paragraph import of_the_setup
 from fieldcal.effects import catalogue
-from fieldcal.evaluation.not_carried import wrong_angles
+from fieldcal.evaluation.omitted_effects import wrong_angle_sentences
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
@@ -32,14 +32,14 @@ OTHER_ANGLES = (
     " angles say, by more than anybody sets an angle wrong; look for positions in"
     " another order, a sign, or axes that are named wrongly, and solve again"
 )
-"""Said where angles say nothing."""
+"""Warning if most angles are wrong."""
 
 BY_POSITION = ("window", "position", "alpha", "beta", "joints", "force")
-"""Functions without physics that go with how the device lies."""
+"""Functions without physics that depend on the position of the device."""
 
 
-def angles_set(explanation: Explanation) -> float:
-    """How well a recording shows that angles are set, deg; 0 if it shows nothing."""
+def shown_angle_setting(explanation: Explanation) -> float:
+    """Scatter of set angles found in a recording, deg; 0 if none is found."""
     found = [0.0]
     for one in explanation.standing:
         effect = catalogue().get(one.name)
@@ -49,8 +49,8 @@ def angles_set(explanation: Explanation) -> float:
     return max(found)
 
 
-def angles_of_offsets(explanation: Explanation) -> float:
-    """Angles that offsets without a known cause may be, deg; 0 if there are none."""
+def angle_equivalent_of_offsets(explanation: Explanation) -> float:
+    """Angle with the effect of offsets of unknown cause, (1), deg; 0 without any."""
     x, d = explanation.rows.x, explanation.dictionary
     unknown = [
         group.columns
@@ -70,39 +70,40 @@ def angles_of_offsets(explanation: Explanation) -> float:
     return float(np.rad2deg(size))
 
 
-def with_angles_shown(
-    fit: Callable[[], Calibration], asked: dict[str, Any], shown: Explanation | None
+def with_shown_angle_setting(
+    fit: Callable[[], Calibration], options: dict[str, Any], shown: Explanation | None
 ) -> tuple[Calibration, list[str]]:
-    """The result with angles set as stated, or as the recording shows, and sentences.
+    """Fit with the stated uncertainty of angles, or the larger one that is shown.
 
-    The rows are those of the set that is asked for: what this explains with the angles
-    as stated, such as a tilt of the base, shows nothing of the angles.
+    Returns the result and sentences. The larger one is used only if it has more
+    evidence: the requested parameters, such as a tilt of the base, may explain the
+    scatter as well.
 
     Parameters
     ----------
-    fit : result of what is asked for
-    asked : what is; how well angles are set in the end
-    shown : by the recording
+    fit : solves with the present values in `options`
+    options : arguments of `solve`; the uncertainty of angles is changed in place
+    shown : explanation of the recording; None if it was not examined
 
     """
     found = fit()
     if shown is None:
         return found, []
-    notes = [*wrong_angles(shown), *of_the_setup(shown)]
-    stated, angles = float(asked["angle_sigma_deg"]), angles_set(shown)
+    notes = [*wrong_angle_sentences(shown), *of_the_setup(shown)]
+    stated, angles = float(options["angle_sigma_deg"]), shown_angle_setting(shown)
     if angles > stated:
-        asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
+        options["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
         wider = fit()
         if wider.info["log_evidence"] <= found.info["log_evidence"]:
-            asked["angle_sigma_deg"] = stated
+            options["angle_sigma_deg"] = stated
         elif angles <= thresholds.NO_ANGLE:
             found, notes = wider, [_worse_set(angles, stated), *notes]
         else:
-            asked["angle_sigma_deg"] = stated
+            options["angle_sigma_deg"] = stated
             warnings = (OTHER_ANGLES, *found.warnings)
             return replace(found, warnings=warnings, good=False), notes
-    if (unknown := angles_of_offsets(shown)) > asked["angle_sigma_deg"]:
-        asked["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
+    if (unknown := angle_equivalent_of_offsets(shown)) > options["angle_sigma_deg"]:
+        options["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
         found, notes = fit(), [_may_be_angles(unknown), *notes]
     return found, notes
 

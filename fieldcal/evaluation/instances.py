@@ -1,10 +1,10 @@
-"""Several IMUs that went through the same motion, held against each other and g.
+"""Several IMUs with the same motion, compared with each other and with g.
 
     |a_k| = R in every rest k                                                       (1)
 
-R is the radius of a sphere through the means of an IMU's rests where these point every
-way, so that its bias does not count; otherwise their median length. One whose R is far
-from that of the others is out; of two, the one that is farther from g.
+R is the radius of a sphere through the means of an IMU's rests, if these point in all
+directions, so that its bias cancels; otherwise their median length. An IMU whose R is
+far from that of the others is marked as out; of two, the one that is farther from g.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 USUAL, BIASED = 0.01, 0.03
-"""Part of g by which a sensor as delivered may well be off: bias taken out, and not."""
+"""Usual error of a sensor as delivered, as a part of g, without and with its bias."""
 
 APART = 4.0
-"""Multiples of how much the others differ that one which is out is off by."""
+"""Smallest difference of an IMU that is out, in median differences of the others."""
 
 FEWEST = 6
-"""Rests through which a sphere is laid."""
+"""Fewest rests for a sphere."""
 
 ROUND = 1e-2
-"""Least singular value, of the greatest, of rests that point every way."""
+"""Smallest singular value, relative to the largest, of rests in all directions."""
 
 
 class Instance(NamedTuple):
-    """What one IMU reads at rest.
+    """Size of the specific force that one IMU measures at rest.
 
     Attributes
     ----------
     name : of the instance
     length : R of (1), m/s^2
     sigma : its standard uncertainty, m/s^2
-    every_way : whether the bias is taken out of it
-    rests : how many
+    every_way : whether the rests point in all directions, so that bias cancels
+    rests : number of rests
     of_g : R / g - 1
     of_others : R over the median of the others, less 1; nan where there are none
-    out : whether it is the one that is out
+    out : whether it differs too much from the others
 
     """
 
@@ -60,7 +60,7 @@ class Instance(NamedTuple):
         return dict.fromkeys(self._fields) | known
 
     def sentence(self) -> str:
-        """Say it in a line."""
+        """One sentence with the numbers."""
         text = (
             f"{self.name}: |a| at rest is {self.length:.4f} ± {self.sigma:.1g} m/s²"
             f" in {self.rests} rests{'' if self.every_way else ', bias included'},"
@@ -73,8 +73,8 @@ class Instance(NamedTuple):
         return text
 
 
-def compared(rests: Mapping[str, Array], gravity: float) -> list[Instance]:
-    """Hold IMUs against each other and g; those without any rest are left out.
+def compare_instances(rests: Mapping[str, Array], gravity: float) -> list[Instance]:
+    """Compare IMUs with each other and with g; those without rests are left out.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def compared(rests: Mapping[str, Array], gravity: float) -> list[Instance]:
 
     """
     known = {n: means[np.isfinite(means).all(axis=1)] for n, means in rests.items()}
-    found = {name: _length(means) for name, means in known.items() if len(means)}
+    found = {name: _rest_length(means) for name, means in known.items() if len(means)}
     sizes = {name: one[0] for name, one in found.items()}
     out = []
     for name, (size, sigma, every_way) in found.items():
@@ -110,7 +110,7 @@ def _is_out(size: float, others: Array, gravity: float, usual: float) -> bool:
     return len(others) == 1 or off > APART * differ
 
 
-def _length(means: Array) -> tuple[float, float, bool]:
+def _rest_length(means: Array) -> tuple[float, float, bool]:
     """R of (1), its standard uncertainty, and whether it is a sphere's."""
     lengths = np.linalg.norm(means, axis=1)
     if len(means) >= FEWEST:

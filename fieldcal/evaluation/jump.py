@@ -21,11 +21,11 @@ NAMES = dict(
 """Full name of each channel's bias."""
 
 
-def with_jump(found: Calibration, shown: Explanation) -> Calibration:
-    """The calibration with how much which bias jumps, and when, in its `info`.
+def with_jump(calibration: Calibration, shown: Explanation) -> Calibration:
+    """Add a jump of biases that the recording shows to `info`.
 
-    `jump` has `at_s`, and under `bias` by full name what it changes by and its standard
-    uncertainty, m/s^2 and rad/s, as far as the recording determines it.
+    `jump` has the time `at_s`, and under `bias`, by full name, change and standard
+    uncertainty, m/s^2 and rad/s, as far as the recording determines them.
     """
     for standing in shown.standing:
         if standing.name == JUMP:
@@ -36,5 +36,5 @@ def with_jump(found: Calibration, shown: Explanation) -> Calibration:
                 if channel in NAMES
             }
             info = {"at_s": told["at_s"].value, "bias": bias}
-            return replace(found, info={**found.info, "jump": info})
-    return found
+            return replace(calibration, info={**calibration.info, "jump": info})
+    return calibration

@@ -1,8 +1,8 @@
 """Whether the recording contradicts how level the base is stated to be.
 
-A stated level of standard uncertainty s is a prior of the tilt. A tilt that is not
-there by the statement is taken for biases, and the fit is as good as before. The same
-rows without the statement give the tilt t with covariance C, and
+A stated level of standard uncertainty s is a prior of the tilt. A larger tilt is then
+taken for biases, and the fit is as good as before. The same rows without the statement
+give the tilt t with covariance C, and
 
     chi2 = t^T (C + s^2 I)^-1 t                                                   (1)
 
@@ -20,32 +20,34 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS, group_of
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.estimation import RecordedRows
 
 
 def with_tilt_shown(
-    found: Calibration,
+    calibration: Calibration,
     observations: Observations,
-    recorded: Recorded | None,
-    asked: Mapping[str, Any],
+    recorded: RecordedRows | None,
+    options: Mapping[str, Any],
 ) -> Calibration:
-    """The same with the tilt that the positions show, where the level is stated.
+    """Add the tilt that the positions show without the stated level to `info`.
 
     Parameters
     ----------
-    found : the result with the stated level
-    observations, recorded, asked : what it was made from
+    calibration : the result with the stated level
+    observations, recorded, options : arguments of `solve` that it was made from
 
     """
-    level = found.info.get("level_sigma_deg")
-    if level is None or found.method in ("two_position", "scalar"):
-        return found
-    free = solve(observations, recorded=recorded, **{**asked, "level_sigma_deg": None})
+    level = calibration.info.get("level_sigma_deg")
+    if level is None or calibration.method in ("two_position", "scalar"):
+        return calibration
+    free = solve(
+        observations, recorded=recorded, **{**options, "level_sigma_deg": None}
+    )
     at = [i for i, name in enumerate(free.names) if group_of(name) in TILTS]
     if not at:
-        return found
+        return calibration
     tilt = free.values[at]
     covariance = free.covariance[np.ix_(at, at)] + level**2 * np.eye(len(at))
     chi2 = float(tilt @ np.linalg.solve(covariance, tilt))  # (1)
     shown = {"chi2": chi2, "dof": len(at), "tilt_deg": float(np.linalg.norm(tilt))}
-    return replace(found, info={**found.info, "tilt_shown": shown})
+    return replace(calibration, info={**calibration.info, "tilt_shown": shown})

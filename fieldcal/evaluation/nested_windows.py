@@ -1,8 +1,8 @@
-"""How long to average: a session solved with less and less of its windows.
+"""How long to average: a session solved with shorter and shorter windows.
 
-Of each window the first T is used. A parameter then has a value x(T), its ± s(T), and
-n(T), the part of that which the means leave: fixture, level and factory leave the same
-at every T,
+The first T of each window is used. A parameter then has a value x(T) with uncertainty
+s(T). n(T) is the part of s(T) from the noise of the means; the part r from fixture,
+level and factory is about the same at every T,
 
     r^2 = s^2(T) - n^2(T)                                                          (1)
 
@@ -10,7 +10,7 @@ White noise falls as 1 / sqrt(T), and nested means differ by
 
     var(x(T) - x(T')) = n^2 (1 - T/T')             n the larger of both, T < T'    (2)
 
-What wins over it first, and from which T, is one of
+The error that exceeds noise first, and from which T, is one of
 
     the fixture     r > n(T)                                                       (3)
     flicker         n^2(T) T > 2 n^2(T0) T0                 T0 the shortest time    (4)
@@ -32,20 +32,24 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import angle_setting, observations, rests
+from fieldcal.evaluation.observations import (
+    angle_setting,
+    build_observations,
+    usable_windows,
+)
 from fieldcal.model import priors
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 
 TIMES = (5, 10, 15, 30, 45, 60, 120, 300, 600, 1800, 3600)
-"""Lengths that are looked at, s, and the whole."""
+"""Lengths that are tried besides the whole window, s."""
 
 SHORTER = 0.8
-"""Part of the whole below which a length says something else."""
+"""Largest length that is tried, as a part of the whole window."""
 
 FAR = 4.0
-"""Standard deviations of (2) beyond which it is no noise: a hundred are looked at."""
+"""Standard deviations of (2) beyond which a change, of a hundred, is not noise."""
 
 EXACT_DEG = 1e-6
 """Level, heading and angles of a fixture that leaves nothing, deg."""
@@ -70,10 +74,10 @@ class NestedWindows:
     sigma: Array
     noise: Array
 
-    def wins(self, name: str) -> tuple[str, float] | None:
-        """What wins over noise first and from which T, s; None where noise lasts."""
+    def dominant_error(self, name: str) -> tuple[str, float] | None:
+        """Error that first exceeds noise, and from which T, s; None if none."""
         k = self.names.index(name)
-        x, n, rest = self.values[:, k], self.noise[:, k], self._rest(k)
+        x, n, rest = self.values[:, k], self.noise[:, k], self._systematic_sigma(k)
         share = 1 - self.seconds[:-1] / self.seconds[1:]
         apart = np.maximum(n[:-1], n[1:]) * np.sqrt(share)  # (2)
         jumped = np.append(False, np.abs(np.diff(x)) > FAR * apart)
@@ -90,15 +94,15 @@ class NestedWindows:
         }
         return min(first.items(), key=lambda one: one[1]) if first else None
 
-    def _rest(self, k: int) -> Array:
-        """What the means do not leave, (t,), (1)."""
+    def _systematic_sigma(self, k: int) -> Array:
+        """Part r of the uncertainty that is not noise of the means, (t,), (1)."""
         return np.sqrt(np.maximum(self.sigma[:, k] ** 2 - self.noise[:, k] ** 2, 0.0))
 
     def to_json(self) -> dict[str, Any]:
-        """For the result: by parameter, and what wins over noise from which time."""
+        """Return the object of result.json."""
         out: dict[str, Any] = {"seconds": self.seconds.tolist(), "parameters": {}}
         for k, name in enumerate(self.names):
-            won = self.wins(name)
+            won = self.dominant_error(name)
             out["parameters"][name] = {
                 "unit": self.units[k],
                 "value": self.values[:, k].tolist(),
@@ -109,10 +113,10 @@ class NestedWindows:
         return out
 
 
-def nested(session: Session) -> NestedWindows | None:
+def solve_nested_windows(session: Session) -> NestedWindows | None:
     """Solve a session for several lengths of its windows.
 
-    None where its windows are too short to be cut, or hold no samples.
+    None if its windows are too short, or consist of means only.
     """
     lengths = [w[1] - w[0] for w in session.windows if w is not None]
     if not lengths or session.about.means_only:
@@ -121,7 +125,7 @@ def nested(session: Session) -> NestedWindows | None:
     found = [
         (t, *both)
         for t in [*(t for t in TIMES if t < SHORTER * longest), longest]
-        if (both := _at(session, t)) is not None
+        if (both := _solve_first_seconds(session, t)) is not None
     ]
     while found and set(found[0][1].names) < set(found[-1][1].names):
         found.pop(0)
@@ -139,16 +143,18 @@ def nested(session: Session) -> NestedWindows | None:
     )
 
 
-def _at(session: Session, seconds: float) -> tuple[Calibration, Calibration] | None:
-    """Solutions of the first seconds of each window: with all, and with noise alone.
+def _solve_first_seconds(
+    session: Session, seconds: float
+) -> tuple[Calibration, Calibration] | None:
+    """Solve with the first seconds of each window: with all errors, and noise alone.
 
-    Both have one method and one model of the tilt. None where so little is no window.
+    None if any window is too short to be used.
     """
     about = session.about
     windows = tuple(w and (w[0], min(w[1], w[0] + seconds)) for w in about.windows)
     try:
-        still = rests(session.with_windows(windows))
-        seen = observations(about, still.averages, still.rows)
+        taken = usable_windows(session.with_windows(windows))
+        seen = build_observations(about, taken.averages, taken.position_numbers)
         whole = solve(
             seen,
             level_sigma_deg=about.level_deg,
@@ -166,7 +172,9 @@ def _at(session: Session, seconds: float) -> tuple[Calibration, Calibration] | N
         )
     except FieldcalError:
         return None
-    return (whole, alone) if len(still.rows) == len(about.positions) else None
+    return (
+        (whole, alone) if len(taken.position_numbers) == len(about.positions) else None
+    )
 
 
 def _values(found: Calibration, names: Sequence[str]) -> Array:

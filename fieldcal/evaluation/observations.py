@@ -1,7 +1,7 @@
-"""From a session's windows to what the estimators are given.
+"""Makes the observations of the estimators from the windows of a session.
 
-A window with no calm part or no samples is left out, and so is a sensor that says
-nothing in any window; both are reported.
+A window with no calm part or no samples is left out, and so is a sensor that does not
+respond in any window. Both are reported.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import ACC, GYR, Block, Grain
 from fieldcal.core.version import __version__
-from fieldcal.evaluation.window_mean import table_rate, take, take_on_a_table
+from fieldcal.evaluation.window_mean import (
+    average_turntable_window,
+    average_window,
+    table_rate,
+)
 from fieldcal.model.rows.swaying import swaying
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.copies import refuse_copies
@@ -28,13 +32,13 @@ from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import dead_sensors, without_dead
 
 ROUNDED = 1e-6
-"""Share of a full scale that units and rounding may make of it."""
+"""Tolerance of a full scale for rounding and conversion of units, as a share of it."""
 
 
-def observations(
+def build_observations(
     about: Description, averages: Sequence[Average], rows: Sequence[int] | None = None
 ) -> Observations:
-    """Averages with what is known of the positions they were taken in.
+    """Observations: averages with the positions that they were taken in.
 
     Parameters
     ----------
@@ -57,7 +61,7 @@ def observations(
 
 
 def angle_setting(about: Description) -> float:
-    """How well angles are set, deg; the limit of the grade where it is not stated."""
+    """Uncertainty of set angles, deg; the limit of the grade if it is not stated."""
     if about.angle_setting_deg is not None:
         return about.angle_setting_deg
     return limits.read(about.grade).angle_setting_deg
@@ -66,7 +70,7 @@ def angle_setting(about: Description) -> float:
 def with_provenance(calibration: Calibration, about: Description) -> Calibration:
     """The calibration with the device it belongs to and the software that made it."""
     origin = {"device": dict(about.device), "software": f"fieldcal {__version__}"}
-    if not about.gauge.plain:
+    if not about.gauge.is_si:
         origin["gauge"] = about.gauge.table()
     return replace(calibration, info={**calibration.info, **origin})
 
@@ -80,41 +84,43 @@ def observe(session: Session) -> tuple[Observations, tuple[str, ...]]:
         If it has no position, or no window of any position can be used.
 
     """
-    found = rests(session)
-    return observations(session.about, found.averages, found.rows), found.warnings
+    found = usable_windows(session)
+    return build_observations(
+        session.about, found.averages, found.position_numbers
+    ), found.warnings
 
 
 @dataclass(frozen=True, slots=True)
-class Rests:
-    """The windows of a session that can be used.
+class UsableWindows:
+    """Usable windows of a session.
 
     Attributes
     ----------
-    rows : number of each one's position
-    averages : of each
+    position_numbers : number of the position of each window, from 0
+    averages : average of each window
     warnings : what was left out, and why
 
     """
 
-    rows: tuple[int, ...]
+    position_numbers: tuple[int, ...]
     averages: tuple[Average, ...]
     warnings: tuple[str, ...]
 
-    def at_rest(self, session: Session) -> Rests:
-        """Return those in which no table turned."""
+    def at_rest(self, session: Session) -> UsableWindows:
+        """Return the windows in which no rate table turned."""
         held = [
             i
-            for i, row in enumerate(self.rows)
+            for i, row in enumerate(self.position_numbers)
             if not session.about.positions[row].turning
         ]
         return replace(
             self,
-            rows=tuple(self.rows[i] for i in held),
+            position_numbers=tuple(self.position_numbers[i] for i in held),
             averages=tuple(self.averages[i] for i in held),
         )
 
 
-def rests(session: Session) -> Rests:
+def usable_windows(session: Session) -> UsableWindows:
     """Average the windows of a recorded session.
 
     Raises
@@ -132,32 +138,36 @@ def rests(session: Session) -> Rests:
         )
     session.about.refuse_overlap()
     if session.about.means_only:
-        return _of_means(session)
+        return _windows_of_means(session)
     refuse_copies(session.block)
     dead, warnings = dead_sensors(session.block.six), list(session.warnings)
-    taken = _averaged(session, _living(session.block), warnings)
+    taken = _average_windows(session, _without_dead_axes(session.block), warnings)
     if not taken:
         raise SessionError(
             f"{session.folder}: no window can be used; {warnings[-1]}"
-            f"{_worth(session.about)}"
+            f"{_missing_unit_hint(session.about)}"
         )
     rows = sorted(taken)
     averages = [taken[i] for i in rows]
     for one in dead:
-        averages = [_without(average, one.channels) for average in averages]
-    return Rests(tuple(rows), tuple(averages), (*warnings, *(one.says for one in dead)))
+        averages = [_without_sensor(average, one.channels) for average in averages]
+    return UsableWindows(
+        tuple(rows), tuple(averages), (*warnings, *(one.says for one in dead))
+    )
 
 
-def _living(block: Block) -> Block:
-    """The samples without axes that tell nothing."""
+def _without_dead_axes(block: Block) -> Block:
+    """The samples with dead axes set to nan."""
     told = without_dead(block.six)
     return replace(block, acc=told[:, :3], gyr=told[:, 3:])
 
 
-def _averaged(session: Session, block: Block, said: list[str]) -> dict[int, Average]:
-    """Averages by the number of their position; what is left out is added to `said`."""
-    about, grain = session.about, _grain_shown(session)
-    said += _beyond(session)
+def _average_windows(
+    session: Session, block: Block, said: list[str]
+) -> dict[int, Average]:
+    """Averages by position number; sentences about omitted windows go to `said`."""
+    about, grain = session.about, _rounding_grain(session)
+    said += _range_warnings(session)
     sways = swaying(block, about)
     if sways is not None:
         block = sways.block
@@ -165,28 +175,28 @@ def _averaged(session: Session, block: Block, said: list[str]) -> dict[int, Aver
     taken: dict[int, Average] = {}
     noise: LearnedNoise | None = None
     held = about.in_time()
-    # each tells the noise for the next
+    # each window provides the noise for the next
     for i, window in zip(held.numbers, held.windows, strict=True):
         try:
             if about.positions[i].turning:
                 rate = table_rate(block, window, about, i)
-                found, remark = take_on_a_table(block, window, rate, grain)
+                found, remark = average_turntable_window(block, window, rate, grain)
             else:
-                found, noise, remark = take(block, window, noise, grain)
+                found, noise, remark = average_window(block, window, noise, grain)
         except FieldcalError as error:
-            said.append(f"{_named(session, i)} is left out: {error}")
+            said.append(f"{_position_label(session, i)} is left out: {error}")
             continue
         if sways is not None:
             more = np.diag(sways.left[i])
             found = replace(found, covariance=found.covariance + more)
         taken[i] = found
         if remark:
-            said.append(f"{_named(session, i)}: {remark}")
+            said.append(f"{_position_label(session, i)}: {remark}")
     return taken
 
 
-def _of_means(session: Session) -> Rests:
-    """Return the means of a session that holds nothing else.
+def _windows_of_means(session: Session) -> UsableWindows:
+    """Return the windows of a session that consists of means only.
 
     Raises
     ------
@@ -212,11 +222,11 @@ def _of_means(session: Session) -> Rests:
             f"{session.folder}: no mean lies in a window of session.toml: give each"
             " [[position]] a start_s and end_s about its mean"
         )
-    return Rests(tuple(rows), tuple(averages), session.warnings)
+    return UsableWindows(tuple(rows), tuple(averages), session.warnings)
 
 
-def _beyond(session: Session) -> list[str]:
-    """Sentences where samples lie beyond the full scale that session.toml states."""
+def _range_warnings(session: Session) -> list[str]:
+    """Sentences about samples beyond the full scale stated in session.toml."""
     said = []
     triads = {"acceleration": session.block.acc, "angular_rate": session.block.gyr}
     for (kind, values), si in zip(triads.items(), SI, strict=True):
@@ -230,20 +240,20 @@ def _beyond(session: Session) -> list[str]:
     return said
 
 
-def _named(session: Session, row: int) -> str:
+def _position_label(session: Session, row: int) -> str:
     """A position by its number, from 1, and by its name if it has one."""
     number, name = f"position {row + 1}", session.positions[row].name
     return number if name == number else f"{number} ({name})"
 
 
-def _without(average: Average, channels: slice) -> Average:
+def _without_sensor(average: Average, channels: slice) -> Average:
     mean, covariance = average.mean.copy(), average.covariance.copy()
     mean[channels] = covariance[channels, :] = covariance[:, channels] = np.nan
     return replace(average, mean=mean, covariance=covariance)
 
 
-def _worth(about: Description) -> str:
-    """What to do where the unit of a count is not stated."""
+def _missing_unit_hint(about: Description) -> str:
+    """Remedy, as part of a sentence, if the unit of a count is not stated."""
     missing = [
         f"{group} (how many {unit} in one {si})"
         for group, unit, si, size in zip(
@@ -257,12 +267,12 @@ def _worth(about: Description) -> str:
     return f"; session.toml must say in [nominal] {' and '.join(missing)}"
 
 
-def _grain_shown(session: Session) -> Grain:
-    """The rounding reported, or that seen on the way where a window shows none.
+def _rounding_grain(session: Session) -> Grain:
+    """Rounding that the device reported, or that seen in turns where windows hide it.
 
-    An output that repeats one value all through a window hides its noise and its step.
+    An output that repeats one value throughout a window hides its noise and its step.
     """
-    told, block = grain_of(session), session.block
+    told, block = reported_grain(session), session.block
     if told.step.all():
         return told
     steps = np.where(_constant(session), grids_of(block), 0.0)
@@ -271,7 +281,7 @@ def _grain_shown(session: Session) -> Grain:
 
 
 def _constant(session: Session) -> NDArray[np.bool_]:
-    """Which outputs repeat one value all through some window, (6,)."""
+    """Outputs that repeat one value throughout some window, (6,)."""
     found = np.zeros(6, dtype=bool)
     for window in filter(None, session.about.windows):
         held = session.block.between(*window)
@@ -281,8 +291,8 @@ def _constant(session: Session) -> NDArray[np.bool_]:
     return found
 
 
-def grain_of(session: Session) -> Grain:
-    """The rounding that the device reported when it was recorded."""
+def reported_grain(session: Session) -> Grain:
+    """Rounding that the device reported during the recording."""
     marks = [mark for mark in session.marks() if mark.get("event") == "grain"]
     if not marks:
         return Grain()

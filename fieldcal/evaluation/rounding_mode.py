@@ -1,4 +1,4 @@
-"""How a device rounds, where nobody knows, and what it sets to zero.
+"""How a device rounds if this is not stated, and the dead band that it has.
 
 Values on a grid of steps q are right on average where they are rounded to the nearest;
 cut toward zero, as a conversion to integers does, they are q / 2 too small in size;
@@ -15,9 +15,9 @@ one firmware, so it is one mode for all.
 A dead band sets what is smaller than d to zero, d > q: the output is zero often, and
 has no other value below d. A mean of less than 2 d is off by d / sqrt(3) or less.
 
-What values that were rounded down are too small by is added to the biases' variance;
-what values cut toward zero are hangs on the signs of the means, and is in the model
-(`solve.given`).
+The error of values rounded down is added to the variance of the biases. That of values
+cut toward zero depends on the signs of the means, and is in the model
+(`solve.parameter_set`).
 """
 
 from __future__ import annotations
@@ -35,58 +35,62 @@ from fieldcal.physics.recording import grids_of
 from fieldcal.session.folder import Session
 
 CUT, DOWN = 0.3, 0.1
-"""Chance that values of unknown rounding were cut toward zero, and rounded down."""
+"""Prior probability that values were cut toward zero, and rounded down."""
 
 UNSTEADY = 0.3
-"""S of (1): how much faster or slower a turn passes one value than the next, ln."""
+"""S of (1), ln: scatter of the times in which a turn passes neighbouring values."""
 
 EVEN = 2.0
-"""Times that one neighbour of zero may show for as long as the other: a device that
-comes to rest beside zero, or on it, does not pass it."""
+"""Largest ratio of the times at the two neighbours of zero: a device that comes to rest
+at zero or beside it does not pass it."""
 
 PASSED = 2
-"""Samples of each neighbour from which a pass counts, and zeros of a dead band."""
+"""Fewest samples of each neighbour in a pass, and fewest zeros of a dead band."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoundingMode:
-    """What is not known of the rounding of the accelerometers.
+    """Uncertainty of the rounding of the accelerometers.
 
     Attributes
     ----------
-    step : (3,) m/s^2; 0 where there is none, or somebody knows how it is rounded
-    cut : probability that values were cut toward zero
-    dead : (3,) m/s^2 below which values are zero; 0 where there is no such band
+    step : (3,) m/s^2; 0 if there is none, or if its rounding is known
+    cut_probability : probability that values were cut toward zero
+    dead_band : (3,) m/s^2, size below which values are zero; 0 if there is none
 
     """
 
     step: Array
-    cut: float
-    dead: Array = field(default_factory=lambda: np.zeros(3))
+    cut_probability: float
+    dead_band: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
-    def toward_zero(self) -> Array:
-        """What values are too small by in size, 1 sigma, (3,) m/s^2."""
-        out: Array = np.sqrt(self.cut) * self.step / 2
+    def cut_sigma(self) -> Array:
+        """Error in size of values that may be cut toward zero, 1 sigma, (3,) m/s^2."""
+        out: Array = np.sqrt(self.cut_probability) * self.step / 2
         return out
 
     @property
-    def down(self) -> Array:
-        """What values are too small by, 1 sigma, (3,) m/s^2."""
-        chance = DOWN / (1 - CUT) * (1 - self.cut)
+    def round_down_sigma(self) -> Array:
+        """Error of values that may be rounded down, 1 sigma, (3,) m/s^2."""
+        chance = DOWN / (1 - CUT) * (1 - self.cut_probability)
         out: Array = np.sqrt(chance) * self.step / 2
         return out
 
-    def around_zero(self, mean: Array) -> Array:
-        """Variance of a mean of which values were cut or set to zero, (n, 3)."""
+    def variance_near_zero(self, mean: Array) -> Array:
+        """Added variance of means near zero, where values become zero, (n, 3)."""
         size = np.abs(np.nan_to_num(mean))
-        cut = np.where(size < self.step / 2, self.cut * self.step**2 / 3, 0.0)
-        out: Array = cut + np.where(size < 2 * self.dead, self.dead**2 / 3, 0.0)
+        cut = np.where(
+            size < self.step / 2, self.cut_probability * self.step**2 / 3, 0.0
+        )
+        out: Array = cut + np.where(
+            size < 2 * self.dead_band, self.dead_band**2 / 3, 0.0
+        )
         return out
 
 
 def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
-    """What the samples of a session tell of it; `grain` is what is known."""
+    """Estimate the rounding from samples; `grain` is the rounding that is known."""
     acc = session.block.acc
     seen = np.zeros(3) if session.about.means_only else grids_of(session.block)[:3]
     step = np.where(grain.step[:3] > 0, 0.0, seen)
@@ -94,16 +98,18 @@ def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
         ratio
         for values, q in zip(acc.T, step, strict=True)
         if q > 0
-        for ratio in passes(np.rint(values[np.isfinite(values)] / q).astype(np.intp))
+        for ratio in zero_crossings(
+            np.rint(values[np.isfinite(values)] / q).astype(np.intp)
+        )
     ]
     least = np.maximum(seen, grain.step[:3])
-    return RoundingMode(step, cut_toward_zero(shown), dead_bands(acc, least))
+    return RoundingMode(step, cut_probability(shown), dead_bands(acc, least))
 
 
 def dead_bands(acc: Array, step: Array) -> Array:
-    """What is the smallest value but zero of outputs with a dead band, else 0, (3,).
+    """Smallest nonzero size of each output with a dead band; 0 for the others, (3,).
 
-    Zero on all axes is no output: such samples were lost.
+    Samples that are zero on all axes were lost, and are ignored.
     """
     some = np.isfinite(acc).all(axis=1) & (acc != 0).any(axis=1)
     size = np.abs(acc[some])
@@ -114,24 +120,24 @@ def dead_bands(acc: Array, step: Array) -> Array:
     return out
 
 
-def with_rounding(found: Calibration, mode: RoundingMode) -> Calibration:
-    """The calibration with what values rounded down may take off its biases."""
+def with_rounding_uncertainty(found: Calibration, mode: RoundingMode) -> Calibration:
+    """Add the error of values rounded down to the covariance of the biases."""
     covariance = found.covariance.copy()
     for row, name in enumerate(found.names):
         group, _, axis = name.partition(".")
         if group == "acc_bias":
-            covariance[row, row] += mode.down["xyz".index(axis)] ** 2
+            covariance[row, row] += mode.round_down_sigma["xyz".index(axis)] ** 2
     return replace(found, covariance=covariance)
 
 
-def cut_toward_zero(shown: list[tuple[int, float]]) -> float:
-    """Probability that values were cut, by (n0, n1) of passes, (1).
+def cut_probability(shown: list[tuple[int, float]]) -> float:
+    """Probability that values were cut toward zero, from (n0, n1) of passes, (1).
 
-    >>> round(cut_toward_zero([]), 3)
+    >>> round(cut_probability([]), 3)
     0.3
-    >>> cut_toward_zero([(80, 40.0)] * 4) > 0.99
+    >>> cut_probability([(80, 40.0)] * 4) > 0.99
     True
-    >>> cut_toward_zero([(40, 40.0)] * 4) < 0.01
+    >>> cut_probability([(40, 40.0)] * 4) < 0.01
     True
     """
     log_odds = float(np.log(CUT / (1 - CUT)))
@@ -142,8 +148,8 @@ def cut_toward_zero(shown: list[tuple[int, float]]) -> float:
     return float(of_odds(log_odds))
 
 
-def passes(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
-    """How long values, in steps, are zero, and one beside it, in each pass, (1)."""
+def zero_crossings(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
+    """Numbers n0 and n1 of (1) for each pass through zero of values, in steps."""
     out = np.flatnonzero(np.abs(value) >= 2)
     for first, last in zip(out[:-1].tolist(), out[1:].tolist(), strict=True):
         if (value[first] > 0) == (value[last] > 0) or last == first + 1:

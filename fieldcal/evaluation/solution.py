@@ -1,8 +1,8 @@
-"""A recorded session, solved: its windows, the turns between them, and what they show.
+"""Solves a recorded session from its windows and the turns between them.
 
-The rows are those that `diagnose` sees: block means with the noise that is measured in
-the recording, samples put right, lines taken out. Of windows that were disturbed what
-is calm counts, before and after it if the device was held on.
+The rows are those of `diagnose`: means over parts of windows with the noise measured in
+the recording, after samples were corrected and lines were subtracted. Of a disturbed
+window the undisturbed parts are used, if the device stayed in the same position.
 """
 
 from __future__ import annotations
@@ -20,69 +20,69 @@ from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, origins
 from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.evaluation.angles_shown import with_angles_shown
-from fieldcal.evaluation.held_on import held_on
+from fieldcal.evaluation.angles_shown import with_shown_angle_setting
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
-from fieldcal.evaluation.not_carried import (
-    misread,
-    uncarried,
-    with_not_carried,
-)
 from fieldcal.evaluation.observations import (
-    Rests,
+    UsableWindows,
     angle_setting,
-    grain_of,
-    observations,
+    build_observations,
+    reported_grain,
     with_provenance,
+)
+from fieldcal.evaluation.omitted_effects import (
+    omitted_effects,
+    with_description_faults,
+    with_omitted_effects,
 )
 from fieldcal.evaluation.rounding_mode import (
     RoundingMode,
     rounding_mode,
-    with_rounding,
+    with_rounding_uncertainty,
 )
+from fieldcal.evaluation.undisturbed_span import undisturbed_span
 from fieldcal.model import priors
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.estimation import Recorded
-from fieldcal.solve.rows import variances, widened
-from fieldcal.solve.shown import Shown
+from fieldcal.solve.estimation import RecordedRows
+from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.rows import mean_variances, with_window_variances
 
-Turns = Literal["auto", "yes", "no"]
+UseTurns = Literal["auto", "yes", "no"]
 
 
 @dataclass(frozen=True)
-class Laid:
-    """A session's windows as the estimators are given them.
+class PreparedSession:
+    """A session with its windows, prepared for the estimators.
 
     Attributes
     ----------
     session : the recording
-    still : windows that can be used
-    before : what explained a part of the recording, which a search may begin with
+    windows : its usable windows
+    previous : explanation of a part of the recording, from which the search may start
 
     """
 
     session: Session
-    still: Rests
-    before: Explanation | None = None
+    windows: UsableWindows
+    previous: Explanation | None = None
 
     @cached_property
     def order(self) -> list[int]:
-        """Numbers in `still` in the order in which the windows were held."""
-        averages = self.still.averages
+        """Indices into `windows`, in the order of time."""
+        averages = self.windows.averages
         return sorted(range(len(averages)), key=lambda i: averages[i].start)
 
     @cached_property
     def about(self) -> Description:
-        """What is known of these windows, and where they were calm."""
-        about, still = self.session.about, self.still
-        rows = [still.rows[i] for i in self.order]
-        averages = [still.averages[i] for i in self.order]
+        """Description of the session with these windows and their undisturbed spans."""
+        about, windows = self.session.about, self.windows
+        rows = [windows.position_numbers[i] for i in self.order]
+        averages = [windows.averages[i] for i in self.order]
         ends = [
-            held_on(self.session.block, about.windows[r], average)
+            undisturbed_span(self.session.block, about.windows[r], average)
             for r, average in zip(rows, averages, strict=True)
         ]
         return replace(
@@ -94,39 +94,39 @@ class Laid:
 
     @cached_property
     def observations(self) -> Observations:
-        """Means of the windows, in the order in which they were held."""
-        averages = [self.still.averages[i] for i in self.order]
-        return observations(self.about, averages, range(len(averages)))
+        """Means of the windows, in the order of time."""
+        averages = [self.windows.averages[i] for i in self.order]
+        return build_observations(self.about, averages, range(len(averages)))
 
     @cached_property
     def rounding(self) -> RoundingMode:
-        """What is not known of how the device rounds."""
-        return rounding_mode(self.session, grain_of(self.session))
+        """Uncertainty of how the device rounds its values."""
+        return rounding_mode(self.session, reported_grain(self.session))
 
     @cached_property
-    def examined(self) -> tuple[Prepared | None, str]:
-        """The recording, checked and reduced, or why it cannot be."""
+    def examination(self) -> tuple[Prepared | None, str]:
+        """The checked and reduced recording, or None and the reason."""
         try:
             return prepare(self.session.block, self.about), ""
         except InputError as error:
             return None, str(error)
 
     @property
-    def prepared(self) -> Prepared | None:
-        """The recording, checked and reduced; None where it cannot be."""
-        return self.examined[0]
+    def reduced_recording(self) -> Prepared | None:
+        """The checked and reduced recording; None if it cannot be examined."""
+        return self.examination[0]
 
     @cached_property
     def explanation(self) -> Explanation | None:
-        """What the recording shows to be there; None where it cannot be examined."""
-        if self.prepared is None:
+        """Explanation of the recording; None if it cannot be examined."""
+        if self.reduced_recording is None:
             return None
-        return explain(self.prepared, self.before)
+        return explain(self.reduced_recording, self.previous)
 
     @property
-    def unexamined(self) -> list[str]:
-        """Sentence where nothing but the means of the windows was looked at."""
-        why = self.examined[1]
+    def unexamined_warnings(self) -> list[str]:
+        """Warning if only the means of the windows could be used."""
+        why = self.examination[1]
         if not why:
             return []
         return [
@@ -134,141 +134,165 @@ class Laid:
             f" since the recording cannot be examined: {why}"
         ]
 
-    def recorded(
+    def recorded_rows(
         self, turns: bool, shown: Explanation | None = None
-    ) -> Recorded | None:
-        """Rows of the windows, and the samples between them if they are to be used.
+    ) -> RecordedRows | None:
+        """Rows of the windows, and samples of the turns if these are to be used.
 
-        `shown` is what the recording shows to be there.
+        `shown` is the explanation of the recording. None if it cannot be examined.
         """
-        if self.prepared is None:
+        if self.reduced_recording is None:
             return None
-        source, rows = self.prepared.source, self.prepared.rows
+        source, rows = self.reduced_recording.source, self.reduced_recording.rows
         measured = (self.observations.has_acc, self.observations.has_gyr)
         sd = np.full_like(rows.sd, np.nan)
         for c in np.flatnonzero(measured):
             sd[:, 3 * c : 3 * c + 3] = rows.sd[:, 3 * c : 3 * c + 3]
         rows = replace(rows, sd=sd)
-        known = variances(self.observations)
-        known[:, :3] += self.rounding.around_zero(self.observations.mean[:, :3])
-        rows = widened(rows, known)
+        known = mean_variances(self.observations)
+        known[:, :3] += self.rounding.variance_near_zero(self.observations.mean[:, :3])
+        rows = with_window_variances(rows, known)
         likely = () if shown is None else shown.posterior.weights
-        return Recorded(
+        return RecordedRows(
             rows,
             origins(source, rows),
             source if turns else None,
-            tuple(Shown.of(s, p) for s, p in likely),
+            tuple(WeightedExplanation.of(s, p) for s, p in likely),
             None if shown is None else shown.filters,
-            tuple(self.rounding.toward_zero.tolist()),
+            tuple(self.rounding.cut_sigma.tolist()),
         )
 
 
-def solved(
+def solve_session(
     session: Session,
-    still: Rests,
-    turns: Turns = "auto",
+    windows: UsableWindows,
+    turns: UseTurns = "auto",
     left: Mapping[str, Any] | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Calibration:
     """Solve a session.
 
     Parameters
     ----------
     session : the recording
-    still : its windows
-    turns : whether what the turns between windows say is used; "yes" insists on it
-    left : what the factory left in the device, by the keys of session.toml; otherwise
-        what that says, or what is usual for the grade
-    asked : of `fieldcal.solve.solve`; how level the base is and how well angles are set
-        are otherwise what session.toml says, or what the grade asks for
+    windows : its usable windows
+    turns : whether the turns between windows are used; "yes" requires them
+    left : sizes of factory errors by the keys of session.toml; they replace those of
+        session.toml and the usual ones of the grade
+    options : arguments of `fieldcal.solve.solve`; defaults for the level of the base
+        and the setting of angles come from session.toml, or from the grade
 
     Raises
     ------
     NotObservable
-        If nothing is determined, or turns are insisted on and there are none.
+        If nothing is determined, or turns are required and there are none.
 
     """
-    return solved_as(Laid(session, still), turns, left, **asked)
+    return solve_prepared(PreparedSession(session, windows), turns, left, **options)
 
 
-def solved_as(
-    laid: Laid,
-    turns: Turns = "auto",
+def solve_prepared(
+    prepared: PreparedSession,
+    turns: UseTurns = "auto",
     left: Mapping[str, Any] | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Calibration:
-    """The same of windows that were laid out already; raises as `solved` does."""
-    asked = _filled_in(laid, asked)
-    device = replace(laid.session.about, **(left or {}))
-    asked["factory"] = factory_errors(device)
-    if asked.get("as_printed"):
-        return _told(solve(laid.observations, **asked), laid, turns, [])
-    shown = laid.explanation
-    recorded = laid.recorded(turns != "no", shown)
+    """Solve a prepared session; parameters and errors as of `solve_session`."""
+    options = _with_defaults(prepared, options)
+    device = replace(prepared.session.about, **(left or {}))
+    options["factory"] = factory_errors(device)
+    if options.get("as_printed"):
+        return _with_warnings(
+            solve(prepared.observations, **options), prepared, turns, []
+        )
+    shown = prepared.explanation
+    recorded = prepared.recorded_rows(turns != "no", shown)
 
     def fit() -> Calibration:
-        return solve(laid.observations, recorded=recorded, **asked)
+        return solve(prepared.observations, recorded=recorded, **options)
 
-    stated = asked["angle_sigma_deg"]
-    found, notes = with_angles_shown(fit, asked, shown)
-    shows = _grade(found, laid.session.about)
+    stated = options["angle_sigma_deg"]
+    calibration, notes = with_shown_angle_setting(fit, options, shown)
+    shows = _shown_grade(calibration, prepared.session.about)
     if shows.because:
-        asked["at_best"] = asked["factory"]
-        asked["factory"] = factory_errors(device, shows.grade)
-        found = fit()
-        found = replace(found, info={**found.info, "grade_shown": asdict(shows)})
-    found = with_tilt_shown(found, laid.observations, recorded, asked)
-    found = _told(found, laid, turns, [*notes, *laid.unexamined])
-    found = with_rounding(found, laid.rounding)
-    if asked["angle_sigma_deg"] > stated:
-        found = replace(found, info={**found.info, "angles_stated_deg": stated})
+        options["at_best"] = options["factory"]
+        options["factory"] = factory_errors(device, shows.grade)
+        calibration = fit()
+        calibration = replace(
+            calibration, info={**calibration.info, "grade_shown": asdict(shows)}
+        )
+    calibration = with_tilt_shown(calibration, prepared.observations, recorded, options)
+    calibration = _with_warnings(
+        calibration, prepared, turns, [*notes, *prepared.unexamined_warnings]
+    )
+    calibration = with_rounding_uncertainty(calibration, prepared.rounding)
+    if options["angle_sigma_deg"] > stated:
+        calibration = replace(
+            calibration, info={**calibration.info, "angles_stated_deg": stated}
+        )
     if shown is None:
-        return replace(found, info={**found.info, "unexamined": laid.examined[1]})
-    found = with_not_carried(with_jump(found, shown), uncarried(shown, found))
-    return misread(shown.prepared, found)
+        return replace(
+            calibration,
+            info={**calibration.info, "unexamined": prepared.examination[1]},
+        )
+    calibration = with_omitted_effects(
+        with_jump(calibration, shown), omitted_effects(shown, calibration)
+    )
+    return with_description_faults(shown.prepared, calibration)
 
 
-def _filled_in(laid: Laid, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """What is asked for, and what session.toml or the grade says where it is not."""
-    about = laid.session.about
+def _with_defaults(
+    prepared: PreparedSession, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Arguments of `solve`, with defaults from session.toml or the grade."""
+    about = prepared.session.about
     own = {
         "level_sigma_deg": about.level_deg,
         "angle_sigma_deg": angle_setting(about),
         "beside_tilt_sigma_deg": priors.BESIDE_TILT_DEG,
     }
-    return own | {name: value for name, value in asked.items() if value is not None}
+    return own | {name: value for name, value in options.items() if value is not None}
 
 
-def _told(
-    found: Calibration, laid: Laid, turns: Turns, notes: Sequence[str]
+def _with_warnings(
+    calibration: Calibration,
+    prepared: PreparedSession,
+    turns: UseTurns,
+    notes: Sequence[str],
 ) -> Calibration:
-    """With what is to be said of the windows; why it is bad comes first."""
+    """Add the warnings of the windows; reasons why the result is bad come first."""
     if turns == "yes":
-        _insist(found, laid.session, laid.still)
-    ahead, behind = ((), found.warnings) if found.good else (found.warnings, ())
-    warnings = (*ahead, *laid.still.warnings, *notes, *behind)
-    found = with_provenance(replace(found, warnings=warnings), laid.session.about)
-    return _listed(found, laid.order)
+        _require_turns(calibration, prepared.session, prepared.windows)
+    ahead, behind = (
+        ((), calibration.warnings) if calibration.good else (calibration.warnings, ())
+    )
+    warnings = (*ahead, *prepared.windows.warnings, *notes, *behind)
+    calibration = with_provenance(
+        replace(calibration, warnings=warnings), prepared.session.about
+    )
+    return _in_session_order(calibration, prepared.order)
 
 
-def _grade(found: Calibration, about: Description) -> GradeShown:
-    """The grade that the device has by a result; the stated one of a bad result.
+def _shown_grade(calibration: Calibration, about: Description) -> GradeShown:
+    """The grade that a result shows; the stated one if the result is bad.
 
-    Where neither the tilt of the base is found nor its level stated, accelerometers
-    tell nothing: a tilt may be what is taken for their bias and scale factor.
+    Accelerometers are ignored if the tilt of the base is neither estimated nor stated:
+    it may have been taken for their bias and scale factor.
     """
-    if not found.good:
+    if not calibration.good:
         return GradeShown(about.grade)
-    levelled = found.method == "scalar" or "level_sigma_deg" in found.info
-    levelled |= bool({*TILTS} & {*found.groups})
-    told = [levelled or sensor_of(group_of(n)) != "acc" for n in found.names]
-    names = [name for name, tells in zip(found.names, told, strict=True) if tells]
-    values, sigma = found.values[told], found.sigma[told]
+    levelled = calibration.method == "scalar" or "level_sigma_deg" in calibration.info
+    levelled |= bool({*TILTS} & {*calibration.groups})
+    told = [levelled or sensor_of(group_of(n)) != "acc" for n in calibration.names]
+    names = [name for name, tells in zip(calibration.names, told, strict=True) if tells]
+    values, sigma = calibration.values[told], calibration.sigma[told]
     return GradeShown.of(about.grade, names, values, sigma, about.sent)
 
 
-def _insist(found: Calibration, session: Session, still: Rests) -> None:
-    """Refuse a result without what the turns give.
+def _require_turns(
+    calibration: Calibration, session: Session, windows: UsableWindows
+) -> None:
+    """Refuse a result that does not use turns.
 
     Raises
     ------
@@ -276,24 +300,24 @@ def _insist(found: Calibration, session: Session, still: Rests) -> None:
         If there is no turn.
 
     """
-    if len(still.at_rest(session).rows) < 1:
+    if len(windows.at_rest(session).position_numbers) < 1:
         raise NotObservable(
             "no position was held at rest, so there is no turn between two; leave"
             " out --turns"
         )
-    if "turns" not in found.info:
+    if "turns" not in calibration.info:
         raise NotObservable(
             "no turn between two positions was recorded whole, so the gyroscopes have "
             "no scale factor: record on while the device is turned"
         )
 
 
-def _listed(found: Calibration, order: list[int]) -> Calibration:
-    """With the probability of each position in the order of session.toml."""
-    bad = found.info.get("bad_position")
+def _in_session_order(calibration: Calibration, order: list[int]) -> Calibration:
+    """Put the probabilities of bad positions in the order of session.toml."""
+    bad = calibration.info.get("bad_position")
     if bad is None:
-        return found
+        return calibration
     listed = [0.0] * len(bad)
     for i, p in zip(order, bad, strict=True):
         listed[i] = p
-    return replace(found, info={**found.info, "bad_position": listed})
+    return replace(calibration, info={**calibration.info, "bad_position": listed})

@@ -1,8 +1,8 @@
 """Average of one window of a recorded session.
 
-A window that somebody else marked may hold a disturbance: then its mean is that of its
-longest calm part, and that is said. On a rate table gravity goes round and nothing is
-asked of the accelerometers.
+A window that was marked by somebody else may contain a disturbance. Its mean is then
+that of its longest calm part, with a remark. On a rate table gravity rotates in the
+device, and the accelerometers are not used.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ SHORTEST = 5.0
 """Shortest calm part of a disturbed window that is worth using, s."""
 
 
-def take(
+def average_window(
     block: Block,
     span: tuple[float, float] | None,
     noise: LearnedNoise | None,
     grain: Grain,
 ) -> tuple[Average, LearnedNoise | None, str]:
-    """Average of a window, what it taught about the noise, and what must be said.
+    """Average of a window, the noise learned from it, and a remark or empty.
 
     Parameters
     ----------
     block : the recording
     span : start and end of the window, s of device time; None where it has none
-    noise : what windows before it taught
-    grain : what the device rounds to
+    noise : noise learned from earlier windows
+    grain : step that the device rounds to
 
     Raises
     ------
     SessionError
-        If there are no samples of it.
+        If it has no samples.
     Moved
         If no part of it was calm.
 
     """
-    span = _given(span)
+    span = _known_span(span)
     part = block.between(*span)
     if len(part) < 2:
         raise SessionError(
@@ -57,7 +57,7 @@ def take(
     try:
         return window.average(), window.noise and window.noise.spectrum, ""
     except Moved as moved:
-        calm = _calm(part, moved, noise, grain)
+        calm = _average_calm_part(part, moved, noise, grain)
         if calm is None:
             raise
         remark = (
@@ -67,7 +67,7 @@ def take(
         return calm, noise, remark
 
 
-def _given(span: tuple[float, float] | None) -> tuple[float, float]:
+def _known_span(span: tuple[float, float] | None) -> tuple[float, float]:
     if span is None:
         raise SessionError("its window was not taken before the recording ended")
     return span
@@ -78,9 +78,11 @@ def table_rate(
 ) -> Array:
     """Rate of the table in a position by its number, in device axes, (3,) rad/s.
 
-    About an axis that nobody knows it is along what the gyroscopes read in the window.
+    If the axis is unknown, the rate is along the mean of the gyroscopes in the window.
     """
-    part = block.between(*_given(span)).gyr if about.positions[row].turning else None
+    part = (
+        block.between(*_known_span(span)).gyr if about.positions[row].turning else None
+    )
     if part is None or not len(part):
         return np.zeros(3)
     at = np.full(len(part), row, dtype=np.intp)
@@ -88,11 +90,11 @@ def table_rate(
     return found
 
 
-def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
-    """A window without what goes round with a rate table, and what that leaves open.
+def without_table_rotation(block: Block, rate: Array) -> tuple[Block, Array]:
+    """A window without the part that rotates with a rate table, and its covariance.
 
-    Gravity goes round, so nothing is asked of the accelerometers; what of the Earth's
-    rate goes round is taken out. The covariance (3, 3) is that of the gyroscopes' mean.
+    Gravity rotates, so the accelerometers are set to nan. The rotating part of the
+    Earth's rate is subtracted; the covariance (3, 3) is that of the gyroscopes' mean.
 
     Parameters
     ----------
@@ -109,25 +111,25 @@ def steadied(block: Block, rate: Array) -> tuple[Block, Array]:
     return replace(blind, gyr=block.gyr - found.values), found.covariance
 
 
-def take_on_a_table(
+def average_turntable_window(
     block: Block, span: tuple[float, float] | None, rate: Array, grain: Grain
 ) -> tuple[Average, str]:
     """Average while a table turns at some rate, (3,) rad/s in device axes.
 
-    Otherwise as `take`.
+    Otherwise as `average_window`.
     """
-    span = _given(span)
-    standing, left = steadied(block.between(*span), rate)
-    one, _, remark = take(standing, span, None, grain)
+    span = _known_span(span)
+    standing, left = without_table_rotation(block.between(*span), rate)
+    one, _, remark = average_window(standing, span, None, grain)
     covariance = one.covariance.copy()
     covariance[3:, 3:] += left
     return replace(one, covariance=covariance), remark
 
 
-def _calm(
+def _average_calm_part(
     block: Block, moved: Moved, noise: LearnedNoise | None, grain: Grain
 ) -> Average | None:
-    """Average of the longest calm part, None if there is none worth it."""
+    """Average of the longest calm part; None if all are shorter than `SHORTEST`."""
     sides = [
         block.between(-float("inf"), moved.at),
         block.between(moved.at, float("inf")),
@@ -143,7 +145,9 @@ def _calm(
             inside = side.t[0] < again.at < side.t[-1]
             # a disturbance lasts: what follows its first instant is disturbed as well
             shifted = again.at if inside else side.t[0] + 1.0
-            found = _calm(side, Moved(str(again), shifted, again.axis), noise, grain)
+            found = _average_calm_part(
+                side, Moved(str(again), shifted, again.axis), noise, grain
+            )
         if found and (best is None or found.end - found.start > best.end - best.start):
             best = found
     return best

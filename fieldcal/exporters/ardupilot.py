@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.calibration.diagonal import Diagonal, diagonal
+from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
 from fieldcal.exporters import ExportSource
@@ -98,7 +98,9 @@ def converted(
             "out: export the format of that program"
         )
     device = installed or _without(autopilot, instance)
-    acc, gyr = (diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr"))
+    acc, gyr = (
+        reduce_to_diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr")
+    )
     every = device.next(acc.bias, acc.scale, gyr.bias)
     known = names(autopilot, device.instance)
     kept: list[str] = []
@@ -122,9 +124,11 @@ def _without(autopilot: int, instance: int) -> Installed:
     return nothing
 
 
-def _left_out(calibration: Calibration, acc: Diagonal, gyr: Diagonal) -> list[str]:
+def _left_out(
+    calibration: Calibration, acc: DiagonalCalibration, gyr: DiagonalCalibration
+) -> list[str]:
     says = []
-    if (worst := float(acc.left_out.max())) > 0:
+    if (worst := float(acc.cross_coupling_error.max())) > 0:
         says.append(
             "cross_coupling has no place in these parameters: leaving it out makes "
             f"errors up to {worst * 9.80665:.3g} m/s^2 at 1 g"
@@ -135,7 +139,7 @@ def _left_out(calibration: Calibration, acc: Diagonal, gyr: Diagonal) -> list[st
             "gyr_scale has no place in these parameters: leaving it out makes errors "
             f"up to {worst:.3g} of the rate"
         )
-    if (worst := float(gyr.left_out.max())) > 0:
+    if (worst := float(gyr.cross_coupling_error.max())) > 0:
         says.append(
             "gyro_cross_coupling has no place in these parameters: leaving it out "
             f"makes errors up to {worst:.3g} of the rate"

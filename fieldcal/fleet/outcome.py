@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fieldcal.acceptance.assessment import assess, limits_path, start_time, unassessed
+from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.diagnosis.verdict import concluded
-from fieldcal.evaluation.not_carried import mended
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import Laid, solved_as
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.omitted_effects import with_repaired_bytes
+from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.fleet.reduced import reduced
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, of_calibration
@@ -57,18 +57,18 @@ class SessionTask:
         return StoredSession(folder, fingerprint=mark, error=said)
 
     def _carried_out(self, folder: Path) -> StoredSession:
-        session, repaired = mended(Session.open(folder))
-        still = rests(session)
-        laid = Laid(session, still)
-        found = solved_as(laid)
+        session, repaired = with_repaired_bytes(Session.open(folder))
+        still = usable_windows(session)
+        prepared = PreparedSession(session, still)
+        found = solve_prepared(prepared)
         found = replace(found, warnings=(*repaired, *found.warnings))
         given = Path(self.limits) if self.limits else None
         bounds = limits.read(session.grade, limits_path(session, given))
         if given is None and "run" not in session.about.raw:
-            found = unassessed(found, session, still, bounds)
+            found = with_faults(found, session, still, bounds)
         else:
             found = assess(found, session, still, bounds, None)
-        explanation = laid.explanation
+        explanation = prepared.explanation
         diagnosis = None
         if explanation is not None and self.diagnose:
             diagnosis = concluded(session.block, explanation).to_json()

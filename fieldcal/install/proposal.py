@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.calibration.diagonal import diagonal
+from fieldcal.calibration.diagonal import reduce_to_diagonal
 from fieldcal.drivers.mavlink_installed import AT_START, Installed, names
 from fieldcal.session.folder import Session
 
@@ -81,7 +81,7 @@ def changes(
         If what was installed is not known whole, or the board is mounted turned.
 
     """
-    acc, gyr = (diagonal(found, sensor, nominal) for sensor in ("acc", "gyr"))
+    acc, gyr = (reduce_to_diagonal(found, sensor, nominal) for sensor in ("acc", "gyr"))
     new = installed.next(acc.bias, acc.scale, gyr.bias)  # (1)
     k = np.ones(3) if installed.taken_out else installed.of("acc_scale")
     sigma = {

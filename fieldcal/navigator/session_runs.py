@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration, limits
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import earth_rate_home, turn
 from fieldcal.core.positions import angles, third_angles
@@ -159,7 +159,7 @@ def _contradicted(found: Drift) -> list[str]:
 
 
 def _deg(value: float, sigma: float) -> str:
-    return " ± ".join(number(float(value), float(sigma))) + "°"
+    return " ± ".join(format_with_sigma(float(value), float(sigma))) + "°"
 
 
 def document(found: Drift, placed: Setup) -> dict[str, Any]:

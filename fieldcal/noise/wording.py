@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from datetime import datetime, timedelta
 
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.recalibration import CHANCES
 
@@ -38,7 +38,7 @@ def follows(found: NoiseResult) -> list[str]:
     ]
     if found.alignment is not None:
         seconds, sigma, spread = found.alignment.best
-        angle = " ± ".join(number(math.degrees(sigma), math.degrees(spread)))
+        angle = " ± ".join(format_with_sigma(math.degrees(sigma), math.degrees(spread)))
         out.append(f"north by gyrocompassing: {angle}° after {seconds:.0f} s")
     return out
 

@@ -1,9 +1,9 @@
-"""Which effects a set of positions cannot tell apart, from its own design matrix.
+"""Effects that a set of positions cannot distinguish, from its design matrix.
 
-What a calibration takes up itself (bias and scale factor of each sensor) is projected
-out of the columns of every effect. An effect with nothing left is *hidden*: it goes
-into the calibration unseen. Two effects are *aliases* when all that is left of one lies
-in the span of the other: cos of the largest principal angle above `ALIKE`.
+The parameters of a calibration (bias and scale factor of each sensor) are projected out
+of the columns of every effect. An effect with no remaining column is *hidden*: the
+calibration absorbs it. Two effects are *aliases* if the remaining columns of one lie in
+the span of the other: cos of the largest principal angle above `ALIKE`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ALIKE = 0.995
 """Cosine of an angle at which noise of a few percent hides the difference."""
 
 NOTHING = 1e-6
-"""Part of a column that is left, below which it counts as projected out."""
+"""Remaining length of a column, as a part of it, that counts as zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Aliases:
 
     Attributes
     ----------
-    hidden : ids that a calibration takes up unseen
+    hidden : ids of effects that a calibration absorbs
     pairs : (id, ids it can be mistaken for)
 
     """
@@ -44,7 +44,7 @@ class Aliases:
     pairs: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
+def find_aliases(positions: Sequence[Position], gravity: float) -> Aliases:
     """Effects at rest that the positions hide or confuse.
 
     Parameters
@@ -64,7 +64,7 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
         seen = _columns(effect, view)
         if seen is None or not np.any(seen):
             continue
-        basis = _span(_without(seen, base), np.linalg.norm(seen, axis=0).max())
+        basis = _span(_project_out(seen, base), np.linalg.norm(seen, axis=0).max())
         if basis.shape[1]:
             left[name] = basis
         else:
@@ -73,7 +73,7 @@ def aliases(positions: Sequence[Position], gravity: float) -> Aliases:
 
 
 def _columns(effect: Effect, view: RowView) -> Array | None:
-    """What an effect does to the six outputs at rest, (6n, k); None if nothing."""
+    """Columns of an effect in the six outputs at rest, (6n, k); None without any."""
     if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
         return None
     seen = columns.of_effect(effect, {}, 0).of(view)
@@ -89,14 +89,14 @@ def _calibration(view: RowView) -> Array:
     return out
 
 
-def _without(columns: Array, base: Array) -> Array:
+def _project_out(columns: Array, base: Array) -> Array:
     q = _span(base, np.linalg.norm(base, axis=0).max())
     left: Array = columns - q @ (q.T @ columns)
     return left
 
 
 def _span(columns: Array, size: float) -> Array:
-    """Orthonormal basis of what the columns span, (m, r)."""
+    """Orthonormal basis of the span of the columns, (m, r)."""
     u, s, _ = np.linalg.svd(columns, full_matrices=False)
     basis: Array = u[:, s > NOTHING * size]
     return basis
@@ -116,7 +116,7 @@ def _pairs(left: dict[str, Array]) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def _contained(a: Array, b: Array) -> bool:
-    """Whether all that a spans lies in the span of b."""
+    """Whether the span of a lies in the span of b."""
     if a.shape[1] > b.shape[1]:
         return False
     return float(np.linalg.svd(a.T @ b, compute_uv=False)[-1]) > ALIKE

@@ -1,11 +1,12 @@
-"""The noise of one device, as it was measured, in the place of its grade's.
+"""Measured noise of one device, for use in place of the noise of its grade.
 
 A window of T has the error s(T) of the worst axis of each triad, measured at several T;
-in the planner's terms it is N and what stands beside it,
+in the planner's terms it is N and the floor B,
 
     B^2 = s(T)^2 - N^2 / T                                                         (1)
 
-so that a device whose bias walks gets no better by longer windows. Units: m/s^2, rad/s.
+so that longer windows do not help a device with a random walk of its bias. Units:
+m/s^2, rad/s.
 """
 
 from __future__ import annotations
@@ -17,19 +18,19 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.planning.planner import Grade
+from fieldcal.planning.planner import GradeNoise
 
 
 @dataclass(frozen=True, slots=True)
 class TriadNoise:
-    """The worst axis of a triad.
+    """Noise of the worst axis of a triad.
 
     Attributes
     ----------
-    unit : of its outputs
+    unit : unit of the outputs
     white : N, per sqrt(Hz)
     seconds, sigma : (t,) lengths of windows, s, and their errors
-    best_s : time after which its mean gets no better; None where longer than is known
+    best_s : time after which the mean does not improve, s; None if beyond the recording
 
     """
 
@@ -40,7 +41,7 @@ class TriadNoise:
     best_s: float | None
 
     def error(self, seconds: float) -> float:
-        """Error of a mean over `seconds`; white noise below what was measured."""
+        """Error of a mean over `seconds`; white noise below the measured times."""
         if seconds < self.seconds[0]:
             return float(self.sigma[0] * np.sqrt(self.seconds[0] / seconds))
         at = np.log(seconds), np.log(self.seconds), np.log(self.sigma)
@@ -49,13 +50,13 @@ class TriadNoise:
 
 @dataclass(frozen=True, slots=True)
 class DeviceNoise:
-    """Both triads; None where one was not measured."""
+    """Noise of both triads; None for one that was not measured."""
 
     acc: TriadNoise | None
     gyr: TriadNoise | None
 
-    def grade(self, seconds: float) -> Grade:
-        """What the planner asks of a grade, for windows of `seconds`, (1)."""
+    def grade(self, seconds: float) -> GradeNoise:
+        """The noise in the terms of the planner, for windows of `seconds`, (1)."""
         parts: list[float] = []
         for triad in (self.acc, self.gyr):
             if triad is None:
@@ -63,10 +64,10 @@ class DeviceNoise:
                 continue
             rest = triad.error(seconds) ** 2 - triad.white**2 / seconds
             parts += [triad.white, float(np.sqrt(max(rest, 0.0)))]
-        return Grade(*parts)
+        return GradeNoise(*parts)
 
     def sentence(self, seconds: float) -> str:
-        """How long this device is worth averaging."""
+        """Sentence with the errors of means and the best averaging times."""
         said = []
         for name, triad in (("accelerometers", self.acc), ("gyroscopes", self.gyr)):
             if triad is not None:
@@ -87,12 +88,12 @@ class DeviceNoise:
         }
 
 
-def of_document(content: Mapping[str, Any]) -> DeviceNoise:
-    """From a checked noise.json."""
-    return DeviceNoise(_worst(content, "a"), _worst(content, "g"))
+def device_noise_from(content: Mapping[str, Any]) -> DeviceNoise:
+    """Read the content of a checked noise.json."""
+    return DeviceNoise(_worst_axis(content, "a"), _worst_axis(content, "g"))
 
 
-def _worst(content: Mapping[str, Any], triad: str) -> TriadNoise | None:
+def _worst_axis(content: Mapping[str, Any], triad: str) -> TriadNoise | None:
     some = [
         c
         for n, c in content["channels"].items()

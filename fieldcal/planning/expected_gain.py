@@ -1,25 +1,26 @@
-"""What a further position is worth, before it is taken.
+"""Expected information gain of a further position, before it is recorded.
 
-What is asked for are numbers q: each parameter over the uncertainty that it may have,
-and of each cause whether it is there (0 or 2, so that a toss-up has a variance of 1).
-An explanation E of the recording, of probability P(E), has its own mean and covariance
-of them, and of the mean y that a window in a further position c would have,
+The requested quantities q are each parameter over its allowed uncertainty, and for each
+cause whether it is present (0 or 2, so that even odds have a variance of 1). An
+explanation E of the recording, of probability P(E), has its own mean and covariance of
+q, and of the mean y of a window in a further position c,
 
     y_E = h(s, c) + T (u_E - u_s),   Cov_E(y) = T C_E T^T + R                       (1)
 
 with h what the model predicts in state s, T its columns in c, u_E and C_E the columns'
-values with their covariance, R noise, instability and how well angles are set. Part of
-y is by what the gyroscopes' turn to c misses it: a turn phi is a rate phi for a second.
+values with their covariance, R noise, instability and how well angles are set. y
+includes the closure of the turn to c: a turn phi counts as a rate phi for one second.
 Over all explanations
 
     C_qy = sum_E P(E) [Cov_E(q, y) + (q_E - q) (y_E - y)^T],   C_qq, C_yy likewise  (2)
     C_qq' = C_qq - C_qy C_yy^-1 C_yq                                                (3)
     gain = 1/2 sum_i ln (1 + C_qq,ii) / (1 + C_qq',ii)                              (4)
 
-so that it counts alike what brings a parameter within its limit and what tells causes
-apart, and what is known well enough counts no more. Causes that the recording does not
-show are explanations as well, as likely as before and as large as it leaves them. What
-the factory left is in every explanation: it is part of each uncertainty, too.
+so that bringing a parameter within its limit counts as much as distinguishing causes,
+and quantities that are known well enough count no more. Causes that the recording does
+not show are explanations as well, with their prior probability and the sizes that the
+recording allows. Every explanation contains the factory errors, as each uncertainty
+does.
 Source: Lindley 1956 for the gain; Goldstein and Wooff, Bayes Linear Statistics, 2007,
 3.1, for (3).
 """
@@ -48,25 +49,25 @@ from fieldcal.model.search.inference import Inferred
 from fieldcal.model.state import State
 
 LEAST = 1e-3
-"""Probability below which an explanation decides no position."""
+"""Probability below which an explanation is ignored."""
 
 STEP = 1e-4
-"""Change of an angle by which outputs move, rad."""
+"""Step of numerical derivatives by an angle, rad."""
 
 COMMON = {"base_tilt": 30.0, "gyro_scale": 1.0, "gyro_cross_coupling": 1.0}
-"""Causes that every explanation has, as a calibration finds them, with their size in
-typical ones: the tilt of the base is anything."""
+"""Causes in every explanation, since a calibration estimates them, with their size in
+typical sizes; the tilt of the base is arbitrary."""
 
 
 @dataclass(frozen=True, slots=True)
-class Explained:
-    """One explanation.
+class EliminatedExplanation:
+    """One explanation with its eliminated columns.
 
     Attributes
     ----------
-    names : of its causes
-    chance : that it is the right one
-    state : its columns, eliminated; those that every explanation has come first
+    names : names of its causes
+    chance : its probability
+    state : its columns, eliminated; the common ones come first
 
     """
 
@@ -76,40 +77,39 @@ class Explained:
 
 
 @dataclass(frozen=True, slots=True)
-class Worth:
-    """What is not known yet, and what a further window in each position tells of it.
+class PositionGains:
+    """Expected gains of further windows in n positions.
 
     Attributes
     ----------
-    asked : names of what is asked for: parameters by full name, causes by id
-    variance : (q,) of each now
-    left : (n, q) of each, expected after a window in each of n positions
+    quantities : requested quantities: parameters by full name, causes by id
+    variance : (q,) present variance of each
+    expected_variance : (n, q) variance expected after a window in each position
     gain : (n,) by (4)
 
     """
 
-    asked: tuple[str, ...]
+    quantities: tuple[str, ...]
     variance: Array
-    left: Array
+    expected_variance: Array
     gain: Array
 
-    def foremost(self, i: int) -> str:
-        """Name of what a position tells most of."""
-        fall = np.log1p(self.variance) - np.log1p(self.left[i])
-        return self.asked[int(np.argmax(fall))]
+    def most_improved(self, i: int) -> str:
+        """Name of the quantity whose variance position i reduces most."""
+        fall = np.log1p(self.variance) - np.log1p(self.expected_variance[i])
+        return self.quantities[int(np.argmax(fall))]
 
 
 class ExpectedGain:
-    """The worth of further positions.
+    """Calculates the expected gain of further positions.
 
     Parameters
     ----------
-    rows : of the windows
-    found : what was inferred of them
-    likely : sets that were looked at, of the columns of the dictionary, with their
-        probabilities
-    allowed : uncertainty that is allowed of each parameter, SI, by its full name
-    angles : how well angles are set, rad
+    rows : rows of the windows
+    found : result of the inference from these rows
+    likely : sets found by the search, with their probabilities
+    allowed : allowed uncertainty of each parameter, SI, by full name
+    angles : uncertainty of set angles, rad
 
     """
 
@@ -123,21 +123,21 @@ class ExpectedGain:
     ) -> None:
         self.rows, self.found, self.angles = rows, found, angles
         self.dictionary: Dictionary = found.inference.dictionary
-        self.asked = dict(self._asked(allowed))
-        self.explained = self._explained(likely)
+        self.quantities = dict(self._requested_quantities(allowed))
+        self.explanations = self._eliminated_explanations(likely)
 
-    def of(self, positions: Sequence[Position]) -> Worth:
-        """The worth of each of some positions, with known angles."""
-        limit = np.array([s for s, _ in self.asked.values()])
-        at = np.array([c for _, c in self.asked.values()])
-        names = sorted(set().union(*(e.names for e in self.explained)))
-        chance = np.array([e.chance for e in self.explained])
+    def of(self, positions: Sequence[Position]) -> PositionGains:
+        """Expected gains of positions with known angles."""
+        limit = np.array([s for s, _ in self.quantities.values()])
+        at = np.array([c for _, c in self.quantities.values()])
+        names = sorted(set().union(*(e.names for e in self.explanations)))
+        chance = np.array([e.chance for e in self.explanations])
         there = np.array(
-            [[2.0 * (n in e.names) for n in names] for e in self.explained]
+            [[2.0 * (n in e.names) for n in names] for e in self.explanations]
         )
-        table, off, noise = self._windows(positions)
+        table, off, noise = self._predicted_windows(positions)
         q_mean, y_mean, q_cov, qy_cov, y_cov = [], [], [], [], []
-        for one, causes in zip(self.explained, there, strict=True):
+        for one, causes in zip(self.explanations, there, strict=True):
             columns, cov = one.state.columns, one.state.inverse
             picked = (columns == at[:, None]) / limit[:, None]
             design = table[:, :, columns]
@@ -159,18 +159,20 @@ class ExpectedGain:
         told = np.linalg.solve(c_yy, np.swapaxes(c_qy, 1, 2))
         left = np.maximum(c_qq - np.einsum("nqc,ncq->nq", c_qy, told), 0.0)  # (3)
         gain = 0.5 * (np.log1p(c_qq) - np.log1p(left)).sum(axis=1)  # (4)
-        return Worth((*self.asked, *names), c_qq, left, gain)
+        return PositionGains((*self.quantities, *names), c_qq, left, gain)
 
     # -- explanations
 
-    def _explained(self, likely: Iterable[tuple[Set, float]]) -> list[Explained]:
-        """Those that were looked at, and causes that nothing shows beside the best."""
-        out = [self._with_common(s, p) for s, p in likely if p > LEAST]
+    def _eliminated_explanations(
+        self, likely: Iterable[tuple[Set, float]]
+    ) -> list[EliminatedExplanation]:
+        """Sets of the search, and the best one with each cause that is not shown."""
+        out = [self._with_common_causes(s, p) for s, p in likely if p > LEAST]
         best = max(out, key=lambda pair: pair[1])
         known = set().union(*(one.names for one, _ in out))
         for cause in self.dictionary.causes:
             if cause.kind == "effect" and cause.name not in {*known, *COMMON}:
-                out.append(self._beside(best, cause))
+                out.append(self._with_one_more_cause(best, cause))
         score = np.array([s for _, s in out])
         share = np.exp(score - np.logaddexp.reduce(score))
         return [
@@ -179,22 +181,24 @@ class ExpectedGain:
             if p > LEAST
         ]
 
-    def _with_common(self, one: Set, chance: float) -> tuple[Explained, float]:
-        """A set with all that every explanation has, and its weight, ln."""
+    def _with_common_causes(
+        self, one: Set, chance: float
+    ) -> tuple[EliminatedExplanation, float]:
+        """A set with the common columns, and its log weight."""
         members = {cause.name for cause, _ in one.members}
         left = [g for g in self.dictionary.unfitted if g.part not in members]
-        columns, sizes = self._common()
+        columns, sizes = self._common_columns()
         at = np.concatenate([columns, one.state.columns, *(g.columns for g in left)])
         wide = np.concatenate([sizes, one.state.sizes, *(g.typical for g in left)])
-        state = Eliminated.of(self._rows(one), at, wide)
+        state = Eliminated.of(self._weighed_rows(one), at, wide)
         names = frozenset(c.name for c, _ in one.members) - COMMON.keys()
         weight = float(np.log(chance)) - one.state.score + state.score
-        return Explained(names, 0.0, state), weight
+        return EliminatedExplanation(names, 0.0, state), weight
 
-    def _beside(
-        self, best: tuple[Explained, float], cause: Cause
-    ) -> tuple[Explained, float]:
-        """The best explanation with one more cause, as large as it may be."""
+    def _with_one_more_cause(
+        self, best: tuple[EliminatedExplanation, float], cause: Cause
+    ) -> tuple[EliminatedExplanation, float]:
+        """The best explanation with one more cause, and its log weight."""
         one, score = best
         group = cause.variants[0]
         inner, pull = one.state.rest(group.columns, group.typical)
@@ -210,10 +214,10 @@ class ExpectedGain:
             np.concatenate([one.state.sizes, group.sizes(v)]),
         )
         more = score + evidence + float(np.log(cause.chance))
-        return Explained(one.names | {cause.name}, 0.0, state), more
+        return EliminatedExplanation(one.names | {cause.name}, 0.0, state), more
 
-    def _common(self) -> tuple[Index, Array]:
-        """Columns with sizes that every explanation has, angles among them."""
+    def _common_columns(self) -> tuple[Index, Array]:
+        """Columns that every explanation has, including angles, with their sizes."""
         d = self.dictionary
         at = [d.rotations_of(d.held)]
         wide = [np.full(len(at[0]), max(self.angles, 1e-9))]
@@ -223,15 +227,15 @@ class ExpectedGain:
                 wide.append(cause.variants[0].sizes(COMMON[cause.name]))
         return np.concatenate(at), np.concatenate(wide)
 
-    def _rows(self, one: Set) -> Weighed:
+    def _weighed_rows(self, one: Set) -> Weighed:
         return self.found.search.weighed(one.sizes.instability)
 
-    # -- what is asked for, and where
+    # -- requested quantities and further windows
 
-    def _asked(
+    def _requested_quantities(
         self, allowed: Mapping[str, float]
     ) -> Iterator[tuple[str, tuple[float, int]]]:
-        """By full name what is allowed of a parameter, and the column that it has."""
+        """Full name, allowed uncertainty and column of each parameter."""
         d = self.dictionary
         turned = [c for c in d.causes if c.name == "gyro_scale"]
         for name, limit in allowed.items():
@@ -246,7 +250,9 @@ class ExpectedGain:
             elif turned:
                 yield name, (limit, int(turned[0].variants[0].columns[c - GYR.start]))
 
-    def _windows(self, positions: Sequence[Position]) -> tuple[Array, Array, Array]:
+    def _predicted_windows(
+        self, positions: Sequence[Position]
+    ) -> tuple[Array, Array, Array]:
         """T (n, m, k), h(s) - T u_s (n, m) and R (n, m, m) of windows and turns."""
         d, values, seen = self.dictionary, self.found.values, self.dictionary.observed
         state = replace(
@@ -257,17 +263,19 @@ class ExpectedGain:
         since = np.repeat(d.since[:, -1:], len(positions), axis=1)
         view = RowView.of(late(self.rows.x, alpha, beta), since, state)
         used = values != 0
-        for one in self.explained:
+        for one in self.explanations:
             used[one.state.columns] = True
-        table = _table(d, view, used)
+        table = _column_table(d, view, used)
         off = state.output(view.x, since) - table @ values
-        noise = self._noise(state, since, alpha, beta)
+        noise = self._noise_covariance(state, since, alpha, beta)
         table, off, noise = table[:, seen], off[:, seen], noise[:, seen][:, :, seen]
         info = np.concatenate([np.zeros(0), *(t.info for t in self.found.turned)])
         if not (info > 0).any():
             return table, off, noise
-        felt = replace(view, x=replace(view.x, w=view.x.w + self._turned(alpha, beta)))
-        turned = (_table(d, felt, used) - _table(d, view, used))[:, GYR]
+        felt = replace(
+            view, x=replace(view.x, w=view.x.w + self._turns_to(alpha, beta))
+        )
+        turned = (_column_table(d, felt, used) - _column_table(d, view, used))[:, GYR]
         size = priors.SIZES[self.found.best.sizes.instability[CLOSURE]]
         miss = 1 / np.median(info[info > 0]) + (size * d.unstable[CLOSURE]) ** 2
         both = np.zeros((len(positions), len(seen) + 3, len(seen) + 3))
@@ -279,14 +287,16 @@ class ExpectedGain:
             both,
         )
 
-    def _turned(self, alpha: Array, beta: Array) -> Array:
+    def _turns_to(self, alpha: Array, beta: Array) -> Array:
         """Turn from the last position to each of some, (n, 3) rad in device axes."""
         x = self.rows.x
         phi: Array = way(turn(x.alpha[-1], x.beta[-1]), alpha, beta) @ x.mounting
         return phi
 
-    def _noise(self, state: State, since: Array, alpha: Array, beta: Array) -> Array:
-        """R of windows, (n, 6, 6): noise of a mean, what windows are off by, angles."""
+    def _noise_covariance(
+        self, state: State, since: Array, alpha: Array, beta: Array
+    ) -> Array:
+        """R of windows, (n, 6, 6): noise of a mean, instability, and angles."""
         rows, d = self.rows, self.dictionary
         sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(len(rows.x) / len(d.held))
         tau = priors.SIZES[list(self.found.best.sizes.instability)] * d.unstable
@@ -302,7 +312,7 @@ class ExpectedGain:
         return out
 
 
-def _table(d: Dictionary, view: RowView, used: Array) -> Array:
+def _column_table(d: Dictionary, view: RowView, used: Array) -> Array:
     """The columns that are used in some rows, (n, 6, k); zero elsewhere."""
     n = len(view.x)
     out = np.zeros((n, 6, d.width))

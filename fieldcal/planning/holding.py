@@ -12,13 +12,13 @@ from fieldcal.planning.steps import Plan, hold, note
 from fieldcal.windows import Average
 
 TRIES = 5
-"""Windows begun in a position before the procedure gives up."""
+"""Largest number of windows started in a position."""
 
 
 def hold_each(
     positions: Sequence[Position], seconds: float, sigma: float | None = None
 ) -> Plan[dict[int, Average]]:
-    """Hold every position; the averages by number, without what was left out."""
+    """Hold every position; returns the averages by number, without skipped ones."""
     averages = {}
     for index, position in enumerate(positions):
         try:
@@ -35,7 +35,7 @@ def hold_each(
 def with_skipped_positions(
     found: Calibration, positions: Sequence[Position], held: dict[int, Average]
 ) -> Calibration:
-    """The calibration, saying which positions are not in it."""
+    """The calibration with warnings about positions that were skipped."""
     left = [p.name for i, p in enumerate(positions) if i not in held]
     said = [f"{name} was left out by the operator" for name in left]
     return replace(found, warnings=(*found.warnings, *said))

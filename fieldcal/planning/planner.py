@@ -1,7 +1,7 @@
-"""Which positions to take, and the uncertainty that they give.
+"""Chooses positions, and predicts the uncertainty that they give.
 
-The design of n positions, J (3n, p) about a perfect device, says what a joint estimate
-will reach before anything is measured:
+The design of n positions, J (3n, p) about a perfect device, determines the uncertainty
+of a joint estimate before anything is measured:
 
     C = s^2 (J^T J)^-1                             Cramer-Rao bound
     s^2 = N^2 / T + B^2                            standard error of one mean
@@ -30,18 +30,18 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
 
 STARTS = 12
-"""Random sets the exchange begins from; the best ends agree long before."""
+"""Number of random sets from which the exchange starts; fewer give the same result."""
 
 STEPS = 7
-"""Angles tried between the limits of each joint."""
+"""Number of angles between the limits of each joint."""
 
 SINGULAR = 1e-9
-"""Smallest singular value, relative and of scaled columns, that determines anything."""
+"""Smallest relative singular value of scaled columns that counts as determined."""
 
 
 @dataclass(frozen=True, slots=True)
-class Grade:
-    """Noise of a class of devices.
+class GradeNoise:
+    """Noise of devices of one grade.
 
     Attributes
     ----------
@@ -65,23 +65,23 @@ class Grade:
 
     @property
     def acc_seconds(self) -> float:
-        """Window after which flicker has more of an accelerometer's mean, s."""
+        """Window beyond which flicker dominates an accelerometer's mean, s."""
         return (self.acc_white / self.acc_floor) ** 2
 
     @property
     def gyr_seconds(self) -> float:
-        """Window after which flicker has more of a gyroscope's mean, s."""
+        """Window beyond which flicker dominates a gyroscope's mean, s."""
         return (self.gyr_white / self.gyr_floor) ** 2
 
     def to_json(self) -> dict[str, float]:
-        """These averaging times, s."""
+        """Return both averaging times, s."""
         return {"acc_best_s": self.acc_seconds, "gyr_best_s": self.gyr_seconds}
 
 
 GRADES = {
-    "consumer": Grade(3e-3, 5e-4, 2e-4, 5e-5),
-    "tactical": Grade(1e-3, 1e-4, 5e-5, 5e-6),
-    "navigation": Grade(1e-4, 2e-5, 3e-7, 5e-8),
+    "consumer": GradeNoise(3e-3, 5e-4, 2e-4, 5e-5),
+    "tactical": GradeNoise(1e-3, 1e-4, 5e-5, 5e-6),
+    "navigation": GradeNoise(1e-4, 2e-5, 3e-7, 5e-8),
 }
 """Typical noise: 300, 100 and 10 micro-g/sqrt(Hz); 0.7, 0.17 and 0.001 deg/sqrt(h)."""
 
@@ -101,12 +101,12 @@ class Ladder:
 
 
 def required_parameters(n: int) -> tuple[str, ...]:
-    """Parameters that n positions must determine: from three on the tilt as well."""
+    """Parameters that n positions must determine; three or more also the tilt."""
     return parameters(*(["angle_offset"] if n >= 3 else []))
 
 
 def expected(
-    positions: Sequence[Position], grade: Grade, seconds: float, gravity: float
+    positions: Sequence[Position], grade: GradeNoise, seconds: float, gravity: float
 ) -> dict[str, float]:
     """Standard uncertainty of every parameter that the positions determine.
 
@@ -124,14 +124,14 @@ def expected(
     """
     names = required_parameters(len(positions))
     jacobian = design(names, positions, gravity).reshape(-1, len(names))
-    sigma = grade.acc(seconds) * sigma_of(jacobian)
+    sigma = grade.acc(seconds) * parameter_sigma(jacobian)
     found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
     gyr = grade.gyr(seconds) / np.sqrt(len(positions))
     found |= {f"gyr_bias.{axis}": float(gyr) for axis in "xyz"}
     return {name: s for name, s in found.items() if np.isfinite(s)}
 
 
-def sigma_of(jacobian: Array) -> Array:
+def parameter_sigma(jacobian: Array) -> Array:
     """Sigma of each parameter for unit noise, (p,); infinite where not determined."""
     size = np.linalg.norm(jacobian, axis=0)
     scaled = jacobian / np.where(size > 0, size, 1.0)
@@ -154,7 +154,7 @@ def best_positions(
     n : number of positions, 2 or more
     ladder : limits of the joints
     gravity : m/s^2
-    fixed : positions that are taken anyway; the n come on top
+    fixed : positions that are taken in any case, in addition to the n
 
     Raises
     ------
@@ -189,7 +189,7 @@ def best_positions(
 def _exchange(
     chosen: list[int], information: Array, given: Array, gravity: float
 ) -> tuple[float, list[int]]:
-    """Replace positions by better ones until there is none; each is used once."""
+    """Replace positions by better ones until there are none; each is used once."""
     cost = np.inf
     while True:
         best = (cost, -1, -1)

@@ -25,7 +25,7 @@ class Hold:
     Attributes
     ----------
     index : the number of the position in the session
-    position : where
+    position : the position
     seconds : window length, s of device time
     sigma : stop earlier once each accelerometer mean is this well known, m/s^2
 
@@ -50,7 +50,7 @@ class Add:
 
     Attributes
     ----------
-    position : where, with known angles
+    position : the position, with known angles
 
     """
 
@@ -59,7 +59,7 @@ class Add:
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """Forget what was taken in a position, and begin the plan again.
+    """Discard the window of a position, and start the plan again.
 
     Attributes
     ----------
@@ -72,11 +72,11 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """Say what the windows taken so far are good for; the reply is the judgement.
+    """Judge the windows recorded so far; the reply is an interim result.
 
     Attributes
     ----------
-    quick : whether the search may begin with what was found the last time
+    quick : whether the search may start from the previous explanation
 
     """
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.planning.planner import Grade
+from fieldcal.planning.planner import GradeNoise
 from fieldcal.windows.cells import CELL
 from fieldcal.windows.sway_process import needed
 from fieldcal.windows.sway_waves import Waves
 
 SWAYS_BY = float(np.deg2rad(1.0))
-"""Amplitude that is planned for, rad."""
+"""Assumed amplitude of the swaying, rad."""
 
 
-def seconds_needed(hz: float, grade: Grade) -> float:
-    """Seconds for which no mean is much more uncertain than on firm ground.
+def window_seconds_needed(hz: float, grade: GradeNoise) -> float:
+    """Length of windows for which no mean is much more uncertain than at rest, s.
 
     Parameters
     ----------

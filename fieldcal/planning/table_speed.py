@@ -1,15 +1,15 @@
-"""What gyroscopes on a table are worth whose speed is known, and whose axis is not.
+"""Predicted uncertainty of gyroscopes on a table of known speed and unknown axis.
 
-The length of what a gyroscope triad measures is the speed v of the table. Of spins i
-with the table's axis along u_i of the device (n, 3), for small errors of biases b and
-scale factors s,
+The length of the rate measured by a gyroscope triad is the speed v of the table. For
+spins i with the table's axis along u_i of the device (n, 3), and small errors of biases
+b and scale factors s,
 
     |w_i| - v = sum_j u_ij b_j + v u_ij^2 (s_j - 1) + e_i + d                      (1)
 
-e is the error of a mean; d is common to all spins: what the speed is off by, and what
-of the Earth's rate lies along the axis, which is the same wherever the device stands on
-the table. Between the spins the device rests in any orientation and shows its biases,
-but for the Earth's rate W, of which W / sqrt(3) is in each:
+e is the error of a mean; d is common to all spins: the error of the speed, and the
+component of the Earth's rate along the axis, which is the same anywhere on the table.
+Between the spins the device rests in any orientation and shows its biases, together
+with the Earth's rate W, of which W / sqrt(3) is in each axis:
 
     m_rj = b_j + e_rj + W_rj                                                       (2)
 
@@ -27,21 +27,21 @@ import numpy as np
 from fieldcal.core.errors import PlanError
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.planning.planner import sigma_of
+from fieldcal.planning.planner import parameter_sigma
 
 NAMES = tuple(f"gyr_{group}.{axis}" for group in ("bias", "scale") for axis in "xyz")
 
 ALONG = EARTH_RATE / 3**0.5
-"""What of the Earth's rate lies along any axis, rad/s, 1 sigma."""
+"""Component of the Earth's rate along any axis, rad/s, 1 sigma."""
 
 UNKNOWN = 1e3
-"""Parameters before a spin, in errors of a mean: with this, few spins compare too."""
+"""Prior sigma of parameters, in errors of a mean, so that few spins can be compared."""
 
 
 def spin_axes(n: int) -> Array:
     """Directions of the table's axis in the device for n spins, (n, 3).
 
-    Each is the best further one of the axes, edges and corners of a cube.
+    Each is the best further direction among axes, edges and corners of a cube.
 
     Raises
     ------
@@ -93,5 +93,5 @@ def expected_by_speed(
     alike = sigma**2 * np.eye(len(axes)) + common**2
     still = np.tile(np.eye(3, 6), (rests, 1)) / np.hypot(sigma, ALONG)  # (2)
     white = np.vstack([np.linalg.solve(np.linalg.cholesky(alike), spun), still])
-    found = zip(NAMES, sigma_of(white).tolist(), strict=True)
+    found = zip(NAMES, parameter_sigma(white).tolist(), strict=True)
     return {name: s for name, s in found if np.isfinite(s)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.report.blocks import Block, Section, Text, WarningBox, table
 from fieldcal.report.diagnosis import verdict_box
 from fieldcal.report.gather import Material
@@ -37,7 +37,7 @@ def against(material: Material) -> Section | None:
     blocks: list[Block] = [verdict_box(found, VERDICTS)]
     blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
     if said := str(found.get("says", "")):
-        blocks.append(Text(pretty(said)))
+        blocks.append(Text(format_unit(said)))
     rows = [row for one in objects_at(found, "differences") for row in _rows(one)]
     if rows:
         blocks.append(table("What differs", COLUMNS, rows))
@@ -55,11 +55,22 @@ def _rows(one: Json) -> Iterator[tuple[str, ...]]:
         pair = table_at(parameters, name)
         off = table_at(pair, "difference")
         value, sigma = real(off.get("value")), real(off.get("sigma"))
-        shown = number(value, sigma) if value == value else (str(off.get("value")), "")
+        shown = (
+            format_with_sigma(value, sigma)
+            if value == value
+            else (str(off.get("value")), "")
+        )
         sizes = [format_number(table_at(pair, side).get("value"), "{:.6g}")
                  for side in ("real", "simulator")]  # fmt: skip
         unit = str(off.get("unit", ""))
-        yield what, direction, name, *sizes, *shown, pretty("" if unit == "1" else unit)
+        yield (
+            what,
+            direction,
+            name,
+            *sizes,
+            *shown,
+            format_unit("" if unit == "1" else unit),
+        )
 
 
 def _prediction(found: Json) -> Block:

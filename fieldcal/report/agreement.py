@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.wording import title
+from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.report.blocks import Block, Figure, Matrix, Section, Text
 from fieldcal.report.charts import SENSORS, Axis, Chart, Series
@@ -117,7 +117,7 @@ def correlation(material: Material) -> Section | None:
     if found is None or len(found.names) < 2:
         return None
     r = correlations(found)
-    names = tuple(title(n) for n in found.names)
+    names = tuple(parameter_title(n) for n in found.names)
     short = tuple(str(i + 1) for i in range(len(names)))
     matrix = Matrix(
         "Correlations in hundredths; row and column numbers are the same",

@@ -13,7 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.calibration.wording import TITLES, number, position_numbers, pretty
+from fieldcal.calibration.wording import (
+    TITLES,
+    format_unit,
+    format_with_sigma,
+    position_numbers,
+)
 from fieldcal.core.samples import CHANNELS, common_unit
 from fieldcal.diagnosis.wording.lines import of_verdict
 from fieldcal.report import evidence
@@ -76,7 +81,7 @@ def diagnosis(material: Material) -> Section | None:
     if effects:
         blocks += _fit(table_at(found, "fit"))
     if said := str(found.get("says", "")):
-        blocks.append(Text(pretty(said)))
+        blocks.append(Text(format_unit(said)))
     blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
     mismatch = objects_at(found, "mismatch")
     if mismatch:
@@ -138,7 +143,7 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
 def _rms(names: Sequence[str], rms: float) -> str:
     """Size of a residual with its unit; sensors with different units have no common."""
     unit = common_unit(names)
-    return "–" if unit is None else f"{rms:.3g} {pretty(unit)}".strip()
+    return "–" if unit is None else f"{rms:.3g} {format_unit(unit)}".strip()
 
 
 def _effects(effects: Sequence[Json]) -> Block:
@@ -165,17 +170,17 @@ def _quantity(quantity: object) -> tuple[str, str, str]:
     if not isinstance(quantity, Mapping):
         return "", "", ""
     value, sigma = quantity.get("value"), real(quantity.get("sigma"))
-    unit = pretty(str(quantity.get("unit", "")))
+    unit = format_unit(str(quantity.get("unit", "")))
     if not isinstance(value, int | float):
         return str(value if value is not None else ""), "", unit
-    return (*number(float(value), sigma), unit)
+    return (*format_with_sigma(float(value), sigma), unit)
 
 
 def _fit(fit: Json) -> list[Block]:
     before, after = table_at(fit, "before"), table_at(fit, "after")
     if not before or not after:
         return []
-    unit = pretty(str(fit.get("unit", "m/s^2")))
+    unit = format_unit(str(fit.get("unit", "m/s^2")))
     facts = [
         (f"rms, {unit}", "rms", "{:.3g}"),
         ("χ² per degree of freedom", "chi2_per_dof", "{:.2f}"),
@@ -226,11 +231,11 @@ def _calibration(groups: Json) -> list[Block]:
     for name, group in groups.items():
         if not isinstance(group, Mapping):
             continue
-        unit = pretty(str(group.get("unit", "")))
+        unit = format_unit(str(group.get("unit", "")))
         triads = (list_at(group, k) for k in ("value", "sigma"))
         for axis, value, sigma in zip("xyz", *triads, strict=False):
             if isinstance(value, int | float):
-                format_number = number(float(value), real(sigma))
+                format_number = format_with_sigma(float(value), real(sigma))
                 rows.append([f"{TITLES.get(name, name)} {axis}", *format_number, unit])
     if not rows:
         return []

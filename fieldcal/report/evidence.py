@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.calibration.wording import pretty
+from fieldcal.calibration.wording import format_unit
 from fieldcal.core.samples import Array
 from fieldcal.report.blocks import Block, Cell, Figure, foldable_table, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
@@ -44,7 +44,7 @@ def curves(found: Sequence[Json]) -> list[Block]:
             f"curve-{i}",
             f"Residual of {channel} over {covariate}",
             f"rms of the residual of {channel}: {', '.join(sizes)}.",
-            Axis(covariate, pretty(str(curve.get("unit", "")))),
+            Axis(covariate, format_unit(str(curve.get("unit", "")))),
             Axis("residual", "m/s²" if channel.startswith("a") else "rad/s"),
             series,
         )

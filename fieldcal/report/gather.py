@@ -13,7 +13,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import FieldcalError, InputError, SessionError
 from fieldcal.core.samples import Block
-from fieldcal.evaluation.observations import Rests, rests
+from fieldcal.evaluation.observations import UsableWindows, usable_windows
 from fieldcal.session.folder import RESULT, Session
 
 DIAGNOSIS = "diagnosis.json"
@@ -58,7 +58,7 @@ class Material:
 
     session: Session
     block: Block
-    still: Rests | None
+    still: UsableWindows | None
     trouble: str
     calibration: Calibration | None
     diagnosis: Mapping[str, Any] | None
@@ -97,7 +97,7 @@ def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Ma
     block = session.block
     still, trouble = None, ""
     try:
-        still = rests(session)
+        still = usable_windows(session)
     except FieldcalError as error:
         trouble = str(error)
     result = _read(session.folder / RESULT)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import Rests, observations
+from fieldcal.evaluation.observations import UsableWindows, build_observations
 from fieldcal.report.blocks import Block as ReportBlock
 from fieldcal.report.blocks import Figure, Section, Text
 from fieldcal.report.charts import Axis, Chart, Series
@@ -56,13 +56,15 @@ def true_forces(material: Material) -> tuple[Array, float] | None:
     return material.calibration.apply(recorded, seen.nominal).acc, seen.gravity
 
 
-def _at_rest(material: Material) -> tuple[Rests, Observations] | None:
+def _at_rest(material: Material) -> tuple[UsableWindows, Observations] | None:
     """The windows at rest, if there are accelerometers and a calibration of them."""
     found = material.calibration
     if found is None or material.still is None or "acc_bias" not in found.groups:
         return None
     still = material.still.at_rest(material.session)
-    seen = observations(material.session.about, still.averages, still.rows)
+    seen = build_observations(
+        material.session.about, still.averages, still.position_numbers
+    )
     return (still, seen) if seen.has_acc and len(seen) else None
 
 
@@ -78,7 +80,7 @@ def norm_errors(material: Material) -> NormErrors | None:
     before, after = (
         np.linalg.norm(f, axis=1) - seen.gravity for f in (nominal, true)
     )  # (1)
-    return NormErrors(still.rows, before, after, np.sqrt(spread))
+    return NormErrors(still.position_numbers, before, after, np.sqrt(spread))
 
 
 def gravity_norm(material: Material) -> Section | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration import COMPONENTS, Calibration, compare
-from fieldcal.calibration.wording import TITLES, pretty, title
+from fieldcal.calibration.wording import TITLES, format_unit, parameter_title
 from fieldcal.core.errors import InputError
 from fieldcal.report.blocks import Block, Cell, Figure, Section, table
 from fieldcal.report.charts import Axis, Chart, Series
@@ -44,7 +44,7 @@ def _chart(group: str, every: tuple[EarlierCalibration, ...]) -> Chart:
             at = x + 0.1 * (i - 1)
             series.append(Series(axis, at, y, i + 1, "both", y - sigma, y + sigma))
     drift = max(float(np.nanmax(np.abs(s.y))) for s in series)
-    unit = pretty(COMPONENTS[group][1])
+    unit = format_unit(COMPONENTS[group][1])
     return Chart(
         f"history-{group}",
         TITLES[group],
@@ -63,9 +63,9 @@ def _changes(before: EarlierCalibration, now: Calibration) -> list[list[str | Ce
     units = dict(zip(now.names, now.units, strict=True))
     return [
         [
-            title(name),
+            parameter_title(name),
             f"{d:+.2g}",
-            pretty(units[name]),
+            format_unit(units[name]),
             Cell(f"{z:+.1f}", "warn" if name in found.changed else ""),
         ]
         for name, d, z in zip(found.names, found.difference, found.z, strict=True)

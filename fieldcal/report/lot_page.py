@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.fleet.capability import LotParameter
 from fieldcal.fleet.control import ControlChart
 from fieldcal.fleet.lot import Lot
@@ -78,8 +78,8 @@ def _odd(found: Lot) -> Table | Text:
         return Text("No unit is out of family.")
     rows = []
     for one in found.odd:
-        off = " ± ".join(number(one.off, one.sigma))
-        unit = pretty(found.parameters[one.parameter].unit)
+        off = " ± ".join(format_with_sigma(one.off, one.sigma))
+        unit = format_unit(found.parameters[one.parameter].unit)
         rows.append(
             [one.serial, one.parameter, off, unit, f"{one.chance:.1g}", one.folder]
         )
@@ -90,9 +90,9 @@ def _odd(found: Lot) -> Table | Text:
 def _shifts(found: Lot) -> list[Block]:
     rows: list[list[str | Cell]] = []
     for one in found.shifts:
-        unit = pretty(found.parameters[one.parameter].unit)
+        unit = format_unit(found.parameters[one.parameter].unit)
         for label, value, sigma in zip(one.labels, one.values, one.sigmas, strict=True):
-            shown = " ± ".join(number(float(value), float(sigma)))
+            shown = " ± ".join(format_with_sigma(float(value), float(sigma)))
             tone: Tone = "warn" if abs(value) > 3 * sigma else ""
             rows.append(
                 [one.parameter, one.level, label, Cell(shown, tone), unit,
@@ -116,11 +116,11 @@ def _spreads(found: Lot) -> Table:
             [
                 one.name,
                 f"{len(one.x)}",
-                " ± ".join(number(about.mean, about.mean_sigma)),
+                " ± ".join(format_with_sigma(about.mean, about.mean_sigma)),
                 f"{about.spread:.2g}",
                 f"{about.low:.2g} to {about.high:.2g}",
                 f"{np.median(one.sigma):.2g}",
-                pretty(one.unit),
+                format_unit(one.unit),
                 "" if one.tolerance is None else f"{one.tolerance:.3g}",
                 cp,
                 cpk,
@@ -135,7 +135,7 @@ def _spreads(found: Lot) -> Table:
 
 def _values(found: Lot, one: LotParameter) -> Figure:
     """Units in the order of time, with their own ±."""
-    about, unit = one.about, pretty(one.unit)
+    about, unit = one.about, format_unit(one.unit)
     at = np.arange(len(one.x), dtype=float)
     seen = Series(
         one.name, at, one.x, 1, "points", one.x - one.sigma, one.x + one.sigma

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import over_time
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS
 from fieldcal.report.blocks import Block as Part
@@ -53,7 +53,7 @@ def averaging(found: Mapping[str, Any]) -> Table:
     for name, channel, told in every:
         errors = zip(told["sigma"], told["spread"], strict=True)
         cells = [f"{value:.2g} ± {spread:.1g}" for value, spread in errors]
-        best, unit = told["best_s"], pretty(channel["unit"])
+        best, unit = told["best_s"], format_unit(channel["unit"])
         rows.append(
             [
                 name,
@@ -155,8 +155,9 @@ def _table(found: AllanDeviation) -> Table:
         rows.append(
             [
                 name,
-                f"{' ± '.join(number(one[i], half[second, i]))} {unit}",
-                f"{' ± '.join(number(found.deviation[k, i], half[k, i]))} {unit}",
+                f"{' ± '.join(format_with_sigma(one[i], half[second, i]))} {unit}",
+                f"{' ± '.join(format_with_sigma(found.deviation[k, i], half[k, i]))}"
+                f" {unit}",
                 f"{found.tau[k]:.0f} s",
             ]
         )

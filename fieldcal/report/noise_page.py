@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate
 from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
@@ -65,7 +65,7 @@ def _chart(what: str, some: list[ChannelEstimate], length: float) -> Chart:
             Series(f"{channel.name} model", said.tau, said.median, i + 1, "line",
                    said.low, said.high),
         ]  # fmt: skip
-    unit = pretty(some[0].unit)
+    unit = format_unit(some[0].unit)
     least = [f"{c.name} {np.min(c.averaging.sigma):.2g} {unit}" for c in some]
     return allan_chart(what, unit, f"Least: {', '.join(least)}.", tuple(series))
 
@@ -74,12 +74,12 @@ def _processes(found: NoiseResult) -> Table:
     rows = []
     for channel in found.model.channels.values():
         for name, size in channel.processes.items():
-            value = f"{size.value:.4g} ± {size.sigma:.2g} {pretty(size.unit)}"
+            value = f"{size.value:.4g} ± {size.sigma:.2g} {format_unit(size.unit)}"
             known = size.time_sigma < size.time < math.inf
-            time = f"{' ± '.join(number(size.time, size.time_sigma))} s"
+            time = f"{' ± '.join(format_with_sigma(size.time, size.time_sigma))} s"
             rows.append([channel.name, _named(name), value, time if known else ""])
         for name, size in channel.limits.items():
-            bound = f"< {size.value:.2g} {pretty(size.unit)}"
+            bound = f"< {size.value:.2g} {format_unit(size.unit)}"
             rows.append([channel.name, _named(name), bound, ""])
     columns = ("channel", "process", ">size ± 1σ (< 95 %)", ">correlation time")
     return table("Sizes", columns, rows)
@@ -97,6 +97,8 @@ def _programs(found: NoiseResult) -> Table:
     rows = []
     for program, values in found.programs.items():
         for name, (value, sigma, unit) in values.items():
-            rows.append([program, name, value_or_bound(value, sigma), pretty(unit)])
+            rows.append(
+                [program, name, value_or_bound(value, sigma), format_unit(unit)]
+            )
     columns = ("program", "name", ">value ± 1σ", "unit")
     return table("Parameters of other programs", columns, rows)

@@ -10,7 +10,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import ParameterName
-from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.samples import Block as SampleBlock
@@ -96,11 +96,13 @@ def _compared(found: Calibration, nominal: Mapping[str, Array]) -> str:
             f" the ± (χ² = {chi2:.0f} of {len(names)} parameters)."
         )
     most = int(np.argmax(np.abs(change) / np.sqrt(np.diag(cov))))
-    unit = pretty(found.units[at[most]])
-    value, error = number(float(change[most]), float(np.sqrt(cov[most, most])))
+    unit = format_unit(found.units[at[most]])
+    value, error = format_with_sigma(
+        float(change[most]), float(np.sqrt(cov[most, most]))
+    )
     return (
-        f"Apply it: {title(names[most])} differs from the calibration in use by"
-        f" {value} ± {error}{' ' + unit if unit else ''}, the most of all."
+        f"Apply it: {parameter_title(names[most])} differs from the calibration in use"
+        f" by {value} ± {error}{' ' + unit if unit else ''}, the most of all."
     )
 
 
@@ -112,7 +114,10 @@ def _facts(material: Material) -> NameValues:
         ("rate", _rate(block)),
     ]
     if material.still is not None:
-        taken, of = len(material.still.rows), len(material.session.positions)
+        taken, of = (
+            len(material.still.position_numbers),
+            len(material.session.positions),
+        )
         facts.append(("positions", f"{taken} of {of}" if taken < of else f"{of}"))
     warm = block.temperature[np.isfinite(block.temperature)]
     if warm.size:
@@ -173,7 +178,14 @@ def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
         if group in nominal and sigma > 0:
             z = (found.values[i] - nominal[group][parameter.axis]) / found.sigma[i]
             change = Cell(f"{z:+.1f} σ", bar=float(min(1.0, abs(z) / WIDEST)))
-        rows.append([title(name), *number(value, sigma), pretty(unit), change])
+        rows.append(
+            [
+                parameter_title(name),
+                *format_with_sigma(value, sigma),
+                format_unit(unit),
+                change,
+            ]
+        )
     columns: tuple[str, ...] = ("parameter", ">value", ">± 1σ", "unit")
     caption = "Device axes; ± is one standard uncertainty"
     if any(row[-1] for row in rows):
@@ -207,5 +219,5 @@ def _without(found: Calibration) -> str:
     missing = [g for g in ("acc_scale", "gyr_scale") if g not in found.groups]
     if not missing:
         return ""
-    names = " and ".join(title(g) for g in missing)
+    names = " and ".join(parameter_title(g) for g in missing)
     return f"Not determined by this recording, and not filled in: {names}."

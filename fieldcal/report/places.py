@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.report.blocks import Block, Figure, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import Material
@@ -83,7 +83,7 @@ def _table(where: MeasuredAngles, material: Material) -> Table:
         cells = [material.position_name(row)]
         cells += [f"{a:g}" if np.isfinite(a) else "–" for a in asked]
         for value, error in zip(shown, sigma, strict=True):
-            cells.append(" ± ".join(number(value, error)))
+            cells.append(" ± ".join(format_with_sigma(value, error)))
         rows.append(cells)
     columns = ("position", ">α asked", ">β asked", ">α shown", ">β shown")
     return table("Angles in degrees; ± is one standard uncertainty", columns, rows)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.calibration.wording import number
+from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.evaluation.observations import Rests
+from fieldcal.evaluation.observations import UsableWindows
 from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
 from fieldcal.report.charts import SENSORS, LabelledSpan, Mark, Record
 from fieldcal.report.gather import Material
@@ -54,7 +54,7 @@ def windows(material: Material) -> tuple[LabelledSpan, ...]:
     """The windows that were averaged, with the number of their position."""
     if material.still is None:
         return ()
-    pairs = zip(material.still.rows, material.still.averages, strict=True)
+    pairs = zip(material.still.position_numbers, material.still.averages, strict=True)
     off = material.epoch
     return tuple(
         LabelledSpan(a.start - off, a.end - off, str(row + 1)) for row, a in pairs
@@ -129,7 +129,7 @@ def _alt(
     return f"{seconds:.0f} s of samples, {len(spans)} windows: {'; '.join(ranges)}."
 
 
-def averages(material: Material, still: Rests) -> list[Table]:
+def averages(material: Material, still: UsableWindows) -> list[Table]:
     """The mean of each window with its standard error, a table a sensor."""
     out = []
     for first, sensor, unit in SENSORS:
@@ -145,12 +145,15 @@ def averages(material: Material, still: Rests) -> list[Table]:
         rows = [
             [
                 material.position_name(row),
-                *(" ± ".join(number(a.mean[i], a.sigma[i])) for i in channels),
+                *(
+                    " ± ".join(format_with_sigma(a.mean[i], a.sigma[i]))
+                    for i in channels
+                ),
                 f"{a.start:.1f} – {a.end:.1f}",
                 f"{a.n:,}",
                 f"{a.temperature:.2f}" if np.isfinite(a.temperature) else "–",
             ]
-            for row, a in zip(still.rows, still.averages, strict=True)
+            for row, a in zip(still.position_numbers, still.averages, strict=True)
         ]
         caption = f"Averages of the {sensor}, with standard errors"
         out.append(table(caption, columns, rows))

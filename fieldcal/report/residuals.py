@@ -27,7 +27,7 @@ from fieldcal.core.frames import (
 )
 from fieldcal.core.positions import rates, speeds, third_angles
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import observations
+from fieldcal.evaluation.observations import build_observations
 from fieldcal.model.causes.planned import state_of
 from fieldcal.physics.experience import Experience
 from fieldcal.report.gather import Material
@@ -60,14 +60,16 @@ def residuals(material: Material) -> Residuals | None:
     found, still = material.calibration, material.still
     if found is None or still is None:
         return None
-    seen = observations(material.session.about, still.averages, still.rows)
+    seen = build_observations(
+        material.session.about, still.averages, still.position_numbers
+    )
     channel = seen.mean - predicted(found, seen)
     true = found.apply(Block.of(seen.time, *_sensors(seen)), seen.nominal)
     norm = np.where(
         seen.oriented, np.nan, np.linalg.norm(true.acc, axis=1) - seen.gravity
     )
     sigma = np.sqrt(np.einsum("nii->ni", seen.covariance))
-    return Residuals(still.rows, channel, norm, sigma, seen.temperature)
+    return Residuals(still.position_numbers, channel, norm, sigma, seen.temperature)
 
 
 def predicted(found: Calibration, seen: Observations) -> Array:
@@ -151,7 +153,9 @@ def reached(material: Material) -> MeasuredAngles | None:
     still = material.still
     if still is None:
         return None
-    seen = observations(material.session.about, still.averages, still.rows)
+    seen = build_observations(
+        material.session.about, still.averages, still.position_numbers
+    )
     if not seen.has_acc:
         return None
     block = Block.of(seen.time, *_sensors(seen))
@@ -165,7 +169,9 @@ def reached(material: Material) -> MeasuredAngles | None:
     force, spread = acc @ seen.mounting.T, spread @ np.abs(seen.mounting.T)
     shown = np.rad2deg([angles_of(f) for f in force])
     asked = np.rad2deg(np.column_stack(seen.angles))
-    return MeasuredAngles(still.rows, asked, shown, _sigma(force, spread, shown))
+    return MeasuredAngles(
+        still.position_numbers, asked, shown, _sigma(force, spread, shown)
+    )
 
 
 def _sigma(force: Array, spread: Array, shown: Array) -> Array:

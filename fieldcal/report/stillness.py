@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.evaluation.observations import Rests
-from fieldcal.evaluation.window_mean import steadied, table_rate
+from fieldcal.evaluation.observations import UsableWindows
+from fieldcal.evaluation.window_mean import table_rate, without_table_rotation
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
 from fieldcal.report.charts import Axis, Chart, Mark, Series
@@ -102,15 +102,15 @@ def _cells(block: Block) -> CellTable:
     return cells.table
 
 
-def _windows(material: Material, still: Rests) -> blocks.Table:
+def _windows(material: Material, still: UsableWindows) -> blocks.Table:
     rows: list[list[str | Cell]] = []
-    for row, average in zip(still.rows, still.averages, strict=True):
+    for row, average in zip(still.position_numbers, still.averages, strict=True):
         end = float(np.nextafter(average.end, np.inf))
         window = material.block.between(average.start, end)
         about, span = material.session.about, (average.start, end)
         if about.positions[row].turning:
             rate = table_rate(material.block, span, about, row)
-            window, _ = steadied(window, rate)
+            window, _ = without_table_rotation(window, rate)
         worst = judge(_cells(window), StillnessLimits()).worst
         tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
         share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))

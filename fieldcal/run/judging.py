@@ -9,9 +9,9 @@ from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.so_far import SoFar
-from fieldcal.evaluation.solution import Laid, solved_as
+from fieldcal.evaluation.interim_result import InterimResult
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.session.folder import Session
 
 MENDED = ("fit", "positions", "witnesses", "turns", "level")
@@ -20,7 +20,9 @@ temperature, the link, what the operator insisted on and how the device was at e
 calibrations stay as they are."""
 
 
-def judged(folder: Path, limits: GradeLimits, before: SoFar | None = None) -> SoFar:
+def judged(
+    folder: Path, limits: GradeLimits, before: InterimResult | None = None
+) -> InterimResult:
     """What the windows that a session has are good for.
 
     Beginning with what was found of some of them `before` takes half the time: enough
@@ -33,13 +35,15 @@ def judged(folder: Path, limits: GradeLimits, before: SoFar | None = None) -> So
 
     """
     session = Session.open(folder)
-    still = rests(session)
-    laid = Laid(session, still, None if before is None else before.explanation)
+    still = usable_windows(session)
+    prepared = PreparedSession(
+        session, still, None if before is None else before.explanation
+    )
     try:
-        found = assess(solved_as(laid), session, still, limits, None)
+        found = assess(solve_prepared(prepared), session, still, limits, None)
     except FieldcalError as error:
-        return SoFar(laid, limits, None, str(error))
-    return SoFar(laid, limits, found, failed=tuple(_failed(found)))
+        return InterimResult(prepared, limits, None, str(error))
+    return InterimResult(prepared, limits, found, failed_checks=tuple(_failed(found)))
 
 
 def _failed(found: Calibration) -> list[str]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal import procedures
-from fieldcal.acceptance.verification import planned
+from fieldcal.acceptance.verification import planned_verification
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, forces
@@ -149,7 +149,7 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
         raise PlanError(f"{name}: {error}") from error
     _check_positions(about, name)
     _check_further(about, run, name)
-    made = Task(tables, about, run, planned(about))
+    made = Task(tables, about, run, planned_verification(about))
     _check_mover(made, name)
     return made
 

@@ -14,7 +14,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from fieldcal import procedures
-from fieldcal.acceptance.verification import planned
+from fieldcal.acceptance.verification import planned_verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.documents import load_json
@@ -30,8 +30,8 @@ from fieldcal.core.errors import (
 )
 from fieldcal.core.positions import Position
 from fieldcal.drivers.driver import Driver
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.so_far import SoFar
+from fieldcal.evaluation.interim_result import InterimResult
+from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_until_still
 from fieldcal.planning.steps import Judge, Plan, Repeat, add, note
 from fieldcal.run.companions import LeadRecorder
@@ -90,7 +90,7 @@ class SessionRun:
         wait = float(task.run.get("warm_up_s", WARM_UP))
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
-        self._so_far: SoFar | None = None
+        self._so_far: InterimResult | None = None
         self._judged_windows = 0
         self._remedies = 0
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
@@ -143,12 +143,12 @@ class SessionRun:
             except RepeatPosition as again:
                 self._taken.pop(again.index, None)
 
-    def _judged(self, quick: bool) -> SoFar:
+    def _judged(self, quick: bool) -> InterimResult:
         """What the windows taken so far are good for."""
         folder, so_far = self._recorder.folder, self._so_far
         windows = [m for m in read_marks(folder / MARKS) if m.get("event") == "window"]
         known = len(windows) == self._judged_windows
-        if not so_far or not known or (so_far.quick and not quick):
+        if not so_far or not known or (so_far.incremental and not quick):
             so_far = judged(folder, self._limits, so_far if quick else None)
         self._so_far, self._judged_windows = so_far, len(windows)
         return so_far
@@ -161,7 +161,7 @@ class SessionRun:
         plan = procedures.procedure(name).plan
         found = yield from plan(about, task.seconds, task.sigma)
         about = with_more(task.about, self._added)
-        verification = planned(about)
+        verification = planned_verification(about)
         if verification is not None:
             yield from self._verified(len(about.positions), verification)
         elif self._until_go:
@@ -181,7 +181,7 @@ class SessionRun:
     def _remedied(self) -> Plan[None]:
         """Take what would make a NO-GO a GO, as long as there is such a thing."""
         while self._remedies < REMEDIES:
-            so_far: SoFar = yield Judge()
+            so_far: InterimResult = yield Judge()
             remedy = so_far.remedy
             if remedy is None:
                 return
@@ -226,8 +226,8 @@ def recorded_averages(session: Session, task: Task) -> dict[int, Average]:
     marks = list(session.marks())
     taken: dict[int, Average] = {}
     with suppress(SessionError):
-        still = rests(session)
-        taken = dict(zip(still.rows, still.averages, strict=True))
+        still = usable_windows(session)
+        taken = dict(zip(still.position_numbers, still.averages, strict=True))
     last = len(task.about.positions)
     window = verification_window(marks, last)
     if window is not None and task.verification is not None:

@@ -9,8 +9,8 @@ from typing import Any
 
 from fieldcal.calibration import Calibration, limits
 from fieldcal.drivers.driver import Driver
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.run import plan_file
 from fieldcal.run.movers import VirtualMover
 from fieldcal.run.operator.script import ScriptOperator
@@ -64,4 +64,4 @@ def recalibrate(
         running = SessionRun(task, operator, recorder, once, bounds, 0.0, GIVE_UP)
         found = running.run(driver)
     session = Session.open(folder)
-    return solved(session, rests(session), method=found.method)
+    return solve_session(session, usable_windows(session), method=found.method)

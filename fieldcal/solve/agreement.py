@@ -1,4 +1,4 @@
-"""Agreement of the window means with a given set.
+"""Agreement of the window means with a parameter set.
 
     S = D + Phi_r L Phi_r^T,   chi2 = min_x (y - Phi x)^T S^-1 (y - Phi x)
     K = (S + Phi V Phi^T)^-1,  r_p = K_pp^-1 (K y)_p                               (1)
@@ -22,43 +22,43 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.physics.effect import Motion, Sensor
-from fieldcal.solve.given import Given
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.parameter_set import ParameterSet
 
 ROUNDED = 1e-9
-"""Share of the longest column below which rounding alone is left of one."""
+"""Length of a column, as a share of the longest, that is only rounding."""
 
-CERTAINLY = (Motion, Sensor)
-"""Effects that have an equation."""
+WITH_EQUATION = (Motion, Sensor)
+"""Kinds of effects that have an equation."""
 
 UNIT = 1e-6
-"""Largest share of what is estimated in a direction that windows do not show."""
+"""Relative singular value below which the windows do not determine a direction."""
 
 UNCHECKED = 1.0
-"""Variance, (m/s^2)^2, of what is predicted of a window that no other one checks: the
-wide sizes of what is estimated show."""
+"""Variance, (m/s^2)^2, of a prediction above which no other window checks it: the wide
+priors of the estimated parameters dominate."""
 
 
 @dataclass(frozen=True, slots=True)
-class Furthest:
-    """The mean that is furthest from what the other windows predict of it.
+class LargestResidual:
+    """Mean furthest from the prediction by the other windows.
 
     Attributes
     ----------
-    window : its number
+    window : number of the window
     axis : 0 to 2 of the triad, -1 for the length of a force of unknown orientation
-    off, sigma : by how much, and how well it was predicted; outputs
+    residual, sigma : difference and its standard uncertainty, in outputs
 
     """
 
     window: int
     axis: int
-    off: float
+    residual: float
     sigma: float
 
     @classmethod
-    def of(cls, off: Array, sigma: Array, lengths: Mask) -> Furthest | None:
-        """Of residuals and their sigmas, (p, 3); `lengths` (p,) where one is that."""
+    def of(cls, off: Array, sigma: Array, lengths: Mask) -> LargestResidual | None:
+        """Largest residual of (p, 3) in sigmas; `lengths` (p,) marks lengths."""
         far = np.abs(off) / sigma
         if not np.isfinite(far).any():
             return None
@@ -68,72 +68,74 @@ class Furthest:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """Of one triad.
+class TriadFit:
+    """Agreement of the means of one triad with the fit.
 
     Attributes
     ----------
-    chi2, dof : of the stated noise, and means less what they determine
+    chi2, dof : chi-squared with the stated noise, and degrees of freedom
     rms : root mean square residual, weighted by the windows' noise
-    left_out : the same of windows that the fit did not see; nan where none could be
-    rows : (p, 3) residuals, nan where nothing was measured; of a position whose
-        orientation nobody knows only along the force, or along the rate of a table
-    furthest : of those that the fit did not see; None where there is none
+    held_out_rms : the same for windows held out of the fit; nan if none could be
+    residuals : (p, 3), nan where nothing was measured. A position of unknown
+        orientation has one residual, along the force or along the rate of a table
+    largest : largest residual of a window held out of the fit; None if there is none
 
     """
 
     chi2: float
     dof: int
     rms: float
-    left_out: float
-    rows: Array
-    furthest: Furthest | None = None
+    held_out_rms: float
+    residuals: Array
+    largest: LargestResidual | None = None
 
     @property
-    def contradicts(self) -> bool:
+    def rejects_model(self) -> bool:
         """Whether the scatter is so large that the model is at fault, not the noise."""
         return self.dof > 0 and not self.chi2 / self.dof < thresholds.WRONG_MODEL
 
 
-def agreement(gram: Gram, d: Given, found: Mixture, channels: tuple[int, ...]) -> Fit:
-    """How well the means of a triad agree, by the columns of the estimate."""
+def triad_agreement(
+    gram: Gram, d: ParameterSet, found: Mixture, channels: tuple[int, ...]
+) -> TriadFit:
+    """Compare the means of a triad with the estimate."""
     p = len(d.held)
     at = np.ix_(np.arange(p), np.array(channels))
     info, off = gram.info[at], gram.off[at]
     used = (info > 0).ravel()
     if not used.any():
-        return Fit(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
+        return TriadFit(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
     index = gram.index[found.columns]
     means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
     y = off.ravel()[used]
-    random = _random(d)
+    random = _random_columns(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
     loose = _free_rotations(gram, p, channels)[used]
     wide = means[:, random] * found.sizes[random]
     plain = np.diag(noise) + wide @ wide.T
     stated = plain + loose @ loose.T
     free = means[:, ~random]
-    # turns that nobody knows hide what they can make
-    seen = _Seen(gram, d, channels, used)
+    # unknown rotations hide the residuals that they can produce
+    seen = _MeasuredMeans(gram, d, channels, used)
     good = (found.bad <= thresholds.CERTAIN)[seen.window] | (0 not in channels)
     columns = np.hstack([free, loose])[good]
     columns = columns[:, np.any(columns != 0.0, axis=0)]
     chi2, rank = _least_chi2(plain[np.ix_(good, good)], columns, y[good])
-    residual = seen.along(y - free @ found.mean[~random])
+    residual = seen.as_table(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
     sizes = free * found.sizes[~random]
-    off, unsure = _left_out(stated + wander, sizes, y, seen)
-    alone = seen.along(off, unsure)
-    return Fit(
+    off, unsure = _held_out_residuals(stated + wander, sizes, y, seen)
+    alone = seen.as_table(off, unsure)
+    return TriadFit(
         chi2, int(good.sum()) - rank, seen.rms(residual), seen.rms(alone), residual,
-        Furthest.of(alone, seen.sigmas(unsure), seen.turned),
+        LargestResidual.of(alone, seen.sigma_table(unsure), seen.freely_rotated),
     )  # fmt: skip
 
 
-def _random(d: Given) -> Mask:
-    """Which columns of the estimate are random, or known but for their size, (k,)."""
+def _random_columns(d: ParameterSet) -> Mask:
+    """Mark columns of random errors, and of known ones of unknown size, (k,)."""
     equations = [
-        g for _, g in d.explanations[0].members if isinstance(g.effect, CERTAINLY)
+        g for _, g in d.explanations[0].members if isinstance(g.effect, WITH_EQUATION)
     ]
     every = [
         np.full(len(g.columns), g.fixed != priors.FREE and g not in equations)
@@ -151,7 +153,7 @@ def _free_rotations(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
 
 
 def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
-    """Least chi2, and how many directions of what is free the means determine."""
+    """Least chi2, and the number of free directions that the means determine."""
     root = np.linalg.cholesky(stated)
     white = np.linalg.solve(root, np.column_stack([free, y]))
     a, b = white[:, :-1], white[:, -1]
@@ -163,18 +165,18 @@ def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
-    """The means of a triad that were measured.
+class _MeasuredMeans:
+    """Means of a triad that were measured.
 
     Attributes
     ----------
-    gram, d, channels : of which windows
+    gram, d, channels : of the windows
     used : (3 p,) whether each mean was
 
     """
 
     gram: Gram
-    d: Given
+    d: ParameterSet
     channels: tuple[int, ...]
     used: Mask
 
@@ -183,43 +185,47 @@ class _Seen:
         """Number of the window of each mean."""
         return np.repeat(np.arange(len(self.d.held)), 3)[self.used]
 
-    def along(self, values: Array, unsure: Array | None = None) -> Array:
+    def as_table(self, values: Array, unsure: Array | None = None) -> Array:
         """Residuals of the means as a table, (p, 3).
 
-        Of a position whose orientation nobody knows there is one, along the force, and
-        along the rate of a table whose axis nobody knows. A force whose variance says
-        that no other window checks it is nan.
+        A position of unknown orientation has one residual, along the force, or along
+        the rate of a table with an unknown axis. A force is nan if its variance shows
+        that no other window checks it.
         """
         out = np.full((len(self.d.held), 3), np.nan)
         out[np.nonzero(self.used.reshape(-1, 3))] = values
-        for i in np.flatnonzero(self.turned).tolist():
-            out[i] = [self._normal(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
+        for i in np.flatnonzero(self.freely_rotated).tolist():
+            out[i] = [self._force_direction(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
         if unsure is not None and 0 in self.channels:
             for i in range(len(out)):
-                n = self._normal(i)[None] if self.turned[i] else np.eye(3)
+                n = (
+                    self._force_direction(i)[None]
+                    if self.freely_rotated[i]
+                    else np.eye(3)
+                )
                 if np.trace(n @ unsure[i] @ n.T) > UNCHECKED * self.d.unit[0] ** 2:
                     out[i] = np.nan
         return out
 
-    def sigmas(self, unsure: Array) -> Array:
-        """What the rows of `along` have beside them, of covariances (p, 3, 3)."""
+    def sigma_table(self, unsure: Array) -> Array:
+        """Sigmas of the residuals in `as_table`, from covariances (p, 3, 3)."""
         out = np.full((len(self.d.held), 3), np.nan)
         for i in np.flatnonzero(self.used.reshape(-1, 3).all(axis=1)).tolist():
-            n = self._normal(i)[None] if self.turned[i] else np.eye(3)
+            n = self._force_direction(i)[None] if self.freely_rotated[i] else np.eye(3)
             out[i, : len(n)] = np.sqrt(np.diag(n @ unsure[i] @ n.T))
         return out
 
     @property
-    def turned(self) -> Mask:
-        """Windows in which turns that nobody knows change the triad, (p,)."""
+    def freely_rotated(self) -> Mask:
+        """Windows whose outputs unknown rotations change (p,)."""
         loose = self.gram.loose[: len(self.d.held), list(self.channels)]
         return np.asarray(loose.any(axis=(1, 2)))
 
-    def _normal(self, i: int) -> Array:
-        """What takes outputs to the input along itself, whatever the turns, (3,).
+    def _force_direction(self, i: int) -> Array:
+        """Direction in which no unknown rotation changes the outputs, (3,).
 
-        Where nobody knows the input, as of a rate, or a channel of it is not seen, as
-        one that is clipped, there is no such direction: nan.
+        Outputs along it give the input along its own direction. It is nan if the input
+        is unknown, such as a rate, or if a channel is missing, such as a clipped one.
         """
         d, at = self.d, list(self.channels)
         inputs = d.x.f if 0 in self.channels else d.x.w
@@ -233,7 +239,7 @@ class _Seen:
     def rms(self, rows: Array) -> float:
         """Root mean square, weighted by the noise of the windows."""
         weight = self.gram.info[: len(rows), list(self.channels)].copy()
-        free = np.flatnonzero(self.turned)
+        free = np.flatnonzero(self.freely_rotated)
         weight[free, 0] = weight[free].mean(axis=1)
         known = np.isfinite(rows)
         if not known.any():
@@ -241,8 +247,10 @@ class _Seen:
         return float(np.sqrt(np.average(rows[known] ** 2, weights=weight[known])))
 
 
-def _left_out(stated: Array, wide: Array, y: Array, seen: _Seen) -> tuple[Array, Array]:
-    """Residual of each mean by a fit without its window, (1); their covariances."""
+def _held_out_residuals(
+    stated: Array, wide: Array, y: Array, seen: _MeasuredMeans
+) -> tuple[Array, Array]:
+    """Residuals of means in fits without their own window, (1), and covariances."""
     inverse = np.linalg.inv(stated + wide @ wide.T)
     pull, window = inverse @ y, seen.window
     out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.held), 3, 3))

@@ -2,8 +2,8 @@
 
 The recording may show effects in addition to the requested parameters, with several
 possible explanations. Each explanation gives an estimate. The calibration is their
-mean, and its covariance includes their differences, (1) of `shown`. Biases that change
-are stated for the end of the recording, (2) of `shown`.
+mean, and its covariance includes their differences, (1) of `explanations`. Biases
+that change are stated for the end of the recording, (2) of `explanations`.
 """
 
 from __future__ import annotations
@@ -23,124 +23,142 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing, Mixture, covariance_of_means
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.solve.given import Given
+from fieldcal.solve.parameter_set import ParameterSet
 from fieldcal.solve.variants import variants
 
 
-def mixed(
-    given: Given, search: Search, carried: Sequence[Member], doubt: bool = True
+def mixture_with_causes(
+    parameter_set: ParameterSet,
+    search: Search,
+    carried: Sequence[Member],
+    doubt: bool = True,
 ) -> Mixture:
-    """A set with some causes beside what is asked for, at all its sizes.
+    """Posterior of the requested parameters together with some causes, over all sizes.
 
-    Each window may be bad as well, unless there is no `doubt`.
+    With `doubt`, each window may also be bad.
     """
-    there = search.evaluated(given.beside(carried))
-    return Mixing(given, search.gram, there, search.unstable, doubt=doubt).run()
+    there = search.evaluated(parameter_set.with_causes(carried))
+    return Mixing(parameter_set, search.gram, there, search.unstable, doubt=doubt).run()
 
 
 @dataclass(frozen=True, slots=True)
-class Parameters:
-    """All parameters that a set has, determined or not.
+class AllParameters:
+    """All parameters of a set, determined or not.
 
     Attributes
     ----------
     values, covariance : (k,), (k, k), at the end of the recording
-    moved : by how many sigmas what is carried moves each, (k,)
+    shift_sigmas : (k,) by how many sigmas the unrequested effects move each
 
     """
 
     values: Array
     covariance: Array
-    moved: Array
+    shift_sigmas: Array
 
 
-def averaged_over(
-    given: Given, gram: Gram, likeliest: Mixture, nominal: State, averaged: bool
-) -> Parameters:
-    """The mean over all explanations, (1) of `shown`."""
-    if not averaged or not any(one.members for one in given.explanations):
-        only = _at_the_end(given, likeliest, nominal)
-        return Parameters(*only, np.zeros(len(only[0])))
-    search = Search(given, gram)
+def average_explanations(
+    parameter_set: ParameterSet,
+    gram: Gram,
+    likeliest: Mixture,
+    nominal: State,
+    averaged: bool,
+) -> AllParameters:
+    """Mean and covariance over all explanations, (1) of `explanations`."""
+    if not averaged or not any(one.members for one in parameter_set.explanations):
+        only = _parameters_at_end(parameter_set, likeliest, nominal)
+        return AllParameters(*only, np.zeros(len(only[0])))
+    search = Search(parameter_set, gram)
     doubt = bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
     chance: dict[tuple[Member, ...], float] = {}
-    for one in given.explanations:  # of which several may have a variant in common
-        for same in variants(search, given.asked, one):
+    for one in parameter_set.explanations:  # explanations may share variants
+        for same in variants(search, parameter_set.base_members, one):
             p = one.probability * same.probability
             chance[same.members] = chance.get(same.members, 0.0) + p
     found = []
     for members in chance:
         there = likeliest
-        if given.beside(members) != given.members:
-            there = mixed(given, search, members, doubt)
-        found.append(_at_the_end(given, there, nominal))
+        if parameter_set.with_causes(members) != parameter_set.members:
+            there = mixture_with_causes(parameter_set, search, members, doubt)
+        found.append(_parameters_at_end(parameter_set, there, nominal))
     weight = np.array(list(chance.values()))
     means = np.array([value for value, _ in found])
     values: Array = weight @ means
     covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in found]))
     covariance += covariance_of_means(means, weight)
-    plain, own = _at_the_end(given, mixed(given, search, (), doubt), nominal)
-    return Parameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
+    plain, own = _parameters_at_end(
+        parameter_set, mixture_with_causes(parameter_set, search, (), doubt), nominal
+    )
+    return AllParameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 
 
-def _at_the_end(given: Given, found: Mixture, nominal: State) -> tuple[Array, Array]:
-    """Parameters of one explanation at the end of the recording, (2) of `shown`."""
-    picked, before = picked_by(given, found.columns), _nominal_values(given, nominal)
+def _parameters_at_end(
+    parameter_set: ParameterSet, found: Mixture, nominal: State
+) -> tuple[Array, Array]:
+    """Parameters of one explanation at the end of the recording, (2)."""
+    picked, before = (
+        parameter_matrix(parameter_set, found.columns),
+        _nominal_values(parameter_set, nominal),
+    )
     return before + picked @ found.mean, picked @ found.covariance @ picked.T
 
 
-def picked_by(given: Given, columns: Index) -> Array:
-    """Parameters by some columns, (k, c), beside their nominal values."""
-    picked = np.zeros((len(given.names), len(columns)))
-    for i, name in enumerate(given.names):
-        picked[i, np.flatnonzero(columns == given.place(name)[0])[0]] = 1.0
+def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:
+    """Derivative of the parameters by some columns, (k, c)."""
+    picked = np.zeros((len(parameter_set.names), len(columns)))
+    for i, name in enumerate(parameter_set.names):
+        picked[i, np.flatnonzero(columns == parameter_set.columns_for(name)[0])[0]] = (
+            1.0
+        )
         parameter = ParameterName.of(name)
         if parameter.sensor:
             scale, c = parameter.is_scale, parameter.channel
-            picked[i] += given.ending[int(scale)][c, columns]
+            picked[i] += parameter_set.bias_scale_at_end[int(scale)][c, columns]
     return picked
 
 
-def _nominal_values(given: Given, nominal: State) -> Array:
+def _nominal_values(parameter_set: ParameterSet, nominal: State) -> Array:
     """Nominal values of the parameters, (k,)."""
-    before = np.zeros(len(given.names))
-    for i, parameter in enumerate(map(ParameterName.of, given.names)):
+    before = np.zeros(len(parameter_set.names))
+    for i, parameter in enumerate(map(ParameterName.of, parameter_set.names)):
         if parameter.sensor:
             every = nominal.scale if parameter.is_scale else nominal.bias
             before[i] = every[parameter.channel]
     return before
 
 
-def known_rows(given: Given, lot: LotPrior, nominal: State) -> KnownRows | None:
-    """What a lot says of the columns of a set; None where it says nothing of them."""
-    lot = lot.only(given.names)
+def lot_rows(
+    parameter_set: ParameterSet, lot: LotPrior, nominal: State
+) -> KnownRows | None:
+    """Prior of a lot as rows for the columns of a set; None if it has no parameter."""
+    lot = lot.subset(parameter_set.names)
     if not lot.names:
         return None
-    picked, before = (
-        picked_by(given, np.arange(given.width)), _nominal_values(given, nominal)
-    )  # fmt: skip
-    at = [given.names.index(name) for name in lot.names]
+    picked = parameter_matrix(parameter_set, np.arange(parameter_set.width))
+    before = _nominal_values(parameter_set, nominal)
+    at = [parameter_set.names.index(name) for name in lot.names]
     return KnownRows.of(picked[at], lot.mean - before[at], lot.covariance)
 
 
-def determined(
-    given: Given, found: Parameters
+def select_determined(
+    parameter_set: ParameterSet, found: AllParameters
 ) -> tuple[tuple[str, ...], Array, Array, Array, tuple[str, ...]]:
-    """Parameters that are determined, and the names of those that are not."""
-    before = np.zeros(given.width)
-    for group in given.groups:
+    """Names, values, covariance and shifts of determined parameters; other names."""
+    before = np.zeros(parameter_set.width)
+    for group in parameter_set.groups:
         before[group.columns] = group.sizes(group.fixed or 1.0)
     sigma = np.sqrt(np.diag(found.covariance))
     limits = thresholds.USEFUL | (
-        {"gyr_scale": thresholds.USEFUL_TURNED} if given.wanted.turned else {}
+        {"gyr_scale": thresholds.USEFUL_TURNED} if parameter_set.options.turned else {}
     )
     known = [
         i
-        for i, name in enumerate(given.names)
-        if sigma[i] ** 2 < thresholds.DETERMINED * before[given.place(name)[0]] ** 2
+        for i, name in enumerate(parameter_set.names)
+        if sigma[i] ** 2
+        < thresholds.DETERMINED * before[parameter_set.columns_for(name)[0]] ** 2
         and sigma[i] < limits.get(group_of(name), np.inf)
     ]
-    names = tuple(given.names[i] for i in known)
-    missing = tuple(n for i, n in enumerate(given.names) if i not in known)
+    names = tuple(parameter_set.names[i] for i in known)
+    missing = tuple(n for i, n in enumerate(parameter_set.names) if i not in known)
     square = found.covariance[np.ix_(known, known)]
-    return names, found.values[known], square, found.moved[known], missing
+    return names, found.values[known], square, found.shift_sigmas[known], missing

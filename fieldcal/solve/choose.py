@@ -1,14 +1,13 @@
-"""From what is asked for to a calibration: the set is given, the model does the rest.
+"""Chooses the parameter set for the requested calibration, and fits it.
 
     two known positions            two_position      bias and scale factor
     more known positions           joint             and the tilt that the data prefer
     positions without angles       scalar            by the length of the force
     rates of a table               least_squares     for the gyroscopes
 
-Whatever the method is called, all rows are in one fit: windows, the turns between them
-where they were recorded, the Earth's rate as far as it is known, how well angles are
-set. Where two models of the tilt fit nearly alike, what they differ by is in the
-uncertainty.
+Each method fits all rows at once: windows, the turns between them if they were
+recorded, the Earth's rate as far as it is known, and the uncertainty of set angles. If
+two models of the tilt fit about equally well, the uncertainty includes the difference.
 """
 
 from __future__ import annotations
@@ -28,27 +27,35 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
-from fieldcal.solve.assumed import Asked
-from fieldcal.solve.borrowed import borrowed
-from fieldcal.solve.estimation import Estimated, Recorded, estimated
-from fieldcal.solve.given import Wanted, earth_known, seen_by
-from fieldcal.solve.latitude import EarthVertical
+from fieldcal.solve.estimation import (
+    ParameterEstimate,
+    RecordedRows,
+    estimate_parameters,
+)
+from fieldcal.solve.latitude import VerticalEarthRate
+from fieldcal.solve.lot_contribution import combine_with_lot
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.options import SolveOptions
+from fieldcal.solve.parameter_set import (
+    ParameterSetOptions,
+    known_earth_rate,
+    with_base_rate,
+)
 from fieldcal.solve.rank import ladder_remedy
-from fieldcal.solve.result import calibration
-from fieldcal.solve.rows import of_means, without_angles
+from fieldcal.solve.result import build_calibration
+from fieldcal.solve.rows import rows_of_means, without_angles
 
-Earth = Literal["stated", "another", "none"]
-"""Whose rate gyroscopes have: of the stated latitude, of another one, or none."""
+EarthRateModel = Literal["stated", "another", "none"]
+"""Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
 
 EVEN = 0.5
-"""Chance from which an error is taken to be as large as the coarser grade has it."""
+"""Probability from which an error is taken to be as large as in the coarser grade."""
 
 NO_EARTH = (
     "the gyroscopes do not show the Earth's rate, as those of a simulator without it:"
     " their biases are stated without; real ones that do so take out what is a bias"
 )
-"""Said where the Earth's rate is absent."""
+"""Warning if the Earth's rate is absent."""
 
 
 def solve(
@@ -61,7 +68,7 @@ def solve(
     heading_sigma_deg: float | None = None,
     angle_sigma_deg: float = 0.0,
     beside_tilt_sigma_deg: float = 0.0,
-    recorded: Recorded | None = None,
+    recorded: RecordedRows | None = None,
     lot: LotPrior | None = None,
     factory: FactoryErrors | None = None,
     at_best: FactoryErrors | None = None,
@@ -76,18 +83,20 @@ def solve(
     tilt : model of the base's tilt; "auto" estimates it where the positions show it
     cross : estimate cross-coupling (non-orthogonality in the scalar method)
     as_printed : closed forms with the misprints of the paper, to compare
-    level_sigma_deg : how level the base was made, about each level axis; the tilt is
-        then that of the base, within this
-    heading_sigma_deg : how well z points north; not known for tactical grade if None
-    angle_sigma_deg : how well each position's angles are set, about each level axis
-    beside_tilt_sigma_deg : how large a tilt of the base may be beside offsets of the
-        joints, and the other way round, where "auto" takes one of them
+    level_sigma_deg : uncertainty of the level of the base about each level axis; the
+        tilt is then that of the base, with this prior
+    heading_sigma_deg : uncertainty of the direction of z from north; None means unknown
+        for tactical grade, and exact for navigation grade
+    angle_sigma_deg : uncertainty of each position's angles, about each level axis
+    beside_tilt_sigma_deg : possible size of a tilt of the base besides offsets of the
+        joints, or the other way round, if "auto" takes one of them
     recorded : the rows of the recording that the observations are means of, and its
         turns; of means alone there is one row for each window
-    factory : what the factory left of errors that are not estimated; nothing if None
-    at_best : the same if the device is as good as it is called, where `factory` is what
-        its biases make likely: the rows tell which, for each kind of error
-    lot : what the unit's lot says, which the result then has unless the unit is odd
+    factory : sizes of errors that the factory left and that are not estimated; None for
+        no errors
+    at_best : the same for the stated grade, if `factory` is that of a coarser grade
+        that the biases show; the rows decide for each kind of error
+    lot : prior from the unit's lot; it is not used if the unit is an outlier
 
     Raises
     ------
@@ -104,45 +113,55 @@ def solve(
     >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
     ('two_position', [1.0, 1.0, 1.0])
     """
-    asked = Asked(
+    options = SolveOptions(
         method, tilt, cross, as_printed,
         level_sigma_deg, heading_sigma_deg, angle_sigma_deg, beside_tilt_sigma_deg, lot,
         factory or FactoryErrors(), at_best,
     )  # fmt: skip
     if as_printed:
-        return printed.solve(observations, asked)
-    return _solved(observations, asked, asked.method_for(observations), recorded)
+        return printed.solve(observations, options)
+    return _solve_with_lot(
+        observations, options, options.method_for(observations), recorded
+    )
 
 
-def _solved(
-    observations: Observations, asked: Asked, method: Method, recorded: Recorded | None
+def _solve_with_lot(
+    observations: Observations,
+    options: SolveOptions,
+    method: Method,
+    recorded: RecordedRows | None,
 ) -> Calibration:
-    """The calibration by the session alone, or with its lot where that fits."""
-    alone = replace(asked, lot=None)
-    found, notes = _fitted(observations, alone, method, recorded)
+    """The calibration of the session alone, or with its lot if the unit fits to it."""
+    alone = replace(options, lot=None)
+    found, notes = _fit_over_earth_rates(observations, alone, method, recorded)
     told = None
-    if asked.lot is not None:
-        beside, others = _fitted(observations, asked, method, recorded)
-        found, told = borrowed(found, beside, asked.lot)
+    if options.lot is not None:
+        beside, others = _fit_over_earth_rates(observations, options, method, recorded)
+        found, told = combine_with_lot(found, beside, options.lot)
         notes = notes if told is None or told.refused else others
-    return calibration(method, observations, asked, found, notes, told)
+    return build_calibration(method, observations, options, found, notes, told)
 
 
-def _fitted(
-    observations: Observations, asked: Asked, method: Method, recorded: Recorded | None
-) -> tuple[Estimated, list[str]]:
-    """The set that fits, with what other rates of the Earth differ by in its sigmas.
+def _fit_over_earth_rates(
+    observations: Observations,
+    options: SolveOptions,
+    method: Method,
+    recorded: RecordedRows | None,
+) -> tuple[ParameterEstimate, list[str]]:
+    """Fit with the Earth's rate of the stated latitude, of another one, and with none.
 
-    The rate of the stated latitude, of another, or none as simulators have it: one
-    that fits a little better is not the only one that is possible.
+    The most likely one is the result. Its covariance includes the differences from the
+    others, weighted by their probabilities. Simulators may have no Earth's rate.
     """
 
-    def fitted(earth: Earth) -> tuple[Estimated, list[str]]:
-        return _Session(observations, asked, method, recorded, earth).best()
+    def fitted(earth: EarthRateModel) -> tuple[ParameterEstimate, list[str]]:
+        return _SessionFit(observations, options, method, recorded, earth).best_fit()
 
     found, notes = fitted("stated")
-    shown = EarthVertical.of(found.given, found.search, observations.latitude)
-    if shown is None or not shown.favoured:
+    shown = VerticalEarthRate.of(
+        found.parameter_set, found.search, observations.latitude
+    )
+    if shown is None or not shown.other_favoured:
         return found, notes
     other, (none, others) = fitted("another")[0], fitted("none")
     ahead = none.score - found.score + np.log(priors.ELSEWHERE)
@@ -150,48 +169,50 @@ def _fitted(
     weights = np.exp(score - score.max())
     as_said, elsewhere, absent = (weights / weights.sum()).tolist()
     if ahead > max(0.0, shown.gain):
-        mixed = none.mixed_with(none, found, as_said)
-        return mixed.mixed_with(none, other, elsewhere), [NO_EARTH, *others]
-    mixed = found.mixed_with(found, other, elsewhere)
-    return mixed.mixed_with(found, none, absent), notes
+        mixed = none.with_model_uncertainty(none, found, as_said)
+        return mixed.with_model_uncertainty(none, other, elsewhere), [NO_EARTH, *others]
+    mixed = found.with_model_uncertainty(found, other, elsewhere)
+    return mixed.with_model_uncertainty(found, none, absent), notes
 
 
-class _Session:
-    """One session's rows, to be laid to sets.
+class _SessionFit:
+    """Fits of several parameter sets to the rows of one session.
 
     Parameters
     ----------
-    observations : of the windows
-    asked : what for
-    method : that was chosen
-    recorded : its rows, if there are more than the means
-    earth : whose rate gyroscopes have
+    observations : means of the windows
+    options : options
+    method : chosen method
+    recorded : rows of the recording; None if there are only means
+    earth : Earth's rate in the gyroscopes
 
     """
 
     def __init__(
         self,
         observations: Observations,
-        asked: Asked,
+        options: SolveOptions,
         method: Method,
-        recorded: Recorded | None,
-        earth: Earth = "stated",
+        recorded: RecordedRows | None,
+        earth: EarthRateModel = "stated",
     ) -> None:
-        self.observations, self.asked, self.method = observations, asked, method
+        self.observations, self.options, self.method = observations, options, method
         navigation = observations.grade == "navigation"
-        base, self.unknown = earth_known(
-            observations.latitude, navigation, asked.heading, observations.under_way
+        base, self.earth_sigma = known_earth_rate(
+            observations.latitude, navigation, options.heading, observations.under_way
         )
         if earth == "another":
-            self.unknown = (self.unknown[0], EARTH_RATE, self.unknown[2])
+            self.earth_sigma = (self.earth_sigma[0], EARTH_RATE, self.earth_sigma[2])
         elif earth == "none":
-            base, self.unknown = np.zeros(3), (0.0, 0.0, 0.0)
-        given = recorded or of_means(observations)
-        rows = given.rows
+            base, self.earth_sigma = np.zeros(3), (0.0, 0.0, 0.0)
+        recorded_rows = recorded or rows_of_means(observations)
+        rows = recorded_rows.rows
         if method == "scalar":
             rows = without_angles(rows, observations.nominal)
-        self.recorded = replace(given, rows=seen_by(rows, base))
-        self.turning = self.recorded.turning() if observations.has_gyr else None
+        self.recorded = replace(recorded_rows, rows=with_base_rate(rows, base))
+        self.turn_integrator = (
+            self.recorded.turn_integrator() if observations.has_gyr else None
+        )
         nominal = observations.nominal
         self.nominal = State(
             np.array([*nominal.acc_bias, *nominal.gyr_bias], dtype=float),
@@ -200,72 +221,74 @@ class _Session:
             np.zeros(3),
         )
 
-    def best(self) -> tuple[Estimated, list[str]]:
-        """The set that fits, with remarks about the tilt."""
-        level, tilt = self.asked.level_deg, self.asked.tilt
+    def best_fit(self) -> tuple[ParameterEstimate, list[str]]:
+        """The estimate with the model of the tilt that fits best, and remarks on it."""
+        level, tilt = self.options.level_deg, self.options.tilt
         if self.method in ("scalar", "least_squares"):
-            return self._with("none"), []
+            return self._fit("none"), []
         if level and tilt in ("auto", "none"):
-            return self._with("base_tilt", level), []
+            return self._fit("base_tilt", level), []
         if self.method == "two_position":
-            return self._with("none"), []
+            return self._fit("none"), []
         if tilt != "auto":
-            return self._with(tilt, level), []
-        return self._by_tilt()
+            return self._fit(tilt, level), []
+        return self._fit_best_tilt()
 
     @property
-    def _beside(self) -> float:
-        """How large the other kind of tilt may be; nothing where one is asked for."""
-        return self.asked.beside_tilt_deg if self.asked.tilt == "auto" else 0.0
+    def _other_tilt_deg(self) -> float:
+        """Possible size of the other kind of tilt, deg; 0 if one kind is requested."""
+        return self.options.beside_tilt_deg if self.options.tilt == "auto" else 0.0
 
-    def _with(
+    def _fit(
         self, tilt: Tilt, level: float | None = None, follow: bool = True
-    ) -> Estimated:
-        """A set with a model of the tilt; windows alone are to choose one by."""
-        turning = self.turning if follow else None
+    ) -> ParameterEstimate:
+        """Fit with a model of the tilt; without `follow`, to windows alone."""
+        turning = self.turn_integrator if follow else None
         observations, turned = self.observations, turning is not None
         table = bool(observations.rotating.any())
         sees_earth = (
             observations.grade == "navigation" and observations.latitude is not None
         )
-        crossed = self.asked.cross or self.method == "least_squares"
-        wanted = Wanted(
+        crossed = self.options.cross or self.method == "least_squares"
+        wanted = ParameterSetOptions(
             tilt,
             cross=crossed,
             gyro_cross=table or turned,
             gyr_scale=table or turned or (sees_earth and len(observations) > 1),
             level_deg=level,
-            beside_tilt_deg=0.0 if level else self._beside,
-            angles_deg=self.asked.angles_deg,
-            factory=self.asked.factory,
-            earth=self.unknown,
+            beside_tilt_deg=0.0 if level else self._other_tilt_deg,
+            angles_deg=self.options.angles_deg,
+            factory=self.options.factory,
+            earth=self.earth_sigma,
             turned=turned,
-            lot=self.asked.lot,
+            lot=self.options.lot,
         )
-        found = estimated(self.recorded, turning, self.nominal, wanted, follow)
-        if (stated := self.asked.at_best) is None:
+        found = estimate_parameters(
+            self.recorded, turning, self.nominal, wanted, follow
+        )
+        if (stated := self.options.at_best) is None:
             return found
-        chances = found.coarser(stated)
+        chances = found.coarser_probabilities(stated)
         finer = {k: getattr(stated, k) for k, p in chances.items() if p < EVEN}
         if not finer:
             return found
         wanted = replace(wanted, factory=replace(wanted.factory, **finer))
-        best = estimated(self.recorded, turning, self.nominal, wanted, follow)
+        best = estimate_parameters(self.recorded, turning, self.nominal, wanted, follow)
         as_stated = np.prod([1 - chances[k] for k in finer])
-        return best.mixed_with(best, found, 1 - float(as_stated))
+        return best.with_model_uncertainty(best, found, 1 - float(as_stated))
 
-    def _by_tilt(self) -> tuple[Estimated, list[str]]:
-        """The model of the tilt that fits better, the other one being weighed in.
+    def _fit_best_tilt(self) -> tuple[ParameterEstimate, list[str]]:
+        """Fit with the better model of the tilt; the covariance includes the other one.
 
-        Windows tell which; turns hardly add to that.
+        The windows decide: turns add little to the choice.
         """
-        fits = {name: self._with(name, follow=False) for name in TILTS}
+        fits = {name: self._fit(name, follow=False) for name in TILTS}
         usable = {n: e for n, e in fits.items() if _determines_all(e)}
         if not usable:
-            return self._with("none"), [self._level_taken()]
+            return self._fit("none"), [self._level_assumed_note()]
         if len(usable) == 1:
             name = next(iter(usable))
-            return self._whole(name, usable), [f"the tilt is taken as {name}"]
+            return self._fit_all_rows(name, usable), [f"the tilt is taken as {name}"]
         ahead = usable["angle_offset"].score - usable["base_tilt"].score
         best, other = TILTS if ahead >= 0 else TILTS[::-1]
         ahead = abs(ahead)
@@ -281,16 +304,18 @@ class _Session:
                 " both; more positions with both angles turned would tell"
             )
         weight = 1 / (1 + float(np.exp(min(ahead, 50.0))))
-        found = self._whole(best, usable)
-        return found.mixed_with(usable[best], usable[other], weight), [note]
+        found = self._fit_all_rows(best, usable)
+        return found.with_model_uncertainty(usable[best], usable[other], weight), [note]
 
-    def _whole(self, tilt: Tilt, by_windows: dict[Tilt, Estimated]) -> Estimated:
-        """The set by all rows, where there are more than those it was chosen by."""
-        if self.turning is None and not self.recorded.shown:
+    def _fit_all_rows(
+        self, tilt: Tilt, by_windows: dict[Tilt, ParameterEstimate]
+    ) -> ParameterEstimate:
+        """Fit to all rows, if there are more than the windows used for the choice."""
+        if self.turn_integrator is None and not self.recorded.explanations:
             return by_windows[tilt]
-        return self._with(tilt)
+        return self._fit(tilt)
 
-    def _level_taken(self) -> str:
+    def _level_assumed_note(self) -> str:
         extra = ladder_remedy(self.observations, parameters("angle_offset"))
         cure = f"; add {join(extra)} to find it" if extra else ""
         return (
@@ -298,9 +323,9 @@ class _Session:
         )
 
 
-def _determines_all(found: Estimated) -> bool:
-    """Whether all of the accelerometers is determined, and the tilt with it."""
+def _determines_all(found: ParameterEstimate) -> bool:
+    """Whether all parameters of the accelerometers and the tilt are determined."""
     if not found.acc.dof and not found.acc.chi2 and not found.names:
         return False
-    open_ = {group_of(n) for n in found.missing}
+    open_ = {group_of(n) for n in found.undetermined}
     return not open_ & {"acc_bias", "acc_scale", *TILTS}

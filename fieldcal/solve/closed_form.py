@@ -23,14 +23,16 @@ import numpy as np
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
 from fieldcal.model.causes.planned import PLAIN
-from fieldcal.solve.closed import Closed
+from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
 
-APART = 1e-4
+MIN_FORCE_DIFFERENCE = 1e-4
 """Least difference of specific force between the positions, as a share of gravity."""
 
 
-def two_position(observations: Observations, as_printed: bool = False) -> Closed:
+def two_position(
+    observations: Observations, as_printed: bool = False
+) -> ClosedFormEstimate:
     """Bias and scale factor of the accelerometers, (11)-(14).
 
     An axis that both positions load alike has no scale factor here, and no bias unless
@@ -53,8 +55,8 @@ def two_position(observations: Observations, as_printed: bool = False) -> Closed
         )
     g = observations.gravity
     f = printed_forces(observations) if as_printed else observations.forces
-    scaled = np.abs(f[0] - f[1]) > APART * g
-    bare = (np.abs(f) < APART * g).all(axis=0) & ~scaled
+    scaled = np.abs(f[0] - f[1]) > MIN_FORCE_DIFFERENCE * g
+    bare = (np.abs(f) < MIN_FORCE_DIFFERENCE * g).all(axis=0) & ~scaled
     if not scaled.any():
         raise NotObservable(
             f"{observations.positions[0].name} and {observations.positions[1].name} "
@@ -69,12 +71,12 @@ def two_position(observations: Observations, as_printed: bool = False) -> Closed
             gain[axis, :, axis] = np.array([1.0, 0.0]) - f[0, axis] * slope  # (11) (14)
         elif bare[axis]:
             gain[axis, :, axis] = 0.5  # (11), both windows
-    whole = Closed.of(PLAIN, gain, observations, ACC)
-    return whole.only(np.concatenate([scaled | bare, scaled]))
+    whole = ClosedFormEstimate.of(PLAIN, gain, observations, ACC)
+    return whole.subset(np.concatenate([scaled | bare, scaled]))
 
 
 def printed_forces(observations: Observations) -> Array:
-    """Reference (5) as printed, in device axes, (n, 3) m/s^2; not for use."""
+    """Forces by (5) as printed, with its error, in device axes, (n, 3) m/s^2."""
     f = observations.forces @ observations.mounting.T
     f[:, 2] *= -1.0
     printed: Array = f @ observations.mounting

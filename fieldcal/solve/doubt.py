@@ -1,4 +1,4 @@
-"""A position that disagrees with the others: how likely that is, and what to do."""
+"""A position that disagrees with the others, with its probability and the remedy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class DoubtfulPosition:
 
     Attributes
     ----------
-    name : of the position
+    name : name of the position
     probability : that its window is bad
 
     """
@@ -27,7 +27,7 @@ class DoubtfulPosition:
 
     @classmethod
     def of(cls, observations: Observations, bad: Array) -> DoubtfulPosition | None:
-        """The worst position, (n,) probabilities; None where all positions agree."""
+        """The most doubtful position by probabilities (n,); None if all agree."""
         worst = int(bad.argmax())
         if bad[worst] < thresholds.SUSPECT:
             return None
@@ -44,7 +44,7 @@ class DoubtfulPosition:
 
     @property
     def sentence(self) -> str:
-        """What happened, and what to do."""
+        """The disagreement, and the remedy."""
         if self.probability > thresholds.CERTAIN:
             return (
                 f"the position {self.name} disagrees with all others and was given no"

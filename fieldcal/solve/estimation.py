@@ -1,4 +1,4 @@
-"""A given set fitted to rows, and the parameters that follow.
+"""A parameter set fitted to rows, and the estimate of its parameters.
 
 The set is fitted until it converges (`settling`). The result there is averaged over the
 effects that may exist in addition to the requested parameters (`averaging`).
@@ -23,98 +23,107 @@ from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turning
-from fieldcal.solve.agreement import Fit, agreement
+from fieldcal.solve.agreement import TriadFit, triad_agreement
 from fieldcal.solve.averaging import (
-    Parameters,
-    averaged_over,
-    determined,
-    known_rows,
-    picked_by,
+    AllParameters,
+    average_explanations,
+    lot_rows,
+    parameter_matrix,
+    select_determined,
 )
-from fieldcal.solve.given import Given, Wanted
+from fieldcal.solve.explanations import WeightedExplanation, bias_scale_at_end
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.reliability import WrongAngles, wrong_angles
-from fieldcal.solve.settling import without_bad_windows
-from fieldcal.solve.shown import Shown, at_end
+from fieldcal.solve.settling import settle_without_bad_windows
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
-    """Rows of the windows, and the samples between them.
+class RecordedRows:
+    """Rows of the windows, and the samples of the turns between them.
 
     Attributes
     ----------
-    rows : of the windows
-    since : (o, n) s since the turn
-    source : the samples of turns that are to be followed
-    shown : explanations of the recording
-    filters : rows of what filters of the sensors make of turns, as the accelerometers
-        show it on the way: (m, 2) by s^2 of each triad, and (m,)
-    cut : m/s^2, 1 sigma, what each accelerometer's values may have lost in size where
-        they were cut toward zero
+    rows : rows of the windows
+    since_turn : (o, n) time since the last turn, s, by origin
+    source : samples of the turns; None if turns are not used
+    explanations : explanations of the recording
+    filters : equations of the second-order delay of the sensors' filters, measured by
+        the accelerometers during turns: matrix (m, 2) by s^2 of each triad, and
+        right-hand side (m,)
+    cut_sigma : how much smaller each accelerometer's values may be because they were
+        rounded toward zero, 1 sigma, m/s^2
 
     """
 
     rows: Rows
-    since: Array
+    since_turn: Array
     source: RowSource | None = None
-    shown: tuple[Shown, ...] = ()
+    explanations: tuple[WeightedExplanation, ...] = ()
     filters: tuple[Array, Array] | None = None
-    cut: tuple[float, ...] = ()
+    cut_sigma: tuple[float, ...] = ()
 
-    def turning(self) -> Turning | None:
-        """Whoever follows the turns, if there are any."""
+    def turn_integrator(self) -> Turning | None:
+        """Return the integrator of the turns; None if there are no turns."""
         if self.source is None:
             return None
-        found = Turning(self.source, self.rows, self.since)
+        found = Turning(self.source, self.rows, self.since_turn)
         return found if found.legs else None
 
 
 @dataclass(frozen=True, slots=True)
-class Estimated:
-    """A given set, estimated.
+class ParameterEstimate:
+    """Estimate of the parameters of a set.
 
     Attributes
     ----------
-    given : the set
-    every : all parameters of the set, in its order
+    parameter_set : the set
+    all_parameters : all parameters of the set, in its order
     names : (k,) parameters that the rows determine
     values, covariance : (k,), (k, k)
-    missing : parameters that they do not determine
-    found : the mixture of the likeliest explanation
-    score : ln of the evidence of the set from all windows, before any is left out:
-        sets that leave out others have nothing to compare
-    moved : by how many sigmas what is carried moves each parameter, (k,)
-    acc, gyr : how well the windows agree
-    turns : rows of the turns
-    contradicted : windows that count, between which the gyroscopes say that the device
-        went elsewhere
-    wrong_angles : what wrong angles would do without being noticed
-    search : of the same rows
+    undetermined : parameters that the rows do not determine
+    mixture : posterior of the likeliest explanation
+    score : log evidence of the set from all windows, before any is left out. Only this
+        value can be compared between sets
+    shift_sigmas : (k,) by how many sigmas the unrequested effects move each parameter
+    search : weighs sets of causes by the same rows
+    acc, gyr : how well the windows of each triad agree
+    turn_rows : rows of the turns
+    contradicted_turns : pairs of used windows between which the rotation measured by
+        the gyroscopes contradicts the positions
+    wrong_angles : effect of wrong angles on the parameters, and how well it shows
 
     """
 
-    given: Given
-    every: Parameters
+    parameter_set: ParameterSet
+    all_parameters: AllParameters
     names: tuple[str, ...]
     values: Array
     covariance: Array
-    missing: tuple[str, ...]
-    found: Mixture
+    undetermined: tuple[str, ...]
+    mixture: Mixture
     score: float
-    moved: Array
+    shift_sigmas: Array
     search: Search
-    acc: Fit
-    gyr: Fit
-    turns: tuple[TurnRows, ...]
-    contradicted: tuple[tuple[int, int], ...] = ()
+    acc: TriadFit
+    gyr: TriadFit
+    turn_rows: tuple[TurnRows, ...]
+    contradicted_turns: tuple[tuple[int, int], ...] = ()
     wrong_angles: tuple[WrongAngles, ...] = ()
 
-    def mixed_with(self, one: Estimated, other: Estimated, weight: float) -> Estimated:
-        """The same, with what another model differs by in the uncertainty.
+    def with_model_uncertainty(
+        self, one: ParameterEstimate, other: ParameterEstimate, weight: float
+    ) -> ParameterEstimate:
+        """Add the difference from another model to the covariance.
 
-        `one` is this model fitted to what `other` is fitted to, a model of another
-        tilt or of another rate of the Earth, as likely as `weight`.
-        alpha0 turns about z and beta0 about x: the same angles in the other order.
+        alpha0 turns about z and beta0 about x: these are the tilts of the base, taken
+        in the other order.
+
+        Parameters
+        ----------
+        one : this model, fitted to the rows that `other` is fitted to
+        other : model with another kind of tilt, or another rate of the Earth
+        weight : probability of `other`
+
         """
         twin = {"angle_offset.alpha0_deg": "base_tilt.about_z_deg",
                 "angle_offset.beta0_deg": "base_tilt.about_x_deg"}  # fmt: skip
@@ -125,70 +134,80 @@ class Estimated:
         named = [self.names[i] for i in at]
         apart = np.array([theirs[twin.get(n, n)] - ours[n] for n in named])
         more = np.zeros_like(self.covariance)
-        more[np.ix_(at, at)] = np.outer(apart, apart) + _wider(
-            one.among(named), other.among([twin.get(n, n) for n in named])
+        more[np.ix_(at, at)] = np.outer(apart, apart) + _excess_covariance(
+            one.covariance_of(named),
+            other.covariance_of([twin.get(n, n) for n in named]),
         )
         return replace(self, covariance=self.covariance + weight * more)
 
-    def among(self, names: Sequence[str]) -> Array:
-        """Covariance of some of its parameters, in their order."""
+    def covariance_of(self, names: Sequence[str]) -> Array:
+        """Covariance of the named parameters, in the order of the names."""
         at = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(at, at)]
 
-    def coarser(self, stated: FactoryErrors) -> dict[str, float]:
-        """How likely each kind of error is as in the set, and not as is stated."""
-        state = self.search.evaluated(self.given.members).state
-        left = [group for _, group in self.given.asked if group.cause == "factory"]
-        return chances_of_coarser(state, left, self.given.wanted.factory, stated)
+    def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
+        """Probability that each kind of error is as in the set, and not as stated."""
+        state = self.search.evaluated(self.parameter_set.members).state
+        left = [
+            group
+            for _, group in self.parameter_set.base_members
+            if group.cause == "factory"
+        ]
+        return chances_of_coarser(
+            state, left, self.parameter_set.options.factory, stated
+        )
 
     @property
     def causes(self) -> dict[str, float]:
-        """What the set has that was not asked for, with its probability."""
+        """Unrequested causes in the set, with their probabilities."""
         out: dict[str, float] = {}
-        for one in self.given.explanations:
+        for one in self.parameter_set.explanations:
             told = (cause.name for cause, _ in one.members if cause.told)
             for name in dict.fromkeys(told):
                 out[name] = out.get(name, 0.0) + one.probability
         return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @property
-    def sure(self) -> float:
-        """Probability that something is there that was not asked for."""
+    def any_cause_probability(self) -> float:
+        """Probability that at least one unrequested cause is present."""
         return sum(
             one.probability
-            for one in self.given.explanations
+            for one in self.parameter_set.explanations
             if any(cause.told for cause, _ in one.members)
         )
 
     @property
-    def ended_s(self) -> float | None:
-        """When biases that change are as stated, s since the start."""
-        if not at_end(self.given, self.given.explanations).any():
+    def valid_at_s(self) -> float | None:
+        """Time for which changing biases are stated, s since the start; or None."""
+        if not bias_scale_at_end(
+            self.parameter_set, self.parameter_set.explanations
+        ).any():
             return None
-        x = self.given.x
+        x = self.parameter_set.x
         return float((x.since_start + x.lasts / 2).max())
 
     @property
-    def bad(self) -> Array:
+    def bad_probability(self) -> Array:
         """Probability that each window is bad, (n,) in the order of the positions."""
-        out = np.zeros(int(self.given.held.max()) + 1)
-        out[self.given.held] = self.found.bad
+        out = np.zeros(int(self.parameter_set.held.max()) + 1)
+        out[self.parameter_set.held] = self.mixture.bad
         return out
 
     @property
-    def closures(self) -> tuple[float, int]:
-        """Sum of squares of the turns' closures, and how many there are."""
-        full = np.zeros(self.given.width)
-        np.add.at(full, self.found.columns, self.found.mean)
+    def closure_squares(self) -> tuple[float, int]:
+        """Sum of squares of the normalised closures of turns, and their number."""
+        full = np.zeros(self.parameter_set.width)
+        np.add.at(full, self.mixture.columns, self.mixture.mean)
         off = [
-            (t.closure - t.design @ full[t.columns]) ** 2 * t.info for t in self.turns
+            (t.closure - t.design @ full[t.columns]) ** 2 * t.info
+            for t in self.turn_rows
         ]
         white = np.concatenate([np.zeros(0), *off])
         return float(white.sum()), len(white)
 
 
-def _wider(ours: Array, theirs: Array) -> Array:
-    """By how much a covariance is larger, in directions in which it is."""
+def _excess_covariance(ours: Array, theirs: Array) -> Array:
+    """Excess of the covariance `theirs` over `ours`, where it is larger; else zero."""
     sigma = np.sqrt(np.diag(ours))
     size, along = np.linalg.eigh((theirs - ours) / np.outer(sigma, sigma))
     along = along * sigma[:, None]
@@ -196,65 +215,70 @@ def _wider(ours: Array, theirs: Array) -> Array:
     return larger
 
 
-def estimated(
-    recorded: Recorded,
+def estimate_parameters(
+    recorded: RecordedRows,
     turning: Turning | None,
     nominal: State,
-    wanted: Wanted,
+    wanted: ParameterSetOptions,
     averaged: bool = True,
-) -> Estimated:
-    """Fit a set.
+) -> ParameterEstimate:
+    """Fit a parameter set to rows.
 
     Parameters
     ----------
-    recorded : rows
-    turning : of the same, if turns are to be used
-    nominal : the state that is started from
-    wanted : what the set is made of
-    averaged : whether over all explanations, or the likeliest is enough
+    recorded : the rows
+    turning : integrator of their turns; None if turns are not used
+    nominal : state to start from
+    wanted : contents of the set
+    averaged : whether to average over all explanations; otherwise the likeliest one
 
     """
-    given = Given(
-        recorded.rows, np.abs(nominal.scale), recorded.since, turning is not None,
-        wanted, recorded.shown, recorded.cut,
+    parameter_set = ParameterSet(
+        recorded.rows, np.abs(nominal.scale), recorded.since_turn, turning is not None,
+        wanted, recorded.explanations, recorded.cut_sigma,
     )  # fmt: skip
-    given.known = _known(given, recorded, nominal)
-    turns = None if turning is None else Turns(turning, given, False)
-    fit = without_bad_windows(recorded.rows, given, nominal, turns)
-    found, gram = fit.found, fit.gram
-    parameters = averaged_over(given, gram, found, nominal, averaged)
-    picked = picked_by(given, found.columns)
-    names, values, covariance, moved, missing = determined(given, parameters)
-    at = [given.names.index(name) for name in names]
+    parameter_set.known = _known_rows(parameter_set, recorded, nominal)
+    turns = None if turning is None else Turns(turning, parameter_set, False)
+    fit = settle_without_bad_windows(recorded.rows, parameter_set, nominal, turns)
+    found, gram = fit.mixture, fit.gram
+    parameters = average_explanations(parameter_set, gram, found, nominal, averaged)
+    picked = parameter_matrix(parameter_set, found.columns)
+    names, values, covariance, moved, missing = select_determined(
+        parameter_set, parameters
+    )
+    at = [parameter_set.names.index(name) for name in names]
     elsewhere = turning.contradicted if turning else ()
-    counts = set(given.held[found.bad <= thresholds.CERTAIN].tolist())
-    return Estimated(
-        given, parameters, names, values, covariance, missing, found, fit.score, moved,
-        Search(given, gram),
-        agreement(gram, given, found, (0, 1, 2)),
-        agreement(gram, given, found, (3, 4, 5)),
-        fit.turned,
+    counts = set(parameter_set.held[found.bad <= thresholds.CERTAIN].tolist())
+    return ParameterEstimate(
+        parameter_set, parameters, names, values, covariance, missing, found,
+        fit.score, moved,
+        Search(parameter_set, gram),
+        triad_agreement(gram, parameter_set, found, (0, 1, 2)),
+        triad_agreement(gram, parameter_set, found, (3, 4, 5)),
+        fit.turn_rows,
         tuple(pair for pair in elsewhere if counts.issuperset(pair)),
-        tuple(wrong_angles(given, found, names, picked[at])),
+        tuple(wrong_angles(parameter_set, found, names, picked[at])),
     )  # fmt: skip
 
 
-def _known(given: Given, recorded: Recorded, nominal: State) -> KnownRows | None:
-    """What the lot and the way between the windows say of columns."""
-    lot, rows = given.wanted.lot, []
-    if lot is not None and (known := known_rows(given, lot, nominal)) is not None:
+def _known_rows(
+    parameter_set: ParameterSet, recorded: RecordedRows, nominal: State
+) -> KnownRows | None:
+    """Prior knowledge of columns from the lot and from the accelerometers in turns."""
+    lot, rows = parameter_set.options.lot, []
+    if lot is not None and (known := lot_rows(parameter_set, lot, nominal)) is not None:
         rows.append(known)
-    group, seen = given.filters, recorded.filters
+    group, seen = parameter_set.filters, recorded.filters
     if group is not None and seen is not None and len(seen[1]):
         rows.append(KnownRows(group.columns, *seen))
     return KnownRows.joined(rows) if rows else None
 
 
-def scatter_of(found: Mixture, channels: tuple[int, ...]) -> float:
-    """Rms of what windows of a triad are off by beside their noise; outputs."""
+def window_scatter(found: Mixture, channels: tuple[int, ...]) -> float:
+    """Rms scatter of the windows of a triad beyond their noise, in outputs."""
     return float(np.sqrt(np.mean(found.scatter[list(channels)] ** 2)))
 
 
-def turns_scatter(found: Mixture) -> float:
-    """The same of turns' closures, rad."""
+def closure_scatter(found: Mixture) -> float:
+    """Rms scatter of the closures of turns beyond their noise, rad."""
     return float(found.scatter[CLOSURE])

@@ -30,9 +30,9 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
-from fieldcal.solve.closed import Closed
+from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
-from fieldcal.solve.rank import determined
+from fieldcal.solve.rank import determined_parameters
 
 Found = dict[str, Array]
 
@@ -44,7 +44,7 @@ STEP = 1e-30
 
 @dataclass(frozen=True, slots=True)
 class AxisEstimates:
-    """What each procedure axis gives by itself.
+    """Estimates from each procedure axis alone.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def axis_estimates(
     outputs = observations.mean[:, ACC] @ p.T
     noise = p @ observations.covariance[:, ACC, ACC] @ p.T
     tables = expansion(observations)
-    usable = [bool(determined(f)[0].all()) for f in tables]
+    usable = [bool(determined_parameters(f)[0].all()) for f in tables]
     if not any(usable):
         raise NotObservable(
             f"{len(observations)} positions separate bias, scale factor and tilt on "
@@ -95,7 +95,7 @@ def axis_estimates(
     by_output = np.concatenate(rows)
     coefficients = np.einsum("knc,nc->k", by_output, outputs)
     limits = np.cumsum([0, *(len(r) for r in rows)])
-    names, values, slope = _differentiated(
+    names, values, slope = _parameters_with_derivatives(
         coefficients, limits, observations.gravity, as_printed
     )
     gain = np.tensordot(slope, by_output, axes=1)
@@ -103,18 +103,22 @@ def axis_estimates(
     return AxisEstimates(names, values, gain, covariance)
 
 
-def five_position(observations: Observations, as_printed: bool = False) -> Closed:
+def five_position(
+    observations: Observations, as_printed: bool = False
+) -> ClosedFormEstimate:
     """Bias, scale factor and offset of the joints from five positions or more.
 
     Parameters and errors as of `axis_estimates`.
     """
     each = axis_estimates(observations, as_printed)
     pick, names = _parameter_rows(each, observations.mounting)
-    return Closed(names, pick @ each.values, pick @ each.covariance @ pick.T)
+    return ClosedFormEstimate(
+        names, pick @ each.values, pick @ each.covariance @ pick.T
+    )
 
 
 def expansion(observations: Observations) -> tuple[Array, Array, Array]:
-    """Functions of the angles that each axis is expanded in, (n, 3 or 5) each."""
+    """Functions of the angles for the expansion of each axis, (n, 3 or 5) each."""
     a, b = observations.angles
     sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
     one = np.ones_like(a)
@@ -123,36 +127,40 @@ def expansion(observations: Observations) -> tuple[Array, Array, Array]:
     return x, yz, yz
 
 
-def _differentiated(
+def _parameters_with_derivatives(
     c: Array, limits: Array, g: float, as_printed: bool
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Parameters from all coefficients, and their derivatives by them."""
     stepped = np.vstack([c + 0j, c + 1j * STEP * np.eye(len(c))]).T
     x, y, z = (stepped[i:j] for i, j in pairwise(limits))
-    found = _of_offset(x, y, z, g, as_printed)
+    found = _parameters_of_axes(x, y, z, g, as_printed)
     table = np.stack(list(found.values()))
     return tuple(found), table[:, 0].real, table[:, 1:].imag / STEP
 
 
-def _of_offset(x: Array, y: Array, z: Array, g: float, as_printed: bool) -> Found:
+def _parameters_of_axes(
+    x: Array, y: Array, z: Array, g: float, as_printed: bool
+) -> Found:
     """(21)-(23), (27)-(34); coefficients (k, ...) of each axis, none if not usable."""
     out: Found = {}
     if len(x):
         a0 = x[1] / x[2] if as_printed else x[2] / x[1]  # (23)
-        out |= _axis("x", x, -x[1], g, as_printed)
+        out |= _bias_and_scale("x", x, -x[1], g, as_printed)
         out["x.alpha0_deg"] = np.arctan(a0) / RAD
     if len(y):
-        out |= _axis("y", y, -y[1], g, as_printed)
+        out |= _bias_and_scale("y", y, -y[1], g, as_printed)
         out["y.alpha0_deg"] = -np.arctan(y[3] / y[1]) / RAD  # (29)
         out["y.beta0_deg"] = -np.arctan(y[2] / y[1]) / RAD  # (28)
     if len(z):
-        out |= _axis("z", z, z[2], g, as_printed)
+        out |= _bias_and_scale("z", z, z[2], g, as_printed)
         out["z.alpha0_deg"] = -np.arctan(z[4] / z[2]) / RAD  # (33)
         out["z.beta0_deg"] = np.arctan(z[1] / z[2]) / RAD  # (32)
     return out
 
 
-def _axis(axis: str, c: Array, lead: Array, g: float, as_printed: bool) -> Found:
+def _bias_and_scale(
+    axis: str, c: Array, lead: Array, g: float, as_printed: bool
+) -> Found:
     """Bias (21) (27) (31) and scale factor (22) (30) (34) of an axis."""
     sign = 1.0 if as_printed else np.sign(lead[0].real)
     norm = np.sqrt((c[1:] ** 2).sum(axis=0))

@@ -5,7 +5,7 @@ positions are inclined enough, it can therefore be distinguished from the biases
 
     U sin(phi) = U sin(stated) - d,    d ~ N(0, U^2)                               (1)
 
-A latitude of the wrong sign shows in nothing else, since gravity is the same on both
+A latitude of the wrong sign is not visible otherwise, since gravity is the same on both
 hemispheres. Whether the latitude is wrong is decided as for any cause, by the evidence
 of the set with d and without it. A simulated device may have no Earth's rate at all;
 this is a third hypothesis, with its own fit.
@@ -21,49 +21,49 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.search.selection import Search
-from fieldcal.solve.given import Given
+from fieldcal.solve.parameter_set import ParameterSet
 
 VERTICAL = 1
-"""Place of the vertical among the columns of the Earth's rate; it points down."""
+"""Index of the vertical in the columns of the Earth's rate; it points down."""
 
 
 @dataclass(frozen=True, slots=True)
-class EarthVertical:
-    """The Earth's rate about the vertical, as gyroscopes show it.
+class VerticalEarthRate:
+    """The Earth's rate about the vertical, as measured by the gyroscopes.
 
     Attributes
     ----------
-    stated : by the latitude, rad/s, upwards
-    shown, sigma : rad/s
-    gain : ln of evidence times chance, for another latitude than the stated one
+    stated : rate by the stated latitude, rad/s, upwards
+    measured, sigma : measured rate and its uncertainty, rad/s
+    gain : log odds of another latitude against the stated one
 
     """
 
     stated: float
-    shown: float
+    measured: float
     sigma: float
     gain: float
 
     @classmethod
     def of(
-        cls, given: Given, search: Search, latitude: float | None
-    ) -> EarthVertical | None:
-        """What the rows of a set show, (1); None where they have no such column.
+        cls, parameter_set: ParameterSet, search: Search, latitude: float | None
+    ) -> VerticalEarthRate | None:
+        """Measure by the rows of a set, (1); None if the set has no such column.
 
         Parameters
         ----------
-        given : the set
+        parameter_set : the set
         search : of its rows
-        latitude : that is stated, rad; None where none is
+        latitude : stated latitude, rad; None if none is stated
 
         """
-        if given.earth < 0 or latitude is None:
+        if parameter_set.earth < 0 or latitude is None:
             return None
-        column = np.array([given.earth + VERTICAL])
+        column = np.array([parameter_set.earth + VERTICAL])
         group = Group("earth", "vertical", column, np.array([EARTH_RATE]), fixed=1.0)
         other = Cause(group.cause, group.part, priors.ELSEWHERE, (group,), "given")
-        as_said = search.evaluated(given.members)
-        free = search.evaluated((*given.members, (other, group)))
+        as_said = search.evaluated(parameter_set.members)
+        free = search.evaluated((*parameter_set.members, (other, group)))
         at = free.state.columns == column[0]
         stated = EARTH_RATE * float(np.sin(latitude))
         return cls(
@@ -74,27 +74,27 @@ class EarthVertical:
         )
 
     @property
-    def favoured(self) -> bool:
-        """Whether the rows speak for another one at all, possible or not."""
+    def other_favoured(self) -> bool:
+        """Whether the evidence favours another latitude, possible or not."""
         return self.gain > float(np.log(priors.ELSEWHERE))
 
     @property
-    def wrong(self) -> bool:
-        """Whether it is likelier that of another latitude; what none has is no such."""
-        beyond = abs(self.shown) - EARTH_RATE
+    def latitude_wrong(self) -> bool:
+        """Whether another latitude is probable, with a rate possible on the Earth."""
+        beyond = abs(self.measured) - EARTH_RATE
         named = np.log(thresholds.NAMED / (1 - thresholds.NAMED))
         return self.gain > float(named) and beyond < 2 * self.sigma
 
     @property
     def sentence(self) -> str:
-        """What is wrong, and what to do."""
-        sine = np.clip(self.shown / EARTH_RATE, -1.0, 1.0)
+        """The contradiction, and the remedy."""
+        sine = np.clip(self.measured / EARTH_RATE, -1.0, 1.0)
         degrees, stated = (
             np.rad2deg(np.arcsin(s)) for s in (sine, self.stated / EARTH_RATE)
         )
         return (
             f"the gyroscopes show the Earth's rate of latitude {degrees:.0f}°"
-            f" ({self.shown:.2g} ± {self.sigma:.1g} rad/s about the vertical), not of"
-            f" {stated:.4g}°: south is negative; mend latitude_deg in [site], or the"
+            f" ({self.measured:.2g} ± {self.sigma:.1g} rad/s about the vertical), not"
+            f" of {stated:.4g}°: south is negative; mend latitude_deg in [site], or the"
             " signs of the gyroscopes' axes, and solve again"
         )

@@ -12,19 +12,19 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import GYR
-from fieldcal.solve.closed import Closed
+from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
-from fieldcal.solve.rank import determined
+from fieldcal.solve.rank import determined_parameters
 
 
-def gyroscopes(observations: Observations) -> Closed:
+def gyroscopes(observations: Observations) -> ClosedFormEstimate:
     """Bias, scale factor, cross-coupling, (3.3)."""
     g = np.column_stack([np.ones(len(observations)), observations.rates])
-    known, _ = determined(g)
+    known, _ = determined_parameters(g)
     inverse = np.linalg.pinv(g[:, known])  # (3.3)
     gain = np.einsum("kn,cd->kcnd", inverse, np.eye(3)).reshape(-1, len(g), 3)
     kept = [n for row, k in zip(_names(), known, strict=True) if k for n in row]
-    return Closed.of(kept, gain, observations, GYR)
+    return ClosedFormEstimate.of(kept, gain, observations, GYR)
 
 
 def _names() -> list[list[str]]:

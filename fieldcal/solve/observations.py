@@ -98,7 +98,7 @@ class Observations:
         return cls(
             tuple(positions),
             np.array([a.mean for a in averages]),
-            np.array([_regular(a.covariance) for a in averages]),
+            np.array([_regularised(a.covariance) for a in averages]),
             gravity,
             np.array([a.temperature for a in averages]),
             np.array([(a.start + a.end) / 2 for a in averages]),
@@ -195,7 +195,7 @@ class Observations:
             raise InputError("there is no position: mark at least two")
 
     def _check_numbers(self, sensor: str, three: slice) -> None:
-        # on a table that turns nothing is asked of the accelerometers
+        # accelerometers are not used while a rate table turns
         rows = np.flatnonzero(~self.rotating) if three == ACC else np.arange(len(self))
         mean = self.mean[rows, three]
         cov = self.covariance[rows, three, three]
@@ -216,8 +216,8 @@ class Observations:
             )
 
 
-def _regular(covariance: Array) -> Array:
-    """Drop correlations that a window is too short to know; they make it singular."""
+def _regularised(covariance: Array) -> Array:
+    """Drop correlations if they make the covariance of a short window singular."""
     out = covariance.copy()
     for three in (ACC, GYR):
         block = out[three, three]

@@ -17,23 +17,23 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.solve import least_squares
-from fieldcal.solve.assumed import Asked
-from fieldcal.solve.closed import Closed
 from fieldcal.solve.closed_form import two_position
+from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.five_position import five_position
 from fieldcal.solve.observations import Observations
-from fieldcal.solve.rank import determined
+from fieldcal.solve.options import SolveOptions
+from fieldcal.solve.rank import determined_parameters
 from fieldcal.solve.result import UNITS
 
 METHODS = ("two_position", "five_position")
 
 TWO = "as printed: the sign of (5) makes the scale factor of z negative"
 FIVE = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
-"""Said of the misprints of each method."""
+"""Warning about the misprints of each method."""
 
 
-def solve(observations: Observations, asked: Asked) -> Calibration:
-    """Everything that the print gives.
+def solve(observations: Observations, options: SolveOptions) -> Calibration:
+    """Calibration by the printed formulas.
 
     Raises
     ------
@@ -41,8 +41,8 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
         If no formula is printed for the method, or for one of the positions.
 
     """
-    _refuse(observations, asked)
-    parts, sentences, method = [], [], asked.method
+    _check_supported(observations, options)
+    parts, sentences, method = [], [], options.method
     still = np.flatnonzero(~observations.rotating)
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
@@ -73,11 +73,11 @@ def solve(observations: Observations, asked: Asked) -> Calibration:
     )
 
 
-def _refuse(observations: Observations, asked: Asked) -> None:
-    """Refuse what the paper prints no formula for."""
-    if asked.method not in ("auto", *METHODS):
+def _check_supported(observations: Observations, options: SolveOptions) -> None:
+    """Refuse methods and positions for which no formula is printed."""
+    if options.method not in ("auto", *METHODS):
         raise InputError(
-            f"the paper prints no {asked.method} method: as printed are two_position"
+            f"the paper prints no {options.method} method: as printed are two_position"
             " and five_position"
         )
     if third := [p.name for p in observations.positions if p.gamma]:
@@ -100,8 +100,8 @@ def _refuse(observations: Observations, asked: Asked) -> None:
         )
 
 
-def _gyroscopes(observations: Observations) -> Closed:
-    """Bias, and what the positions or rates give besides."""
+def _gyroscopes(observations: Observations) -> ClosedFormEstimate:
+    """Bias of the gyroscopes, and what positions or rates determine besides."""
     n = len(observations)
     if observations.rotating.any():
         return least_squares.gyroscopes(observations)
@@ -110,27 +110,29 @@ def _gyroscopes(observations: Observations) -> Closed:
         and observations.latitude is not None
         and n > 1
     ):
-        return _by_the_earth(observations)
+        return _bias_and_scale_by_earth_rate(observations)
     gain = np.tile(np.eye(3)[:, None] / n, (1, n, 1))  # (36)
-    return Closed.of([f"gyr_bias.{a}" for a in "xyz"], gain, observations, GYR)
+    return ClosedFormEstimate.of(
+        [f"gyr_bias.{a}" for a in "xyz"], gain, observations, GYR
+    )
 
 
-def _by_the_earth(observations: Observations) -> Closed:
+def _bias_and_scale_by_earth_rate(observations: Observations) -> ClosedFormEstimate:
     """Bias and scale factor, (42)-(48), channel by channel."""
     w = printed_earth_rate(observations) @ observations.mounting
     gain = np.zeros((6, len(observations), 3))
     kept = np.ones(6, dtype=bool)
     for axis in range(3):
         design = np.column_stack([np.ones(len(observations)), w[:, axis]])  # (42)
-        known, _ = determined(design)
+        known, _ = determined_parameters(design)
         kept[[axis, 3 + axis]] = known
         gain[axis, :, axis], gain[3 + axis, :, axis] = np.linalg.pinv(design)
     names = [f"gyr_{kind}.{a}" for kind in ("bias", "scale") for a in "xyz"]
-    return Closed.of(names, gain, observations, GYR).only(kept)
+    return ClosedFormEstimate.of(names, gain, observations, GYR).subset(kept)
 
 
 def printed_earth_rate(observations: Observations) -> Array:
-    """Reference (40), (41) as printed, in procedure axes, (n, 3) rad/s; not for use."""
+    """Earth's rate by (40), (41) as printed, in procedure axes, (n, 3) rad/s."""
     a, b = observations.angles
     up, north = (EARTH_RATE * f(observations.known_latitude) for f in (np.sin, np.cos))
     third = -up * np.sin(a) * np.sin(b) + north * np.cos(b)  # (41), sin for cos alpha

@@ -1,4 +1,4 @@
-"""Parameters that a design determines, and further positions for the other ones.
+"""Parameters that a design determines, and positions that determine the others.
 
 Columns are scaled to length one, so that the rank does not depend on units; directions
 whose singular value is below `RCOND` of the largest are not determined, nor is a
@@ -29,8 +29,8 @@ ROUNDING = 1e-12
 LEAK = 1e-4
 """Share of a null direction above which a parameter counts as not determined."""
 
-MOST = 4
-"""Positions that are proposed; of more, another procedure is the answer."""
+MAX_POSITIONS = 4
+"""Largest number of proposed positions; beyond it another procedure is needed."""
 
 LADDER = tuple(
     Position.deg(a, b)
@@ -40,10 +40,10 @@ LADDER = tuple(
 """Positions that can be proposed: first within a small ladder, then beyond it."""
 
 
-def determined(rows: Array) -> tuple[Mask, int]:
+def determined_parameters(rows: Array) -> tuple[Mask, int]:
     """Which parameters (p,) a design (m, p) determines, and its rank."""
     scale = np.linalg.norm(rows, axis=0)
-    # sin(180°) is not quite zero: what is left of such a column is rounding
+    # sin(180°) is not quite zero: such a column contains only rounding errors
     scale = np.where(scale > ROUNDING * scale.max(initial=0.0), scale, np.inf)
     _, s, vt = np.linalg.svd(rows / scale, full_matrices=True)
     rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())
@@ -51,7 +51,7 @@ def determined(rows: Array) -> tuple[Mask, int]:
     return known, rank
 
 
-def remedy(
+def positions_to_add(
     rows: Callable[[Sequence[Position]], Array],
     taken: Sequence[Position],
     candidates: Sequence[Position],
@@ -69,13 +69,13 @@ def remedy(
 
     def count(places: Sequence[Position]) -> tuple[int, int]:
         table = rows(places)
-        known, rank = determined(table.reshape(-1, table.shape[-1]))
+        known, rank = determined_parameters(table.reshape(-1, table.shape[-1]))
         return int(known.sum()), rank  # ties go to what raises the rank
 
     everything = rows(taken).shape[-1]
     have = count(taken)
     while have[0] < everything:
-        if len(extra) == MOST:
+        if len(extra) == MAX_POSITIONS:
             return []
         found = [count([*taken, *extra, c]) for c in candidates]
         best = max(range(len(found)), key=found.__getitem__)
@@ -88,11 +88,11 @@ def remedy(
 def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]:
     """Names of the fewest positions of `LADDER` that would determine parameters.
 
-    Positions without angles say nothing that is linear in the parameters.
+    Positions without angles are ignored: they are not linear in the parameters.
     """
     known = [p for p in observations.positions if p.oriented]
 
     def rows(places: Sequence[Position]) -> Array:
         return design(names, places, observations.gravity, observations.mounting)
 
-    return [p.name for p in remedy(rows, known, LADDER)]
+    return [p.name for p in positions_to_add(rows, known, LADDER)]

@@ -26,22 +26,23 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.posterior.mixture import Mixture
-from fieldcal.solve.given import Given
+from fieldcal.solve.parameter_set import ParameterSet
 
 JOINTS = ("α", "β")
 
 
 @dataclass(frozen=True, slots=True)
 class WrongAngles:
-    """A mistake of its largest size.
+    """A mistake of set angles at its largest size.
 
     Attributes
     ----------
     joint : index of the joint
-    angle_deg : that is wrong wherever it is set; None of a position alone or a gauge
-    position : number of the one that is wrong, from 0; None of several
-    shows : l of (1)
-    moves : d t of (1) by full name
+    angle_deg : angle that is wrong wherever it is set; None for a single position, or
+        for all angles in proportion
+    position : number of the single wrong position, from 0; None for several
+    shows : l of (1), how well the mistake shows
+    moves : d t of (1), shift of each parameter by full name
 
     """
 
@@ -52,7 +53,7 @@ class WrongAngles:
     moves: Mapping[str, float]
 
     @property
-    def says(self) -> str:
+    def description(self) -> str:
         """The mistake in words."""
         name = JOINTS[self.joint]
         if self.position is not None:
@@ -62,8 +63,8 @@ class WrongAngles:
             return f"{name} = {self.angle_deg:.4g}° set {by}"
         return f"every {name} set {priors.GAUGE:.1%} too far"
 
-    def off_at(self, alpha: float, beta: float) -> tuple[float, float]:
-        """What the same mistake makes of another position's angles, rad."""
+    def error_at(self, alpha: float, beta: float) -> tuple[float, float]:
+        """Error of the angles of another position by the same mistake, rad."""
         angle = (alpha, beta)[self.joint]
         off = 0.0
         if self.position is None and self.angle_deg is None:
@@ -91,18 +92,22 @@ class WrongAngles:
 
 
 def wrong_angles(
-    given: Given, found: Mixture, names: tuple[str, ...], picked: Array
+    parameter_set: ParameterSet, found: Mixture, names: tuple[str, ...], picked: Array
 ) -> list[WrongAngles]:
-    """Mistakes of the angles of a set.
+    """Effects of all possible mistakes of angles on an estimate.
 
     Parameters
     ----------
-    given, found : the set and its estimate
+    parameter_set, found : the set and its posterior
     names : (k,) parameters
-    picked : (k, c) each of them by the columns of the estimate
+    picked : (k, c) derivative of the parameters by the columns of the estimate
 
     """
-    own = [g for _, g in given.asked if g.cause == "angle_setting" and g.part == "own"]
+    own = [
+        g
+        for _, g in parameter_set.base_members
+        if g.cause == "angle_setting" and g.part == "own"
+    ]
     if not own:
         return []
     order = np.argsort(found.columns)
@@ -111,9 +116,9 @@ def wrong_angles(
     told = found.covariance[np.ix_(at, at)]
     shown = np.diag(weight) - weight[:, None] * told * weight
     moved = -picked @ found.covariance[:, at] * weight
-    places: Index = (own[0].columns[::2] - given.small_rotation) // 2
+    places: Index = (own[0].columns[::2] - parameter_set.small_rotation) // 2
     out = []
-    for joint, angle, position, u in _mistakes(given, places):
+    for joint, angle, position, u in _mistakes(parameter_set, places):
         shows = max(float(u @ shown @ u), 0.0) ** 0.5
         moves = dict(zip(names, (moved @ u).tolist(), strict=True))
         out.append(WrongAngles(joint, angle, position, shows, moves))
@@ -121,10 +126,10 @@ def wrong_angles(
 
 
 def _mistakes(
-    given: Given, places: Index
+    parameter_set: ParameterSet, places: Index
 ) -> Iterator[tuple[int, float | None, int | None, Array]]:
-    """Joint, angle, position and what each angle is off by, (2 p,) rad."""
-    x = given.x
+    """Joint, angle, position and errors of all angles, (2 p,) rad, of each mistake."""
+    x = parameter_set.x
     rows = [int(np.argmax(x.position == p)) for p in places]
     for joint, angles in enumerate((x.alpha[rows], x.beta[rows])):
         for i, place in enumerate(places.tolist()):

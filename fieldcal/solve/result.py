@@ -1,4 +1,4 @@
-"""An estimated set as a calibration, with its warnings."""
+"""Makes a calibration with warnings from an estimate."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from fieldcal.calibration import Calibration, Method
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.names import group_of, sensor_of
-from fieldcal.calibration.plausible import elsewhere, senseless
+from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.errors import NotObservable
 from fieldcal.model import thresholds
 from fieldcal.solve import words
-from fieldcal.solve.assumed import Asked
-from fieldcal.solve.borrowed import Borrowed
+from fieldcal.solve.cross_coupling_effect import largest_cross_coupling_effect
 from fieldcal.solve.doubt import DoubtfulPosition
-from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
-from fieldcal.solve.latitude import EarthVertical
-from fieldcal.solve.magnified import magnified
+from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
+from fieldcal.solve.latitude import VerticalEarthRate
+from fieldcal.solve.lot_contribution import LotContribution
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.solve.warnings import (
+    agreement_warnings,
     closure_chi2,
-    contradicted,
-    doubts,
-    left_open,
-    not_levelled,
+    contradiction_warnings,
+    level_warnings,
+    undetermined_warnings,
 )
 
 UNITS = {group: unit for group, (_, _, unit) in GROUPS.items()}
@@ -35,15 +35,15 @@ UNITS |= {"angle_offset": "deg", "base_tilt": "deg"}
 """Unit of each group's components."""
 
 
-def calibration(
+def build_calibration(
     method: Method,
     observations: Observations,
-    asked: Asked,
-    found: Estimated,
+    options: SolveOptions,
+    estimate: ParameterEstimate,
     notes: Sequence[str],
-    told: Borrowed | None = None,
+    lot_contribution: LotContribution | None = None,
 ) -> Calibration:
-    """Put an estimate into a calibration.
+    """Make a calibration from an estimate.
 
     Raises
     ------
@@ -51,15 +51,21 @@ def calibration(
         If it has no parameter.
 
     """
-    names, sigma = found.names, np.sqrt(np.diag(found.covariance))
-    worst = magnified(found)
+    names, sigma = estimate.names, np.sqrt(np.diag(estimate.covariance))
+    worst = largest_cross_coupling_effect(estimate)
     sentences = [
-        words.carried(found.sure, found.causes, names, found.moved, found.ended_s),
-        told.sentence if told else "",
-        *left_open(method, observations, found),
+        words.effects_warning(
+            estimate.any_cause_probability,
+            estimate.causes,
+            names,
+            estimate.shift_sigmas,
+            estimate.valid_at_s,
+        ),
+        lot_contribution.sentence if lot_contribution else "",
+        *undetermined_warnings(method, observations, estimate),
         worst.sentence if worst else "",
         *notes,
-        *not_levelled(method, asked, observations),
+        *level_warnings(method, options, observations),
     ]
     if not names:
         raise NotObservable(
@@ -67,24 +73,24 @@ def calibration(
         )
     of_acc = any(map(_is_acc, names))
     odd = [
-        *senseless(names, found.values, sigma, observations.nominal),
-        *elsewhere(_named(found.contradicted, observations)),
-        *_wrong_latitude(found, observations),
-        *contradicted(observations, found, of_acc),
+        *implausible_values(names, estimate.values, sigma, observations.nominal),
+        *misdirected_turns(_turn_names(estimate.contradicted_turns, observations)),
+        *_wrong_latitude(estimate, observations),
+        *contradiction_warnings(observations, estimate, of_acc),
     ]
-    sentences += doubts(method, observations, found)
-    fit = found.acc if of_acc else found.gyr
-    info = _info(method, observations, asked, found)
-    info |= {"borrowed": told.to_json()} if told else {}
+    sentences += agreement_warnings(method, observations, estimate)
+    fit = estimate.acc if of_acc else estimate.gyr
+    info = _info(method, observations, options, estimate)
+    info |= {"borrowed": lot_contribution.to_json()} if lot_contribution else {}
     return Calibration(
         method=method,
         names=names,
-        values=found.values,
-        covariance=found.covariance,
+        values=estimate.values,
+        covariance=estimate.covariance,
         units=tuple(UNITS[group_of(n)] for n in names),
         chi2=fit.chi2,
         dof=fit.dof,
-        rms=found.acc.rms,
+        rms=estimate.acc.rms,
         warnings=tuple(dict.fromkeys(w for w in [*odd, *sentences] if w)),
         good=not odd,
         info=info,
@@ -96,7 +102,7 @@ def _is_acc(name: str) -> bool:
     return sensor_of(group_of(name)) == "acc"
 
 
-def _named(
+def _turn_names(
     turns: Sequence[tuple[int, int]], observations: Observations
 ) -> list[tuple[str, str]]:
     """Turns by the names of the positions at their ends."""
@@ -104,42 +110,51 @@ def _named(
     return [(names[before], names[behind]) for before, behind in turns]
 
 
-def _wrong_latitude(found: Estimated, observations: Observations) -> list[str]:
-    """A latitude that the gyroscopes contradict."""
-    shown = EarthVertical.of(found.given, found.search, observations.latitude)
-    return [shown.sentence] if shown and shown.wrong else []
+def _wrong_latitude(
+    estimate: ParameterEstimate, observations: Observations
+) -> list[str]:
+    """Sentence if the gyroscopes contradict the stated latitude."""
+    shown = VerticalEarthRate.of(
+        estimate.parameter_set, estimate.search, observations.latitude
+    )
+    return [shown.sentence] if shown and shown.latitude_wrong else []
 
 
-def _harms(wrong: WrongAngles, found: Estimated) -> bool:
+def _is_harmful(wrong: WrongAngles, estimate: ParameterEstimate) -> bool:
     """Whether wrong angles could move a parameter beyond its uncertainty."""
-    sigma = np.sqrt(np.diag(found.covariance))
+    sigma = np.sqrt(np.diag(estimate.covariance))
     return any(
         abs(wrong.moves[name]) > thresholds.MOVED_WRONG * s
-        for name, s in zip(found.names, sigma, strict=True)
+        for name, s in zip(estimate.names, sigma, strict=True)
     )
 
 
-def _carried(observations: Observations, found: Estimated) -> dict[str, Any]:
-    """What the set has that was not asked for, and what that does."""
-    moved = dict(zip(found.names, found.moved.tolist(), strict=True))
-    out: dict[str, Any] = {"causes": found.causes, "moved_sigmas": moved}
-    if found.ended_s is not None:
+def _carried_info(
+    observations: Observations, estimate: ParameterEstimate
+) -> dict[str, Any]:
+    """Unrequested causes in the set, and their effects on the parameters."""
+    moved = dict(zip(estimate.names, estimate.shift_sigmas.tolist(), strict=True))
+    out: dict[str, Any] = {"causes": estimate.causes, "moved_sigmas": moved}
+    if estimate.valid_at_s is not None:
         last = (
             float(observations.temperature[-1])
             if len(observations.temperature)
             else np.nan
         )
         warm = last if np.isfinite(last) else None
-        out["as_of"] = {"since_start_s": found.ended_s, "temperature_degc": warm}
+        out["as_of"] = {"since_start_s": estimate.valid_at_s, "temperature_degc": warm}
     return out
 
 
 def _info(
-    method: Method, observations: Observations, asked: Asked, found: Estimated
+    method: Method,
+    observations: Observations,
+    options: SolveOptions,
+    estimate: ParameterEstimate,
 ) -> dict[str, Any]:
     known = observations.temperature[np.isfinite(observations.temperature)]
     latitude = observations.latitude
-    wanted = found.given.wanted
+    wanted = estimate.parameter_set.options
     out: dict[str, Any] = {
         "conditions": {
             "positions": len(observations),
@@ -149,10 +164,10 @@ def _info(
             "temperature_sd_k": float(known.std()) if len(known) else None,
             "grade": observations.grade,
         },
-        "bad_position": [round(float(p), 4) for p in found.bad],
-        "extra_scatter": scatter_of(found.found, (0, 1, 2)),
-        "log_evidence": found.score,
-        "angle_sigma_deg": asked.angles_deg,
+        "bad_position": [round(float(p), 4) for p in estimate.bad_probability],
+        "extra_scatter": window_scatter(estimate.mixture, (0, 1, 2)),
+        "log_evidence": estimate.score,
+        "angle_sigma_deg": options.angles_deg,
         "square_sigma": 0.0 if wanted.cross else wanted.factory.cross_coupling,
         "quadratic_sigma": wanted.factory.quadratic,
         "g_sensitivity_sigma": wanted.factory.g_sensitivity,
@@ -160,27 +175,27 @@ def _info(
         "gyr_bias_per_k_sigma": wanted.factory.gyr_per_k,
         "acc_hysteresis_sigma": wanted.factory.hysteresis,
     }
-    if doubt := DoubtfulPosition.of(observations, found.bad):
+    if doubt := DoubtfulPosition.of(observations, estimate.bad_probability):
         out["doubtful_position"] = doubt.to_json()
-    if np.isfinite(found.acc.left_out):
-        out["left_out_rms"] = found.acc.left_out
-    if found.given.wanted.level_deg:
-        out["level_sigma_deg"] = found.given.wanted.level_deg
+    if np.isfinite(estimate.acc.held_out_rms):
+        out["left_out_rms"] = estimate.acc.held_out_rms
+    if estimate.parameter_set.options.level_deg:
+        out["level_sigma_deg"] = estimate.parameter_set.options.level_deg
     if wanted.tilt != "none" and wanted.beside_tilt_deg:
         out["beside_tilt_sigma_deg"] = wanted.beside_tilt_deg
     if observations.has_gyr:
-        gyr = found.gyr
+        gyr = estimate.gyr
         out["gyroscopes"] = {
             "chi2": gyr.chi2, "dof": gyr.dof, "unit": "rad/s",
             "rms": gyr.rms if np.isfinite(gyr.rms) else None,
-            "extra_scatter": scatter_of(found.found, (3, 4, 5)),
+            "extra_scatter": window_scatter(estimate.mixture, (3, 4, 5)),
         }  # fmt: skip
-    if harmful := [w for w in found.wrong_angles if _harms(w, found)]:
+    if harmful := [w for w in estimate.wrong_angles if _is_harmful(w, estimate)]:
         out["wrong_angles"] = [w.to_json() for w in harmful]
-    if found.causes or found.ended_s is not None:
-        out["carried"] = _carried(observations, found)
-    if found.turns:
-        chi2, dof = closure_chi2(found)
-        scatter = turns_scatter(found.found)
+    if estimate.causes or estimate.valid_at_s is not None:
+        out["carried"] = _carried_info(observations, estimate)
+    if estimate.turn_rows:
+        chi2, dof = closure_chi2(estimate)
+        scatter = closure_scatter(estimate.mixture)
         out["turns"] = {"chi2": chi2, "dof": dof, "scatter_rad": scatter}
     return out

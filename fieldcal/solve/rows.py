@@ -1,4 +1,4 @@
-"""Rows of windows of which only the means are known, one row for each.
+"""Rows of windows of which only the means are known: one row for each window.
 
 A recording has several rows for each window (`model.reduce`). A table of means, and a
 procedure that is still running, have only the means and their covariances.
@@ -18,27 +18,27 @@ from fieldcal.model.rows.orientation import free_force
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.rows.turntable import Readings
 from fieldcal.physics.experience import Experience
-from fieldcal.solve.estimation import Recorded
+from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.observations import Observations
 
 
-def of_means(observations: Observations) -> Recorded:
+def rows_of_means(observations: Observations) -> RecordedRows:
     """One row for each window; correlations between outputs are not kept."""
     n, nominal = len(observations), observations.nominal
     index = np.arange(n)
     y = observations.mean.copy()
-    told = variances(observations)
+    told = mean_variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
     read = Readings(
         observations.positions,
         index,
         (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
-        _earth(observations),
+        _earth_rate_at_rest(observations),
     )
     x = Experience.at_rest(
         *observations.angles,
         observations.gravity,
-        f=_force(observations),
+        f=_measured_force(observations),
         t=np.where(np.isfinite(observations.time), observations.time, index),
         position=index,
         gamma=third_angles(observations.positions),
@@ -56,17 +56,17 @@ def of_means(observations: Observations) -> Recorded:
     x = replace(x, w=np.where(free[:, None], read.earth_rates(), x.w))
     sd[~x.force_known, :3] = np.nan
     common = np.zeros_like(sd)
-    common[x.earth_unseen, 3:] = unseen_earth(nominal.gyr_scale) * (n > 1)
+    common[x.earth_unseen, 3:] = unknown_earth_rate(nominal.gyr_scale) * (n > 1)
     level = np.median(sd, axis=0)
     span = np.column_stack([x.t, x.t])
     rows = Rows(x, y, sd, common, np.ones(n), level, span, np.zeros(n))
-    return Recorded(rows, np.full((1, n), np.inf))
+    return RecordedRows(rows, np.full((1, n), np.inf))
 
 
 def without_angles(rows: Rows, nominal: Nominal) -> Rows:
-    """Rows of which nobody says how the device lay: the force is along what is read.
+    """Rows with unknown orientation: the force is along the measured one.
 
-    Where a table turns, or the accelerometers say nothing, it stays as it is.
+    Rows on a turning table, or without accelerometers, keep their force.
     """
     x, nowhere = rows.x, np.full(len(rows.x), np.nan)
     apart = (rows.y[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
@@ -76,26 +76,25 @@ def without_angles(rows: Rows, nominal: Nominal) -> Rows:
     return replace(rows, x=replace(x, alpha=nowhere, beta=nowhere, f=f))
 
 
-def variances(observations: Observations) -> Array:
-    """Of the means, (n, 6); of windows whose orientation is free along the force alone.
+def mean_variances(observations: Observations) -> Array:
+    """Variances of the means, (n, 6).
 
-    A device that turns a little at rest, as in a hand, is unsteady across it, and that
-    its free orientation takes up.
+    If the orientation is unknown, that along the force is taken for all three axes: the
+    motion of a device held in a hand is across it, and changes only the orientation.
     """
     out: Array = np.einsum("nii->ni", observations.covariance).copy()
     free = ~observations.oriented & np.isfinite(observations.mean[:, ACC]).all(axis=1)
-    f = _force(observations)[free]
+    f = _measured_force(observations)[free]
     up = f / np.linalg.norm(f, axis=1, keepdims=True)
     along = np.einsum("ni,nij,nj->n", up, observations.covariance[free, ACC, ACC], up)
     out[free, ACC] = along[:, None]
     return out
 
 
-def widened(rows: Rows, known: Array) -> Rows:
-    """Rows whose windows' means are as uncertain as each window's spectrum says.
+def with_window_variances(rows: Rows, known: Array) -> Rows:
+    """Rows whose windows have means of given variances `known`, (p, 6).
 
-    `known` (p, 6) are the variances; what they are beyond white noise all rows of a
-    window share.
+    The part beyond white noise is an error that all rows of a window have in common.
     """
     common = rows.common.copy()
     for p in np.unique(rows.x.position):
@@ -107,8 +106,8 @@ def widened(rows: Rows, known: Array) -> Rows:
     return replace(rows, common=common)
 
 
-def _earth(observations: Observations) -> float:
-    """Length of the rate at rest, rad/s; 0 where the gyroscopes do not see it."""
+def _earth_rate_at_rest(observations: Observations) -> float:
+    """Size of the angular rate at rest, rad/s; 0 if gyroscopes do not resolve it."""
     if observations.grade != "navigation":
         return 0.0
     if observations.latitude is None:
@@ -117,10 +116,10 @@ def _earth(observations: Observations) -> float:
     return float(np.linalg.norm(rate))
 
 
-def _force(observations: Observations) -> Array:
-    """Force along what the accelerometers read, (n, 3) m/s^2.
+def _measured_force(observations: Observations) -> Array:
+    """Force along the measured one, (n, 3) m/s^2.
 
-    Any direction will do where they say nothing.
+    The direction is arbitrary where it was not measured.
     """
     nominal = observations.nominal
     apart = (observations.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
@@ -128,7 +127,7 @@ def _force(observations: Observations) -> Array:
     return free_force(observations.gravity, np.arange(len(observations)), apart)
 
 
-def unseen_earth(scale: Array | tuple[float, ...]) -> Array:
-    """What the Earth's rate adds where orientations are not known, (3,) outputs."""
+def unknown_earth_rate(scale: Array | tuple[float, ...]) -> Array:
+    """Error from the Earth's rate in unknown orientations, 1 sigma, (3,) outputs."""
     size: Array = EARTH_RATE / np.sqrt(3) * np.abs(np.asarray(scale))
     return size

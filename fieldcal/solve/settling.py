@@ -1,4 +1,4 @@
-"""A given set fitted to rows: linearised until it converges, without bad windows.
+"""Fits a parameter set to rows: linearised until it converges, without bad windows.
 
 The state is moved to the estimate of the set (`model.inference`), turns between windows
 are integrated with this state, and the most probable explanation is taken (`mixture`).
@@ -20,58 +20,60 @@ from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.solve.averaging import mixed
-from fieldcal.solve.given import Given
+from fieldcal.solve.averaging import mixture_with_causes
 from fieldcal.solve.observations import Mask
+from fieldcal.solve.parameter_set import ParameterSet
 
 FOLLOWED, NEAR = 6, 0.01
-"""Times that turns are followed at most, and the change of a scale factor from which
-once more: they are followed again in the end, and what is linear in a change leaves its
-square, 1e-4 and then 1e-8."""
+"""Largest number of integrations of the turns, and the change of a scale factor from
+which they are integrated again. The error of linearisation is the square of the change:
+1e-4, and 1e-8 after the last integration."""
 
 NO_WEIGHT = 1e5
-"""Times its noise that a bad window is given where it must not bend the state."""
+"""Factor on the noise of a bad window that must not influence the state."""
 
 
 @dataclass(frozen=True, slots=True)
 class SettledSet:
-    """A set at the state where it settled.
+    """A parameter set fitted about the state to which it converged.
 
     Attributes
     ----------
-    found : the mixture of the likeliest explanation
-    gram : products of rows and columns there
-    turned : rows of the turns there
-    score : ln of its evidence from all windows, before any was left out
+    mixture : posterior of the likeliest explanation
+    gram : products of rows and columns
+    turn_rows : rows of the turns
+    score : log evidence from all windows, before any was left out
 
     """
 
-    found: Mixture
+    mixture: Mixture
     gram: Gram
-    turned: tuple[TurnRows, ...]
+    turn_rows: tuple[TurnRows, ...]
     score: float
 
 
-def without_bad_windows(
-    rows: Rows, given: Given, nominal: State, turns: Turns | None
+def settle_without_bad_windows(
+    rows: Rows, parameter_set: ParameterSet, nominal: State, turns: Turns | None
 ) -> SettledSet:
-    """The fit of the windows that agree, while those left out are few."""
+    """Fit the windows that agree; few may be left out."""
 
     def inference(left: Mask) -> Inference:
         return Inference(
-            WindowSystem(_without_windows(rows, given, left), given), nominal, turns
+            WindowSystem(_without_windows(rows, parameter_set, left), parameter_set),
+            nominal,
+            turns,
         )
 
-    bad, score = np.zeros(len(given.held), dtype=bool), np.nan
+    bad, score = np.zeros(len(parameter_set.held), dtype=bool), np.nan
     # one bad window of six can be told from scatter, two of six cannot
     most = max(1, len(bad) // 6)
     for _ in range(1 + most):
         now = inference(bad)
-        gram, found = _settled_fit(now, now, given)
+        gram, found = _settled_fit(now, now, parameter_set)
         worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
         if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
-            # a gross error bends the state so far that nothing is linear about it
-            gram, found = _settled_fit(now, inference(bad | worst), given)
+            # a gross error moves the state out of the linear range
+            gram, found = _settled_fit(now, inference(bad | worst), parameter_set)
         if not bad.any():
             score = found.score
         worst &= (found.bad > thresholds.CERTAIN) & ~bad
@@ -83,62 +85,72 @@ def without_bad_windows(
 
 
 def _settled_fit(
-    inference: Inference, settling: Inference, given: Given
+    inference: Inference, settling: Inference, parameter_set: ParameterSet
 ) -> tuple[Gram, Mixture]:
-    """The likeliest explanation about the state where other rows have settled."""
-    gram = inference.gram(*_settled(settling, given), None)
-    return gram, mixed(given, Search(given, gram), given.explanations[0].members)
+    """Fit of the likeliest explanation about the state to which other rows converge."""
+    gram = inference.gram(*_settled_state(settling, parameter_set), None)
+    return gram, mixture_with_causes(
+        parameter_set,
+        Search(parameter_set, gram),
+        parameter_set.explanations[0].members,
+    )
 
 
-def _without_windows(rows: Rows, given: Given, bad: Mask) -> Rows:
-    """Rows of which some windows (p,) have no weight."""
-    left = np.isin(rows.x.position, given.held[bad])
+def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows:
+    """Rows in which bad windows (p,) have no weight."""
+    left = np.isin(rows.x.position, parameter_set.held[bad])
     return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
 
 
-def _settled(inference: Inference, given: Given) -> tuple[State, Array]:
-    """The state where the set has settled, and the columns' values in it."""
-    start: Array = np.zeros(given.width)
-    state, values, _ = inference.settled(inference.nominal, start, given.members)
+def _settled_state(
+    inference: Inference, parameter_set: ParameterSet
+) -> tuple[State, Array]:
+    """The state to which the set converges, and the values of its columns there."""
+    start: Array = np.zeros(parameter_set.width)
+    state, values, _ = inference.settled(
+        inference.nominal, start, parameter_set.members
+    )
     if inference.turns is None:
         return state, values
-    # windows see no rate but the Earth's, too little to follow turns by
-    gyr = np.s_[given.scale + 3 : given.scale + 6]
+    # windows measure only the Earth's rate: too little for scale factors of gyroscopes
+    gyr = np.s_[parameter_set.scale + 3 : parameter_set.scale + 6]
     values[gyr] = 0.0
     nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
     state = replace(state, scale=nominal)
-    state, values = _followed_first(inference, given, state, values)
+    state, values = _follow_turns_first(inference, parameter_set, state, values)
     for again in range(FOLLOWED):
         if again:
             inference.followed(state, values)
         before = state.scale
-        state, values, _ = inference.settled(state, values, given.members)
+        state, values, _ = inference.settled(state, values, parameter_set.members)
         if np.abs(state.scale / before - 1).max() < NEAR:
             break
     return state, values
 
 
-def _followed_first(
-    inference: Inference, given: Given, state: State, values: Array
+def _follow_turns_first(
+    inference: Inference, parameter_set: ParameterSet, state: State, values: Array
 ) -> tuple[State, Array]:
-    """Follow the turns by the state that windows led to; back comes where to go on.
+    """Integrate the turns with the state from the windows, or with the nominal one.
 
-    What windows leave open may be anywhere in that state, and gyroscopes then lead
-    elsewhere for no other reason. If they do so in fewer turns where everything is
-    nominal, those turns are what tells the rest.
+    Parameters that the windows do not determine may be far off in that state, so that
+    turns contradict the positions. If fewer turns do so with nominal parameters, the
+    fit continues from there. Returns the state and the values to continue with.
     """
-    astray = _astray(inference, state, values)
+    astray = _contradicted_turns(inference, state, values)
     if not astray:
         return state, values
-    nothing: Array = np.zeros(given.width)
-    if _astray(inference, inference.nominal, nothing) < astray:
-        state, values, _ = inference.settled(inference.nominal, nothing, given.members)
+    nothing: Array = np.zeros(parameter_set.width)
+    if _contradicted_turns(inference, inference.nominal, nothing) < astray:
+        state, values, _ = inference.settled(
+            inference.nominal, nothing, parameter_set.members
+        )
         return state, values
     inference.followed(state, values)
     return state, values
 
 
-def _astray(inference: Inference, state: State, values: Array) -> int:
-    """In how many turns the gyroscopes lead elsewhere by a state."""
+def _contradicted_turns(inference: Inference, state: State, values: Array) -> int:
+    """Number of turns that contradict the positions, integrated with a state."""
     inference.followed(state, values)
     return len(inference.turns.turning.contradicted) if inference.turns else 0

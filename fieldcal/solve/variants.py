@@ -1,6 +1,6 @@
-"""Variants of an explanation: on other axes, and with other shapes, of its causes.
+"""Variants of an explanation, with its causes on other axes and with other shapes.
 
-The search names the axes that show a cause beyond doubt, and the shape that fits best.
+The search names the axes that certainly show a cause, and the shape that fits best.
 Whether other axes have it too, and its time constant or instant, remain uncertain. An
 explanation is therefore the mean over its variants, each weighted by its evidence over
 all sizes with the other causes unchanged ((3) of `model.evidence`). There are hundreds,
@@ -17,56 +17,61 @@ from fieldcal.model.evidence.gram import Eliminated, gains
 from fieldcal.model.evidence.sets import chances
 from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member
 from fieldcal.model.search.selection import Search
-from fieldcal.solve.shown import Shown, has_equation
+from fieldcal.solve.explanations import WeightedExplanation, has_equation
 
 POINTS = 24
-"""Variants of a certain explanation that stand for all of them; of one less likely so
-many fewer."""
+"""Number of variants that represent all variants of a certain explanation; it falls in
+proportion to the probability of the explanation."""
 
 HAIR = 1e-6
-"""By which a point lies before its place: where variants mirror one another, half of
-the probability ends between two of them, and rounding would decide which is taken."""
+"""Offset of points. With variants that mirror each other, a point may lie just between
+two of them, and rounding would decide which one is taken."""
 
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 """Their square roots spread points evenly over the causes beyond the first; where there
 are more causes, over several of them alike."""
 
 
-def variants(search: Search, known: tuple[Member, ...], one: Shown) -> list[Shown]:
+def variants(
+    search: Search, known: tuple[Member, ...], one: WeightedExplanation
+) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
     Parameters
     ----------
     search : over the rows
-    known : what the set has beside
+    known : the other members of the set
     one : the explanation
 
     """
     each = [_choices(search, (*known, *one.members), m) for m in one.members]
-    each += [_with_and_without(search, (*known, *one.members), m) for m in one.maybe]
+    each += [
+        _with_and_without(search, (*known, *one.members), m)
+        for m in one.possible_members
+    ]
     share: dict[tuple[Member, ...], float] = {}
-    points = spread(len(each), max(1, round(POINTS * one.probability)))
+    points = spread_points(len(each), max(1, round(POINTS * one.probability)))
     for at in points:
         picked = [
-            choices[reached(weight, u)]
+            choices[choice_at(weight, u)]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
         members = tuple(m for some in picked for m in some)
         share[members] = share.get(members, 0.0) + 1 / len(points)
-    return [Shown(members, p) for members, p in share.items()]
+    return [WeightedExplanation(members, p) for members, p in share.items()]
 
 
-def reached(weight: Array, u: float) -> int:
-    """Which of some choices of probability (k,) a point of the unit line lies in.
+def choice_at(weight: Array, u: float) -> int:
+    """Index of the choice, of probabilities (k,), in which a point of 0 to 1 lies.
 
-    >>> reached(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
+    >>> choice_at(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
     1
     """
     return int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))
 
 
-def spread(count: int, points: int = POINTS) -> Array:
-    """Points spread evenly over a cube, (points, count); in the middle of one line."""
+def spread_points(count: int, points: int = POINTS) -> Array:
+    """Points spread evenly over the unit cube, (points, count)."""
     if not count:
         return np.full((1, 0), 0.5)
     step = np.array([1 / points, *np.resize(np.sqrt(PRIMES), count - 1)])
@@ -77,7 +82,7 @@ def spread(count: int, points: int = POINTS) -> Array:
 def _choices(
     search: Search, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
-    """Variants of a cause of a set, and how likely each is."""
+    """Variants of a cause of a set, and their probabilities."""
     cause, group = member
     if not (has_equation(group) and cause.variants[1:]):
         return [(member,)], np.ones(1)
@@ -89,9 +94,9 @@ def _choices(
 def _with_and_without(
     search: Search, members: tuple[Member, ...], member: Member
 ) -> tuple[list[tuple[Member, ...]], Array]:
-    """A set as it is or with one variant of a further cause, and how likely each is.
+    """No further cause, or one of its variants, and their probabilities.
 
-    The best variant's evidence is that with windows as unstable as they are beside it.
+    The evidence of the best variant includes a new estimate of the instability.
     """
     cause = member[0]
     score = _scores(search, members, member)
@@ -104,9 +109,9 @@ def _with_and_without(
 
 
 def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Array:
-    """Evidence of every variant of a cause beside the other members, over all sizes.
+    """Log evidence of each variant of a cause with the other members, over all sizes.
 
-    Times how likely each is before the rows are seen, where that differs.
+    It includes the prior probability of each variant.
     """
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
@@ -133,7 +138,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
 def _without_columns(
     search: Search, members: tuple[Member, ...], own: Index
 ) -> Eliminated:
-    """A set without some columns, windows being as unstable as with them."""
+    """A set without some columns, with the instability of windows unchanged."""
     full = search.evaluated(members)
     kept = ~np.isin(full.state.columns, own)
     rows = search.weighed(full.sizes.instability)

@@ -2,12 +2,12 @@
 
     U_i += sum_k s_ik c_k(t) f_i,   s_ik = N(0, (r b_k / g)^2)                     (1)
 
-c_k(t) are the courses by which the temperature changes the biases, b_k how large the
-change of the biases by each is, and r the part of that which a scale factor changes by
-at 1 g. A position that is taken once cannot tell (1) from other scale factors, and the
-next flight starts with what they have become. The MPU-6050 states 0.02 %/K beside 35 mg
+c_k(t) are the courses by which the temperature changes the biases, b_k the sizes of
+these changes, and r the change of a scale factor at 1 g as a part of that of a bias.
+Positions that are taken once cannot distinguish (1) from constant scale factors, but
+the next flight starts with the changed ones. The MPU-6050 states 0.02 %/K, and 35 mg
 from 25 to 70 degC, which is r = 0.25. A smooth course of biases that no effect
-describes counts as made by the temperature: it is what changes most of them.
+describes is attributed to the temperature, the most frequent cause.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 
 ACC = 3
-"""Outputs of accelerometers, the first ones of all."""
+"""Number of outputs of accelerometers; they come first."""
 
 WARM_SCALE = "warm_scale"
-"""What these groups are called."""
+"""Name of these groups."""
 
 COURSES = ("time", "temperature")
-"""Functions without physics that may be the temperature's."""
+"""Functions without physics that may be an effect of the temperature."""
 
 
 def warm_scale(table: ColumnTable, group: Group) -> Member | None:
-    """What changes the scale factors beside a group that changes the biases.
+    """Change of scale factors that accompanies a group that changes biases.
 
     Parameters
     ----------
     table : to which the columns are added
-    group : none comes back unless it may follow the temperature and is on
-        accelerometers
+    group : the result is None unless the group may be an effect of the temperature and
+        is on accelerometers
 
     """
     if not _thermal(group):
@@ -67,7 +67,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
 
 
 def _thermal(group: Group) -> bool:
-    """Whether it may be the temperature that makes a group."""
+    """Whether a group may be an effect of the temperature."""
     effect = group.effect
     if effect is None:
         return group.cause in COURSES
@@ -75,9 +75,9 @@ def _thermal(group: Group) -> bool:
 
 
 def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
-    """Courses of a group's columns, which of them, and how large biases are by each.
+    """Course of a group, its columns on accelerometers, and sizes of the biases.
 
-    Those on accelerometers alone, m/s^2.
+    Sizes are in m/s^2.
     """
     first, basis = next(
         (first, basis)

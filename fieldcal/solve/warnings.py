@@ -1,4 +1,4 @@
-"""Warnings about a calibration: what is undetermined, unchecked, or scatters much.
+"""Warnings about a calibration: undetermined parameters, missing checks, scatter.
 
 Each is one sentence that also says what to do.
 """
@@ -17,10 +17,10 @@ from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.core.sentences import join
 from fieldcal.model import thresholds
 from fieldcal.solve import words
-from fieldcal.solve.assumed import Asked
 from fieldcal.solve.doubt import DoubtfulPosition
-from fieldcal.solve.estimation import Estimated, scatter_of, turns_scatter
+from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.rank import ladder_remedy
 
 OF_ACC = frozenset(
@@ -32,27 +32,27 @@ OF_TURNS = frozenset({"gyr_scale", "gyro_cross_coupling"})
 """Groups that turns determine."""
 
 
-def left_open(
-    method: Method, observations: Observations, found: Estimated
+def undetermined_warnings(
+    method: Method, observations: Observations, estimate: ParameterEstimate
 ) -> list[str]:
     """Parameters that are not determined, and positions that would determine them."""
     sentences = []
-    acc = [n for n in found.missing if group_of(n) in OF_ACC]
-    if acc and found.given.wanted.level_deg is not None:
+    acc = [n for n in estimate.undetermined if group_of(n) in OF_ACC]
+    if acc and estimate.parameter_set.options.level_deg is not None:
         acc = [n for n in acc if group_of(n) != "base_tilt"]
     if acc:
         sentences.append(
-            _scalar(acc, found, len(observations))
+            _norm_warning(acc, estimate, len(observations))
             if method == "scalar"
             else words.not_determined(
-                acc, _remedy(observations, found), "these positions"
+                acc, _remedy(observations, estimate), "these positions"
             )
         )
-        if not any(group_of(n) in OF_ACC for n in found.names):
-            sentences.append(_length(observations))
-    gyr = [n for n in found.missing if group_of(n) == "gyr_scale"]
-    cross = [n for n in found.missing if group_of(n) == "gyro_cross_coupling"]
-    if not found.given.wanted.gyr_scale and observations.has_gyr:
+        if not any(group_of(n) in OF_ACC for n in estimate.names):
+            sentences.append(_force_length_warning(observations))
+    gyr = [n for n in estimate.undetermined if group_of(n) == "gyr_scale"]
+    cross = [n for n in estimate.undetermined if group_of(n) == "gyro_cross_coupling"]
+    if not estimate.parameter_set.options.gyr_scale and observations.has_gyr:
         sentences.append(
             "gyr_scale is not determined: the Earth's rate gives it only with two "
             "known positions and the latitude"
@@ -60,11 +60,11 @@ def left_open(
             else words.NO_SCALE
         )
     elif gyr or cross:
-        sentences.append(_turning(gyr, cross, observations, found))
+        sentences.append(_gyroscope_warning(gyr, cross, observations, estimate))
     return sentences
 
 
-def _length(observations: Observations) -> str:
+def _force_length_warning(observations: Observations) -> str:
     """Warning that the force at rest is not gravity, if no parameter explains it.
 
     Empty if it is within the range of gravity on the Earth.
@@ -84,23 +84,26 @@ def _length(observations: Observations) -> str:
     )
 
 
-def _remedy(observations: Observations, found: Estimated) -> list[str]:
-    """Positions that would determine them."""
-    names = [n for n in found.given.names if group_of(n) in OF_ACC]
-    if any(n in found.missing for n in names) and not observations.rotating.any():
+def _remedy(observations: Observations, estimate: ParameterEstimate) -> list[str]:
+    """Positions that would determine parameters of the accelerometers."""
+    names = [n for n in estimate.parameter_set.names if group_of(n) in OF_ACC]
+    if (
+        any(n in estimate.undetermined for n in names)
+        and not observations.rotating.any()
+    ):
         return ladder_remedy(observations, names)
     return []
 
 
-def _turning(
+def _gyroscope_warning(
     gyr: Sequence[str],
     cross: Sequence[str],
     observations: Observations,
-    found: Estimated,
+    estimate: ParameterEstimate,
 ) -> str:
     """Gyroscope parameters that turns or rates do not determine, with the remedy."""
     missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
-    if not found.given.wanted.turned and not observations.rotating.any():
+    if not estimate.parameter_set.options.turned and not observations.rotating.any():
         return (
             f"{join(missing)} {'are' if missing[1:] else 'is'} not estimated:"
             " the Earth's rate gives it only roughly in these windows; average longer,"
@@ -118,7 +121,7 @@ def _turning(
     return words.not_determined(missing, [level], "these turns")
 
 
-def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
+def _norm_warning(missing: Sequence[str], estimate: ParameterEstimate, n: int) -> str:
     """Parameters that the norm of the force does not determine, with the remedy."""
     hidden = [m for m in missing if group_of(m) == "cross_coupling"]
     if len(hidden) < len(missing):
@@ -130,17 +133,19 @@ def _scalar(missing: Sequence[str], found: Estimated, n: int) -> str:
     why = "axes held up and down alone cannot show it"
     if n < 9:
         why = f"{n} norms cannot determine 9 parameters"
-    elif found.acc.dof in words.FEW:
-        why += f" (and all nine would leave {words.FEW[found.acc.dof]})"
+    elif estimate.acc.dof in words.FEW:
+        why += f" (and all nine would leave {words.FEW[estimate.acc.dof]})"
     return (
         f"{join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
         f" add positions with gravity half way between {join(pairs)}"
     )
 
 
-def not_levelled(method: Method, asked: Asked, observations: Observations) -> list[str]:
+def level_warnings(
+    method: Method, options: SolveOptions, observations: Observations
+) -> list[str]:
     """Warning that the base is assumed level, if nothing else determines its tilt."""
-    if method != "two_position" or asked.level_deg:
+    if method != "two_position" or options.level_deg:
         return []
     moved = observations.gravity * np.deg2rad(0.1)
     return [
@@ -150,19 +155,24 @@ def not_levelled(method: Method, asked: Asked, observations: Observations) -> li
     ]
 
 
-def doubts(method: Method, observations: Observations, found: Estimated) -> list[str]:
+def agreement_warnings(
+    method: Method, observations: Observations, estimate: ParameterEstimate
+) -> list[str]:
     """Warnings about how well the windows agree."""
-    doubt = DoubtfulPosition.of(observations, found.bad)
-    few, scattered = _few(method, found), _scattered(found)
+    doubt = DoubtfulPosition.of(observations, estimate.bad_probability)
+    few, scattered = (
+        _few_windows_warnings(method, estimate),
+        _scatter_warnings(estimate),
+    )
     return [*few, doubt.sentence if doubt else "", *scattered]
 
 
-def contradicted(
-    observations: Observations, found: Estimated, of_acc: bool
+def contradiction_warnings(
+    observations: Observations, estimate: ParameterEstimate, of_acc: bool
 ) -> list[str]:
-    """A fit of forces, or of rates, in which the model is at fault, not the noise."""
-    fit, first = (found.acc, 0) if of_acc else (found.gyr, 3)
-    if not fit.contradicts:
+    """Warning if forces or rates contradict each other: noise cannot explain it."""
+    fit, first = (estimate.acc, 0) if of_acc else (estimate.gyr, 3)
+    if not fit.rejects_model:
         return []
     what = "forces" if of_acc else "rates"
     says = (
@@ -170,53 +180,60 @@ def contradicted(
         f" {fit.dof} degree{'s' if fit.dof > 1 else ''} of freedom, and chance does not"
         " do that"
     )
-    if (far := fit.furthest) is None:
+    if (far := fit.largest) is None:
         return [says]
     unit = CHANNEL_UNITS[first].replace("^2", "²")
     length = f"the length of the {what[:-1]}"
     along = CHANNELS[first + far.axis] if far.axis >= 0 else length
     return [
         f"{says}; furthest from what the others predict is"
-        f" {observations.positions[far.window].name}, {along} by {far.off:+.2g} ±"
+        f" {observations.positions[far.window].name}, {along} by {far.residual:+.2g} ±"
         f" {far.sigma:.1g} {unit}: take that position again, or ask fieldcal diagnose"
         " what is left out"
     ]
 
 
-def _few(method: Method, found: Estimated) -> list[str]:
+def _few_windows_warnings(method: Method, estimate: ParameterEstimate) -> list[str]:
     """Warning that so few windows leave nothing to check the fit."""
-    if np.isnan(found.acc.rms):
+    if np.isnan(estimate.acc.rms):
         return []
-    if found.acc.dof <= 0:
+    if estimate.acc.dof <= 0:
         return [words.NO_DOF]
-    if method == "scalar" and found.acc.dof in words.FEW:
+    if method == "scalar" and estimate.acc.dof in words.FEW:
         return [
-            f"only {words.FEW[found.acc.dof]}: too few to check the fit; add positions"
-            " in other orientations"
+            f"only {words.FEW[estimate.acc.dof]}: too few to check the fit; add"
+            " positions in other orientations"
         ]
     return []
 
 
-def _scattered(found: Estimated) -> list[str]:
+def _scatter_warnings(estimate: ParameterEstimate) -> list[str]:
     """Warnings of scatter beyond the noise."""
-    what = "norms" if found.given.free.all() else "positions"
+    what = "norms" if estimate.parameter_set.free.all() else "positions"
     sentences = []
     for name, agreed, channels in (
-        (what, found.acc, (0, 1, 2)), ("gyroscopes' means", found.gyr, (3, 4, 5)),
+        (what, estimate.acc, (0, 1, 2)), ("gyroscopes' means", estimate.gyr, (3, 4, 5)),
     ):  # fmt: skip
         if not np.isnan(agreed.rms):
-            spread, unit = scatter_of(found.found, channels), CHANNEL_UNITS[channels[0]]
-            sentences.append(words.excess(name, agreed.chi2, agreed.dof, spread, unit))
-    chi2, dof = closure_chi2(found)
+            spread, unit = (
+                window_scatter(estimate.mixture, channels),
+                CHANNEL_UNITS[channels[0]],
+            )
+            sentences.append(
+                words.scatter_warning(name, agreed.chi2, agreed.dof, spread, unit)
+            )
+    chi2, dof = closure_chi2(estimate)
     if dof >= thresholds.TURNS_TELL:
         sentences.append(
-            words.excess("turns", chi2, dof, turns_scatter(found.found), "rad")
+            words.scatter_warning(
+                "turns", chi2, dof, closure_scatter(estimate.mixture), "rad"
+            )
         )
     return sentences
 
 
-def closure_chi2(found: Estimated) -> tuple[float, int]:
+def closure_chi2(estimate: ParameterEstimate) -> tuple[float, int]:
     """Chi-squared of the turns' closures, and its degrees of freedom."""
-    chi2, count = found.closures
-    spent = sum(group_of(n) in OF_TURNS for n in found.names)
+    chi2, count = estimate.closure_squares
+    spent = sum(group_of(n) in OF_TURNS for n in estimate.names)
     return chi2, max(0, count - spent)

@@ -26,24 +26,24 @@ IN_WORDS = {
     "misset": "a position that was set at another angle",
     "repeated_angle": "an angle that is wrong wherever it is set",
 }
-"""What is no effect, by its id."""
+"""Words for causes that are not effects, by id."""
 
 
 def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> str:
-    """Name parameters that the data leave open, and what would fix it."""
+    """Sentence about parameters that are not determined, with the remedy."""
     verb = "are" if len(missing) > 1 else "is"
     cure = f": add {join(remedy)}" if remedy else ""
     return f"{join(missing)} {verb} not determined by {what}{cure}"
 
 
-def chance(chi2: float, dof: int) -> float:
+def chi2_chance(chi2: float, dof: int) -> float:
     """Probability of a chi2 at least as large when only the stated noise acts."""
     return chi2_tail(chi2, dof) if dof > 0 else 1.0
 
 
-def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
+def scatter_warning(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     """Warning of scatter beyond the noise; empty if there is none."""
-    if chi2 <= dof or chance(chi2, dof) >= thresholds.BEYOND_NOISE:
+    if chi2 <= dof or chi2_chance(chi2, dof) >= thresholds.BEYOND_NOISE:
         return ""
     few = " (itself uncertain, with so few degrees of freedom)" if dof < 5 else ""
     cause = "run fieldcal diagnose to see where it comes from"
@@ -60,14 +60,14 @@ def excess(what: str, chi2: float, dof: int, spread: float, unit: str) -> str:
     )
 
 
-def carried(
+def effects_warning(
     sure: float,
     causes: Mapping[str, float],
     names: Sequence[str],
     moved: Array,
     ended_s: float | None,
 ) -> str:
-    """Warning of effects that a result contains unasked; empty if they are unlikely.
+    """Warning of unrequested effects in a result; empty if they are unlikely.
 
     Parameters
     ----------

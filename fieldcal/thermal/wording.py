@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import number, pretty, title
+from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
 from fieldcal.core.gravity import G0
 
 TOLD = 3.0
@@ -28,7 +28,7 @@ def costs(
 
     """
     told = [
-        f"{title(name)} {_signed(change, sigma, GROUPS[group_of(name)][2])}"
+        f"{parameter_title(name)} {_signed(change, sigma, GROUPS[group_of(name)][2])}"
         f"{_means(group_of(name), change)}"
         for name, (change, sigma) in changes.items()
         if abs(change) >= TOLD * sigma
@@ -46,9 +46,9 @@ def document(changes: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
 
 
 def _signed(change: float, sigma: float, unit: str) -> str:
-    value, around = number(change, sigma)
+    value, around = format_with_sigma(change, sigma)
     sign = "" if value.startswith("-") else "+"
-    return f"{sign}{value} ± {around} {pretty(unit)}".rstrip()
+    return f"{sign}{value} ± {around} {format_unit(unit)}".rstrip()
 
 
 def _means(group: str, change: float) -> str:

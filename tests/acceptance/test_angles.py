@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from observed import force, observe
 
-from fieldcal.acceptance.angles import unstated, unwitnessed
+from fieldcal.acceptance.angles import unnoticed_angle_error, unstated_angles_warning
 from fieldcal.acceptance.decision import ANGLES, Circumstances, Decision, decide
 from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
@@ -69,7 +69,7 @@ def held(found: Calibration, alpha: float, beta: float) -> Verification:
 
 
 def test_a_small_ladder_has_no_witness_and_names_the_remedy() -> None:
-    said = unwitnessed(calibrated(five()), about(), BOUNDS, None, None)
+    said = unnoticed_angle_error(calibrated(five()), about(), BOUNDS, None, None)
     assert said.startswith("wrong angles would not be noticed")
     two = calibrated([(0, 0), (45, 5)], used=BOUNDS.angle_setting_deg)
     made = decided(two, about())
@@ -97,7 +97,9 @@ def test_who_is_told_before_a_run_that_nobody_vouches_for_the_angles(
 ) -> None:
     known: list[dict[str, Any]] = [{"alpha_deg": a, "beta_deg": b} for a, b in places]
     known += [{"name": f"face {i}"} for i in range(bare)]
-    said = unstated(parse({"site": {"gravity": G, **site}, "position": known}))
+    said = unstated_angles_warning(
+        parse({"site": {"gravity": G, **site}, "position": known})
+    )
     assert ("--angles 0.01" in said and "± 0.05°" in said) == warned == bool(said)
 
 
@@ -118,31 +120,34 @@ def test_a_word_on_the_angles_is_relied_on_and_repeated(site: dict[str, Any]) ->
 @pytest.mark.parametrize("more", [FACES[1:4] + FACES[4:5], FACES[1:]])
 def test_gravity_on_other_faces_bears_witness(more: list[tuple[float, float]]) -> None:
     found = calibrated([*five(), *more], unknown=len(more))
-    assert unwitnessed(found, about(), BOUNDS, None, None) == ""
+    assert unnoticed_angle_error(found, about(), BOUNDS, None, None) == ""
 
 
 def test_faces_that_are_stated_need_no_witness() -> None:
-    assert unwitnessed(calibrated(FACES), about(), BOUNDS, None, None) == ""
+    assert unnoticed_angle_error(calibrated(FACES), about(), BOUNDS, None, None) == ""
 
 
 def test_a_position_to_verify_bears_witness_where_it_is_another_one() -> None:
     found = calibrated(five())
     same = held(found, 45.0, 0.0)
-    assert unwitnessed(found, about(), BOUNDS, same, None)
+    assert unnoticed_angle_error(found, about(), BOUNDS, same, None)
     other = held(found, -135.0, 45.0)
-    assert unwitnessed(found, about(), BOUNDS, other, None) == ""
+    assert unnoticed_angle_error(found, about(), BOUNDS, other, None) == ""
 
 
 def test_a_certificate_is_taken_at_its_word() -> None:
     site = {"gravity": G, "angles_from": "certificate 4711"}
     assert (
-        unwitnessed(calibrated(five()), parse({"site": site}), BOUNDS, None, None) == ""
+        unnoticed_angle_error(
+            calibrated(five()), parse({"site": site}), BOUNDS, None, None
+        )
+        == ""
     )
 
 
 def test_what_a_program_turned_is_nobodys_statement() -> None:
     found = calibrated(five())
     virtual = about(mover={"kind": "virtual"})
-    assert unwitnessed(found, virtual, BOUNDS, None, None) == ""
+    assert unnoticed_angle_error(found, virtual, BOUNDS, None, None) == ""
     command = about(mover={"kind": "command", "command": ["turn"]})
-    assert unwitnessed(found, command, BOUNDS, None, None)
+    assert unnoticed_angle_error(found, command, BOUNDS, None, None)

@@ -11,8 +11,8 @@ from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
 
 from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
-from fieldcal.acceptance.growth import growth
-from fieldcal.acceptance.verification import proposed, verify
+from fieldcal.acceptance.growth import navigation_errors
+from fieldcal.acceptance.verification import propose_verification, verify
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.document import schema
 from fieldcal.core.errors import InputError
@@ -241,7 +241,7 @@ def test_the_growth_of_errors_is_that_of_a_navigator(axes: tuple[str, ...]) -> N
         attitude = Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * now)
         velocity += (attitude.apply(f) - up) * t / steps
     end = (Rotation.from_rotvec(tilt0) * Rotation.from_rotvec(w * t)).as_rotvec()
-    told = growth(found, G, p, t)
+    told = navigation_errors(found, G, p, t)
     assert told.level == pytest.approx(velocity[:, [0, 2]].std(axis=0).max(), rel=0.07)
     assert told.vertical == pytest.approx(velocity[:, 1].std(), rel=0.07)
     assert told.tilt == pytest.approx(end[:, [0, 2]].std(axis=0).max(), rel=0.07)
@@ -249,7 +249,9 @@ def test_the_growth_of_errors_is_that_of_a_navigator(axes: tuple[str, ...]) -> N
 
 
 def test_growth_is_not_told_of_what_was_not_determined() -> None:
-    told = growth(_only(calibration(), ("acc_bias",)), G, np.eye(3), 60.0).to_json()
+    told = navigation_errors(
+        _only(calibration(), ("acc_bias",)), G, np.eye(3), 60.0
+    ).to_json()
     assert told["heading_sigma_deg"] is None and told["tilt_sigma_deg"] is None
     assert told["vertical_velocity_sigma_m_s"] is not None
 
@@ -272,7 +274,7 @@ def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> A
 
 @pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.thorough)])
 def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) -> None:
-    rng, position, chances = np.random.default_rng(8), proposed(FIVE), []
+    rng, position, chances = np.random.default_rng(8), propose_verification(FIVE), []
     for _ in range(runs):
         windows = [_held(p, rng) for p in FIVE]
         found = solve(Observations.of(FIVE, windows, G))
@@ -282,10 +284,10 @@ def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) ->
 
 
 def test_a_position_that_is_off_is_no_go() -> None:
-    rng, position = np.random.default_rng(9), proposed(FIVE)
+    rng, position = np.random.default_rng(9), propose_verification(FIVE)
     found = solve(Observations.of(FIVE, [_held(p, rng) for p in FIVE], G))
     seen = verify(found, ABOUT, position, _held(position, rng, cross=0.02))
-    assert seen.largest == pytest.approx(0.2, abs=0.05)
+    assert seen.residual_size == pytest.approx(0.2, abs=0.05)
     made = decide(found, ABOUT, BOUNDS, Circumstances([21.0], LINK, seen))
     reason = next(r for r in made.reasons if "not fitted" in r)
     assert position.name in reason and "does not explain" in reason
@@ -295,7 +297,7 @@ def test_a_position_that_is_off_is_no_go() -> None:
 def test_the_verification_position_is_within_the_ladder_and_new(
     positions: tuple[Position, ...],
 ) -> None:
-    found = proposed(positions).degrees
+    found = propose_verification(positions).degrees
     assert found is not None and found not in [p.degrees for p in positions]
     known = np.array([p.degrees for p in positions])
     assert (known.min(axis=0) <= found).all() and (found <= known.max(axis=0)).all()
@@ -427,4 +429,4 @@ def test_a_misfit_counts_by_what_it_does_to_the_navigator(
 
 def test_where_all_positions_have_a_third_angle_home_verifies_them() -> None:
     three = [Position.deg(a, 10.0, gamma=c) for a, c in ((0, 90), (30, -90))]
-    assert proposed(three) == Position.deg(0.0, 0.0)
+    assert propose_verification(three) == Position.deg(0.0, 0.0)

@@ -10,7 +10,7 @@ import pytest
 from observed import observe
 from small_sessions import SD, ladder, nominal, rows_of
 
-from fieldcal.acceptance.factory import relies_on_factory
+from fieldcal.acceptance.factory import check_factory_errors
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FactoryErrors
@@ -20,8 +20,8 @@ from fieldcal.core.samples import Array
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
-from fieldcal.solve.estimation import Recorded, estimated
-from fieldcal.solve.given import Wanted
+from fieldcal.solve.estimation import RecordedRows, estimate_parameters
+from fieldcal.solve.parameter_set import ParameterSetOptions
 
 TACTICAL = limits.read("tactical")
 ABOUT = description.parse({"format": 1})
@@ -57,7 +57,7 @@ def test_it_says_how_square_axes_were_taken_to_be(
 ) -> None:
     """It may be stated in session.toml, or to `solve` alone."""
     about = replace(ABOUT, squareness=stated)
-    (check,) = relies_on_factory(found(square), about, TACTICAL)
+    (check,) = check_factory_errors(found(square), about, TACTICAL)
     assert check.ok is None and f"square to ± {says}" in check.says
 
 
@@ -65,8 +65,8 @@ def test_cross_coupling_that_is_estimated_is_relied_on_by_nothing() -> None:
     result = solve(
         observe(NINE, forces(NINE, G)), cross=True, factory=FactoryErrors(3e-4)
     )
-    assert relies_on_factory(result, ABOUT, TACTICAL) == []
-    assert relies_on_factory(found(0.0), ABOUT, TACTICAL) == []
+    assert check_factory_errors(result, ABOUT, TACTICAL) == []
+    assert check_factory_errors(found(0.0), ABOUT, TACTICAL) == []
 
 
 def test_faces_have_of_it_what_each_bias_takes_in() -> None:
@@ -155,7 +155,7 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
     """At the end of the recording; the course is that of a thermometer, or of a box."""
     rng, off, plain = np.random.default_rng(3), list[Array](), list[Array]()
     warming: dict[str, Any] = {} if shown else {"warming": np.zeros(27)}
-    x, wanted = ladder(**warming), Wanted(tilt="none")
+    x, wanted = ladder(**warming), ParameterSetOptions(tilt="none")
     left = FactoryErrors(**PER_K, warming_k=1.25)
     course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)
     end = 2e-3 * x.t[-1] if shown else 1.25 * np.exp(-x.since_start[-1] / 300)
@@ -164,9 +164,11 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
         y = np.hstack([x.f, x.w]) + drift * course[:, None]
         y += SD / 20 * rng.standard_normal(y.shape)
         rows = rows_of(x, y)
-        recorded = Recorded(replace(rows, sd=rows.sd / 20), np.array([x.since_turn]))
+        recorded = RecordedRows(
+            replace(rows, sd=rows.sd / 20), np.array([x.since_turn])
+        )
         for factory, pulls in ((left, off), (FactoryErrors(), plain)):
-            found = estimated(
+            found = estimate_parameters(
                 recorded, None, nominal(), replace(wanted, factory=factory)
             )
             at = [found.names.index(f"gyr_bias.{axis}") for axis in "xyz"]
@@ -184,10 +186,10 @@ def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
     result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=felt))
     more = np.sqrt(result.vector("gyr_bias")[1] ** 2 - plain**2)
     np.testing.assert_allclose(more, felt * G, rtol=0.02)
-    checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
+    checks = {c.name: c for c in check_factory_errors(result, ABOUT, TACTICAL)}
     assert "18 deg/h per g, as usual for the grade" in checks["g-sensitivity"].says
     result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=10 * felt))
-    checks = {c.name: c for c in relies_on_factory(result, ABOUT, TACTICAL)}
+    checks = {c.name: c for c in check_factory_errors(result, ABOUT, TACTICAL)}
     assert "0 ± 180 deg/h per g, as stated" in checks["g-sensitivity"].says
 
 
@@ -232,7 +234,7 @@ def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
     wrong: dict[str, Any] = {"joint": 0, "angle_deg": None, "position": 4}
     wrong |= {"shows": shows, "moves": {"acc_scale.y": moves}}
     info = {**result.info, "grade_shown": told, "wrong_angles": [wrong]}
-    checks = relies_on_factory(replace(result, info=info), ABOUT, TACTICAL)
+    checks = check_factory_errors(replace(result, info=info), ABOUT, TACTICAL)
     (check,) = [c for c in checks if c.name == "grade"]
     assert check.ok is ok
     assert ("position 5 with a wrong α" in check.says) == (ok is False)
@@ -272,7 +274,7 @@ def test_a_device_beyond_its_grade_has_of_each_kind_what_the_recording_shows(
         **seen.info, "grade_shown": shows, "acc_hysteresis_sigma": left.hysteresis,
         "quadratic_sigma": left.quadratic, "acc_bias_per_k_sigma": left.acc_per_k,
     }  # fmt: skip
-    told = relies_on_factory(replace(seen, info=info), ABOUT, TACTICAL)
+    told = check_factory_errors(replace(seen, info=info), ABOUT, TACTICAL)
     by_name = {check.name: check.says for check in told}
     for name in ("linearity", "hysteresis", "warm-up"):
         assert says in by_name[name]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fieldcal.acceptance.decision import Circumstances, decide
-from fieldcal.acceptance.jump import jumps_too_far
+from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.calibration import Calibration, limits
 from fieldcal.session.description import parse
 
@@ -38,13 +38,13 @@ def test_one_device_is_refused_as_often_as_the_limit_says() -> None:
                 before, after = rng.normal(0, repeat, 2)
                 seen = after - before + rng.normal(0, repeat / 2)
                 bias[f"{group}__{axis}"] = (float(seen), repeat / 2)
-        refused += bool(jumps_too_far(jumping(**bias), bounds))
+        refused += bool(bias_jump_warning(jumping(**bias), bounds))
     assert refused == pytest.approx(40, abs=4 * 40**0.5)
 
 
 def test_nothing_is_said_where_nothing_jumps_or_no_limit_is_known() -> None:
-    assert jumps_too_far(jumping(), BOUNDS) == ""
-    assert jumps_too_far(jumping(sensitivity__x=(9.0, 0.1)), BOUNDS) == ""
+    assert bias_jump_warning(jumping(), BOUNDS) == ""
+    assert bias_jump_warning(jumping(sensitivity__x=(9.0, 0.1)), BOUNDS) == ""
 
 
 def test_biases_of_another_device_are_no_go() -> None:

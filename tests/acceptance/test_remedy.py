@@ -11,12 +11,12 @@ import tomlkit
 from session_folders import recorded, write_session
 
 from fieldcal.acceptance.assessment import assess
-from fieldcal.acceptance.remedy import cheapest
+from fieldcal.acceptance.remedy import cheapest_remedy
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.positions import FIVE, TWO, ladder
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile
 
@@ -36,8 +36,8 @@ def decided(
     site: dict[str, float] = {"latitude_deg": 50.45, "height_m": 170.0}
     site |= {"angle_setting_deg": 0.05}
     session = Session.open(write_session(folder, block, positions, site=site))
-    still = rests(session)
-    return assess(solved(session, still), session, still, bounds, None)
+    still = usable_windows(session)
+    return assess(solve_session(session, still), session, still, bounds, None)
 
 
 @pytest.mark.thorough  # as test_adaptive has it of a run that asks for it at once
@@ -83,7 +83,7 @@ def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     names = tuple(f"gyr_bias.{a}" for a in "xyz")
     found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
     session = about(tmp_path / "s", five)
-    remedy = cheapest(
+    remedy = cheapest_remedy(
         found, session.about, session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
     )
     assert remedy is not None and remedy.says.startswith("hold position 5 for ")
@@ -103,7 +103,9 @@ def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> N
     for angles in ([(0.0, 0.0)] * 6, [(a, 0.0) for a in (0.0, 90.0, 180.0, 270.0)]):
         session = about(tmp_path / str(len(angles)), angles)
         had = session.about.positions
-        remedy = cheapest(found, session.about, had, LIMITS, ["gyr_bias"], 1e-3, 30.0)
+        remedy = cheapest_remedy(
+            found, session.about, had, LIMITS, ["gyr_bias"], 1e-3, 30.0
+        )
         assert remedy is not None
         seconds.append(remedy.seconds / 30.0 / len(angles) + 1)
     once = (1.1**2 - 0.8**2) / (0.9**2 - 0.8**2)
@@ -112,7 +114,7 @@ def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> N
     more = replace(found, info={"g_sensitivity_sigma": 0.95 * limit / 9.81})
     session = about(tmp_path / "home", [(0.0, 0.0)] * 6)
     args = session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
-    assert cheapest(more, session.about, *args) is None
+    assert cheapest_remedy(more, session.about, *args) is None
 
 
 def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
@@ -120,14 +122,14 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
     names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xy")
     session = about(tmp_path / "s", two)
     found = found_with(names, [1e-3] * 4)
-    remedy = cheapest(
+    remedy = cheapest_remedy(
         found, session.about, session.about.positions, LIMITS, ["acc_scale"], 1e-4, 30.0
     )
     assert remedy is not None and "not determined yet" in remedy.says
     assert set(remedy.positions) <= set(ladder(TWO)) - set(two)
     hopeless = replace(LIMITS, acc_scale_sigma=1e-9)
     assert (
-        cheapest(
+        cheapest_remedy(
             found,
             session.about,
             session.about.positions,
@@ -146,7 +148,7 @@ def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
     found = replace(
         found_with(("acc_bias.x",), [1e-3]), info={"doubtful_position": doubtful}
     )
-    remedy = cheapest(
+    remedy = cheapest_remedy(
         found, session.about, session.about.positions, LIMITS, [], 1e-3, 30.0
     )
     assert remedy is not None and remedy.again == (2,)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fieldcal.acceptance.site import gravity_contradicted
+from fieldcal.acceptance.site import gravity_contradiction
 from fieldcal.session.description import Description, parse
 
 
@@ -26,10 +26,10 @@ def at(**site: Any) -> Description:
     ],
 )
 def test_what_may_be_is_not_contradicted(site: dict[str, float]) -> None:
-    assert gravity_contradicted(at(**site)) == ""
+    assert gravity_contradiction(at(**site)) == ""
 
 
 def test_another_place_is_named_with_its_gravity() -> None:
-    said = gravity_contradicted(at(gravity=9.80, latitude_deg=50.45, height_m=170.0))
+    said = gravity_contradiction(at(gravity=9.80, latitude_deg=50.45, height_m=170.0))
     assert "9.8 m/s² is impossible: at 50.45° latitude and 170 m it is 9.8106" in said
-    assert "anywhere on Earth" in gravity_contradicted(at(gravity=9.9))
+    assert "anywhere on Earth" in gravity_contradiction(at(gravity=9.9))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fieldcal.calibration.parameters import Nominal
-from fieldcal.calibration.plausible import elsewhere, senseless
+from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ from fieldcal.calibration.plausible import elsewhere, senseless
 def test_a_base_out_of_level_by_tens_of_degrees_is_another_mounting(
     name: str, value: float, sigma: float, odd: bool
 ) -> None:
-    said = senseless([name], np.array([value]), np.array([sigma]), Nominal())
+    said = implausible_values([name], np.array([value]), np.array([sigma]), Nominal())
     assert bool(said) == odd
     if odd:
         assert "[frame] mounting" in said[0] and name in said[0]
@@ -37,7 +37,7 @@ def test_a_value_that_no_sensor_has_is_none_unless_it_is_as_uncertain(
     name: str, value: float, sigma: float, odd: bool
 ) -> None:
     """More than 10 %, half a g or 30 deg/s from nominal, and by five sigma."""
-    said = senseless([name], np.array([value]), np.array([sigma]), Nominal())
+    said = implausible_values([name], np.array([value]), np.array([sigma]), Nominal())
     assert bool(said) == odd
     if odd:
         assert name in said[0] and "no sensor is that far off" in said[0]
@@ -45,7 +45,7 @@ def test_a_value_that_no_sensor_has_is_none_unless_it_is_as_uncertain(
 
 def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
     """Of four the fourth is counted."""
-    assert elsewhere([]) == []
+    assert misdirected_turns([]) == []
     names = [f"position {i}" for i in range(1, 6)]
     pairs = list(pairwise(names))
     after = (
@@ -60,5 +60,5 @@ def test_turns_that_led_elsewhere_are_named_three_by_three() -> None:
         (4, "in 4 turns ", f"{names[0]} to {names[1]}, {names[1]} to {names[2]} and"
          f" {names[2]} to {names[3]}, and 1 more"),
     ):  # fmt: skip
-        (text,) = elsewhere(pairs[:count])
+        (text,) = misdirected_turns(pairs[:count])
         assert text == f"{start}{said} stated angles (from {listed}){after}"

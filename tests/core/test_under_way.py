@@ -15,8 +15,8 @@ from session_folders import recorded, write_session
 from fieldcal.core import under_way
 from fieldcal.core.under_way import UnderWay
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import earth
@@ -98,7 +98,7 @@ def session(folder: Path, **said: Any) -> Session:
 
 def test_biases_and_scale_factors_under_way(tmp_path: Path) -> None:
     one = session(tmp_path)
-    found = solved(one, rests(one))
+    found = solve_session(one, usable_windows(one))
     truth = dict.fromkeys((f"acc_scale.{x}" for x in "xyz"), 1.0)
     truth |= dict(
         zip((f"acc_bias.{x}" for x in "xyz"), (2e-3, 1e-3, -2e-3), strict=True)

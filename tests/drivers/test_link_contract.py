@@ -27,7 +27,7 @@ from fieldcal.core.errors import DeviceSilent
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers import codec
 from fieldcal.drivers.driver import Driver, Health, open_driver
-from fieldcal.evaluation.observations import observations
+from fieldcal.evaluation.observations import build_observations
 from fieldcal.session import description
 from fieldcal.sim_device.remote import Remote
 from fieldcal.solve import solve
@@ -122,7 +122,7 @@ def heard(name: str, truth: Path) -> tuple[Block, Health]:
 def calibrated(block: Block) -> Calibration:
     t0 = block.t[0]
     windows = [average(block.between(t0 + a, t0 + b)) for a, b in WINDOWS]
-    return solve(observations(ABOUT, windows), method="two_position")
+    return solve(build_observations(ABOUT, windows), method="two_position")
 
 
 def pulls(found: Calibration, truth: dict[str, Any]) -> list[float]:

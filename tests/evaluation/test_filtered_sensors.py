@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from session_folders import places, recorded, write_session
 
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.model import priors
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
@@ -38,7 +38,7 @@ def test_scale_factors_of_gyroscopes_are_right_behind_a_filter_of_100_ms(
     positions = places(FACES, 20.0, 6.0)
     block = recorded(DEVICE, positions, seed=1)
     session = Session.open(write_session(tmp_path / "faces", block, positions))
-    found = solved(session, rests(session))
+    found = solve_session(session, usable_windows(session))
     good = []
     for axis, true in zip("xyz", DEVICE.truth.gyr_scale, strict=True):
         name = f"gyr_scale.{axis}"

@@ -13,7 +13,7 @@ from laid_about import G, turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.instances import compared
+from fieldcal.evaluation.instances import compare_instances
 
 
 def rests(seed: int, scale: float, n: int = 14) -> Array:
@@ -33,7 +33,7 @@ def test_the_one_that_is_out_is_named_whatever_the_biases(
         f"imu{i}": rests(seed + i, scale if i == odd else 1 + 1e-3 * (i - 2))
         for i in range(many)
     }
-    found = compared(made, G)
+    found = compare_instances(made, G)
     assert [one.name for one in found if one.out] == [f"imu{odd}"] * (scale != 1)
     one = found[odd]
     assert one.of_g == pytest.approx(scale - 1, abs=0.004) and one.every_way
@@ -41,10 +41,12 @@ def test_the_one_that_is_out_is_named_whatever_the_biases(
 
 def test_a_level_imu_may_have_a_bias() -> None:
     level = np.tile([0.0, 0.0, G], (3, 1))
-    found = compared({"a": level, "b": level + [0, 0, 0.2], "none": level[:0]}, G)
+    found = compare_instances(
+        {"a": level, "b": level + [0, 0, 0.2], "none": level[:0]}, G
+    )
     assert [one.out for one in found] == [False, False]
     assert "bias included" in found[1].sentence()
-    (alone,) = compared({"a": 1.2 * level}, G)
+    (alone,) = compare_instances({"a": 1.2 * level}, G)
     assert not alone.out and alone.document()["of_others"] is None
 
 

@@ -13,7 +13,7 @@ from session_folders import places, recorded, write_session
 from fieldcal.calibration import over_time
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.nested_windows import NestedWindows, nested
+from fieldcal.evaluation.nested_windows import NestedWindows, solve_nested_windows
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
@@ -42,7 +42,7 @@ def session(
 
 
 def found(folder: Path, *effects: str, **how: Any) -> NestedWindows:
-    out = nested(session(folder, *effects, **how))
+    out = solve_nested_windows(session(folder, *effects, **how))
     assert out is not None
     assert out.seconds.tolist() == [5, 10, 15, 30, 45, 60]
     return out
@@ -54,8 +54,10 @@ def test_white_noise_falls_with_the_root_of_the_time(tmp_path: Path) -> None:
     k = [made.names.index(f"acc_bias.{axis}") for axis in "xyz"]
     fall = made.noise[0, k] / made.noise[-1, k]
     assert fall == pytest.approx(np.sqrt(12.0), rel=0.3)
-    assert {made.wins(f"acc_bias.{axis}") for axis in "xy"} == {None}
-    assert made.wins("acc_bias.z") == ("fixture", 10.0), "of a base off by 0.05 deg"
+    assert {made.dominant_error(f"acc_bias.{axis}") for axis in "xy"} == {None}
+    assert made.dominant_error("acc_bias.z") == ("fixture", 10.0), (
+        "of a base off by 0.05 deg"
+    )
 
 
 @pytest.mark.thorough
@@ -63,13 +65,13 @@ def test_what_the_fixture_leaves_stays(tmp_path: Path) -> None:
     made = found(tmp_path, setting=0.05)
     k = made.names.index("acc_bias.y")
     assert made.sigma[-1, k] > 0.9 * made.sigma[0, k] > 0.9 * made.noise[0, k]
-    assert made.wins("acc_bias.y") == ("fixture", 5.0)
+    assert made.dominant_error("acc_bias.y") == ("fixture", 5.0)
 
 
 @pytest.mark.thorough
 def test_flicker_wins_in_its_time(tmp_path: Path) -> None:
     made = found(tmp_path, flicker=2e-3)
-    what, seconds = made.wins("acc_bias.x") or ("", 0.0)
+    what, seconds = made.dominant_error("acc_bias.x") or ("", 0.0)
     assert what == "flicker"
     assert 10 <= seconds <= 30  # spectra of five seconds show little of it
 
@@ -87,18 +89,18 @@ def test_a_value_that_walks_off_is_no_noise() -> None:
     for _ in range(300):
         steps = rng.standard_normal(40).cumsum()
         values = np.array([steps[i - 1] / i for i in (5, 10, 20, 40)])
-        apart.append(of(values, noise).wins("p"))
+        apart.append(of(values, noise).dominant_error("p"))
     assert sum(one is not None for one in apart) <= 2
     moved = np.array([0.0, 0.0, 1.0, 1.0])
-    assert of(moved, noise).wins("p") == ("drift", 20.0)
-    assert of(moved, 2 * noise).wins("p") is None
+    assert of(moved, noise).dominant_error("p") == ("drift", 20.0)
+    assert of(moved, 2 * noise).dominant_error("p") is None
 
 
 def test_windows_that_cannot_be_cut_say_so(tmp_path: Path) -> None:
     one = session(tmp_path)
     short = tuple(w and (w[0], w[0] + 4.0) for w in one.windows)
-    assert nested(one.with_windows(short)) is None
-    assert nested(one.with_windows(())) is None
+    assert solve_nested_windows(one.with_windows(short)) is None
+    assert solve_nested_windows(one.with_windows(())) is None
 
 
 @pytest.mark.thorough

@@ -13,9 +13,9 @@ from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.evaluation.rounding_mode import (
     CUT,
     RoundingMode,
-    passes,
     rounding_mode,
-    with_rounding,
+    with_rounding_uncertainty,
+    zero_crossings,
 )
 from fieldcal.session.description import parse
 from fieldcal.session.folder import Session
@@ -47,29 +47,29 @@ def test_zero_is_twice_as_wide_where_values_are_cut(
 ) -> None:
     for seed in range(3):
         found = rounding_mode(session(rounded(swung(seed) / STEP) * STEP), Grain())
-        assert least <= found.cut <= most
+        assert least <= found.cut_probability <= most
         np.testing.assert_allclose(found.step, STEP, rtol=1e-6)
 
 
 def test_a_device_that_never_passes_zero_tells_nothing() -> None:
     acc = np.trunc((9.8 + 0.1 * swung(1)) / STEP) * STEP
     found = rounding_mode(session(acc), Grain())
-    assert found.cut == pytest.approx(CUT)
-    assert (found.toward_zero > 0.2 * STEP).all() and (found.down > 0).all()
+    assert found.cut_probability == pytest.approx(CUT)
+    assert (found.cut_sigma > 0.2 * STEP).all() and (found.round_down_sigma > 0).all()
 
 
 def test_whoever_knows_the_rounding_leaves_nothing_open() -> None:
     acc = np.trunc(swung(1) / STEP) * STEP
     found = rounding_mode(session(acc), Grain(acc=STEP))
-    assert not found.toward_zero.any() and not found.down.any()
-    assert not found.around_zero(np.zeros((2, 3))).any()
+    assert not found.cut_sigma.any() and not found.round_down_sigma.any()
+    assert not found.variance_near_zero(np.zeros((2, 3))).any()
     smooth = rounding_mode(session(swung(1)), Grain())
     assert not smooth.step.any()
 
 
 def test_a_mean_of_zeros_may_be_anything_up_to_a_step() -> None:
     found = rounding_mode(session(np.trunc(swung(2) / STEP) * STEP), Grain())
-    variance = found.around_zero(np.array([[0.0, 3 * STEP, np.nan]]))
+    variance = found.variance_near_zero(np.array([[0.0, 3 * STEP, np.nan]]))
     rng = np.random.default_rng(5)
     anywhere = rng.uniform(-STEP, STEP, 100_000)
     assert variance[0, 0] == pytest.approx(anywhere.var(), rel=0.03)
@@ -81,11 +81,11 @@ def test_a_dead_band_hides_what_a_mean_near_zero_is() -> None:
     rng, smooth = np.random.default_rng(3), swung(3)
     acc = np.where(np.abs(smooth) < STEP, 0.0, smooth)
     found = rounding_mode(session(acc), Grain())
-    np.testing.assert_allclose(found.dead, STEP, rtol=0.02)
+    np.testing.assert_allclose(found.dead_band, STEP, rtol=0.02)
     true = np.linspace(-3 * STEP, 3 * STEP, 61)
     samples = true[:, None] + rng.normal(0, 0.3 * STEP, (61, 4000))
     mean = np.where(np.abs(samples) < STEP, 0.0, samples).mean(axis=1)
-    sigma = np.sqrt(found.around_zero(np.repeat(mean[:, None], 3, axis=1))[:, 0])
+    sigma = np.sqrt(found.variance_near_zero(np.repeat(mean[:, None], 3, axis=1))[:, 0])
     assert (np.abs(mean - true) < 2 * sigma + 0.01 * STEP).all()
     assert not sigma[[0, -1]].any() and sigma[30] == pytest.approx(STEP / 3**0.5, 0.03)
 
@@ -94,15 +94,15 @@ def test_what_is_zero_for_another_reason_is_no_dead_band() -> None:
     lost = swung(4)
     lost[100:120] = 0.0
     for acc in (swung(4), lost, np.round(swung(4) / STEP) * STEP):
-        assert not rounding_mode(session(acc), Grain()).dead.any()
+        assert not rounding_mode(session(acc), Grain()).dead_band.any()
 
 
 def test_a_device_that_comes_to_rest_does_not_pass() -> None:
     through = [-3, -1, -1, 0, 0, 0, 0, 1, 1, 3]
-    assert list(passes(np.array(through))) == [(4, 2.0)]
+    assert list(zero_crossings(np.array(through))) == [(4, 2.0)]
     for rests in ([-3, -1, -1, *[0] * 40, 1, 1, 3], [-3, *[-1] * 9, 0, 0, 1, 1, 3]):
-        assert not list(passes(np.array(rests)))
-    assert not list(passes(np.array([-3, -1, -1, 0, 0, 0, -1, -3])))
+        assert not list(zero_crossings(np.array(rests)))
+    assert not list(zero_crossings(np.array([-3, -1, -1, 0, 0, 0, -1, -3])))
 
 
 def test_values_rounded_down_are_in_the_bias() -> None:
@@ -111,7 +111,7 @@ def test_values_rounded_down_are_in_the_bias() -> None:
         "joint", names, np.ones(6), 1e-12 * np.eye(6), ("1",) * 6, 7.0, 7, 1e-3
     )
     down = RoundingMode(np.array([0.0, 0.02, 0.0]), 0.0)
-    found = with_rounding(plain, down)
+    found = with_rounding_uncertainty(plain, down)
     # a chance of one in seven that it is 0.01 too small, where values were not cut
     assert found.uncertainty("acc_bias.y") == pytest.approx(0.01 / 7**0.5, rel=1e-6)
     for name in set(names) - {"acc_bias.y"}:

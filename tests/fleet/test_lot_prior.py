@@ -68,7 +68,7 @@ def test_mean_and_spread_are_those_of_the_next_unit() -> None:
     np.testing.assert_allclose(found.mean, MIDDLE, atol=4 * (WIDE + ERROR).max() / 20)
     np.testing.assert_allclose(found.sigma, WIDE, rtol=0.2)
     off = found.covariance / found.sigma / found.sigma[:, None] - np.eye(4)
-    assert np.abs(off).max() < 0.25 and (found.odd < 0.02).all()
+    assert np.abs(off).max() < 0.25 and (found.outlier_probability < 0.02).all()
 
 
 @pytest.mark.parametrize("lot", [0.8, -0.8])

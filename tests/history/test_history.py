@@ -18,7 +18,7 @@ from fieldcal.cli import main
 from fieldcal.commands.history import lines
 from fieldcal.commands.report import write
 from fieldcal.core.errors import InputError
-from fieldcal.evaluation.observations import observe, rests
+from fieldcal.evaluation.observations import observe, usable_windows
 from fieldcal.history.place import default_place
 from fieldcal.history.store import History, family
 from fieldcal.history.trend import trend
@@ -107,7 +107,7 @@ def test_a_damaged_file_is_said_and_a_run_goes_on(
     path.write_bytes(content)
     session = bench(tmp_path / "s")
     found = solve(observe(session)[0])
-    made = assess(found, session, rests(session), BOUNDS, History(path))
+    made = assess(found, session, usable_windows(session), BOUNDS, History(path))
     assert made.info["decision"]["checks"]
     assert np.array_equal(made.values, found.values)
     if content:
@@ -157,7 +157,7 @@ def bench(folder: Path) -> Session:
 def test_old_values_do_not_enter_a_new_calibration(tmp_path: Path) -> None:
     session = bench(tmp_path / "s")
     found = solve(observe(session)[0], level_sigma_deg=0.001)
-    still = rests(session)
+    still = usable_windows(session)
     clean = assess(found, session, still, BOUNDS, None)
     poisoned = filled(tmp_path / "h.sqlite", *[1e6] * 9)
     with_it = assess(found, session, still, BOUNDS, poisoned)

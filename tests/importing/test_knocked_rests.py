@@ -11,7 +11,7 @@ import pytest
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.observations import usable_windows
 from fieldcal.session.folder import Session
 
 RATE, KNOCKS, PER_KELVIN = 20.0, (70.0, 150.0, 260.0, 330.0), 4e-3
@@ -59,7 +59,7 @@ def test_it_is_one_position_without_the_knocks(knocked: Path) -> None:
 
 def test_its_mean_is_that_of_the_calm_parts(knocked: Path) -> None:
     session = Session.open(knocked)
-    (window,) = rests(session).averages
+    (window,) = usable_windows(session).averages
     calm = np.isfinite(session.block.acc).all(axis=1)
     assert 0.96 < calm.mean() < 0.995
     np.testing.assert_allclose(

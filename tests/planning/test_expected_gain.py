@@ -67,8 +67,8 @@ def gain_of(found: Explanation) -> ExpectedGain:
 def alone(gain: ExpectedGain) -> ExpectedGain:
     """The same where the likeliest explanation is certain."""
     out = copy(gain)
-    best = max(out.explained, key=lambda e: e.chance)
-    out.explained = [replace(best, chance=1.0)]
+    best = max(out.explanations, key=lambda e: e.chance)
+    out.explanations = [replace(best, chance=1.0)]
     return out
 
 
@@ -93,7 +93,7 @@ def test_a_window_tells_what_was_expected_of_it(
     one = Position.deg(*place)
     before = alone(three).of([one])
     then = alone(gain_of(explained([*START, one]))).of([one])
-    expected = np.sqrt(before.left[0, : len(ALLOWED)])
+    expected = np.sqrt(before.expected_variance[0, : len(ALLOWED)])
     came = np.sqrt(then.variance[: len(ALLOWED)])
     np.testing.assert_allclose(came, expected, rtol=0.35)
 
@@ -111,7 +111,7 @@ def test_what_is_expected_of_bias_and_scale_is_that_of_least_squares(
     """
     one = Position.deg(45, -5)
     three = gain_of(explained(START, left=left))
-    told = alone(three).of([one]).left[0, : len(ALLOWED)]
+    told = alone(three).of([one]).expected_variance[0, : len(ALLOWED)]
     noise = three.rows.noise[:3] / np.sqrt(SECONDS * 100.0)
     weighed, places = list[np.ndarray](), [*START, one]
     for before, place in zip([None, *START], places, strict=True):
@@ -184,10 +184,10 @@ def test_a_cause_is_told_where_it_differs_from_what_stands_in_its_place() -> Non
     gain = gain_of(explained(start, [("quadratic", {"x": 1e-3})]))
     sides = [Position.deg(40, 0), Position.deg(-40, 0)]
     worth = gain.of(sides)
-    open_ = [i for i, n in enumerate(worth.asked) if worth.variance[i] > 0.2]
-    causes = [i for i in open_ if worth.asked[i] not in ALLOWED]
-    assert {"quadratic", "scale_asymmetry"} & {worth.asked[i] for i in causes}
-    same, other = worth.left[:, causes].sum(axis=1)
+    open_ = [i for i, n in enumerate(worth.quantities) if worth.variance[i] > 0.2]
+    causes = [i for i in open_ if worth.quantities[i] not in ALLOWED]
+    assert {"quadratic", "scale_asymmetry"} & {worth.quantities[i] for i in causes}
+    same, other = worth.expected_variance[:, causes].sum(axis=1)
     assert other < 0.85 * same and worth.gain[1] > worth.gain[0]
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fieldcal.cli import main
-from fieldcal.planning.planner import GRADES, Grade
-from fieldcal.planning.swaying_base import seconds_needed
+from fieldcal.planning.planner import GRADES, GradeNoise
+from fieldcal.planning.swaying_base import window_seconds_needed
 
 FACES = """
 format = 1
@@ -77,8 +77,8 @@ def test_what_cannot_be_planned_is_refused(
 
 def test_slow_swaying_and_little_noise_need_longer_windows() -> None:
     tactical = GRADES["tactical"]
-    seconds = [seconds_needed(hz, tactical) for hz in (0.5, 0.1, 0.06)]
+    seconds = [window_seconds_needed(hz, tactical) for hz in (0.5, 0.1, 0.06)]
     assert seconds[0] < seconds[1] < seconds[2]
     assert seconds[1] >= 12.0  # 1.2 periods
-    quiet = Grade(1e-7, 0.0, 1e-9, 0.0)
-    assert seconds_needed(0.1, quiet) >= seconds[1]
+    quiet = GradeNoise(1e-7, 0.0, 1e-9, 0.0)
+    assert window_seconds_needed(0.1, quiet) >= seconds[1]

@@ -11,11 +11,17 @@ from fieldcal.cli import main
 from fieldcal.core.errors import PlanError
 from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.planning import planner
-from fieldcal.planning.aliasing import aliases
-from fieldcal.planning.planner import GRADES, Grade, Ladder, best_positions, expected
+from fieldcal.planning.aliasing import find_aliases
+from fieldcal.planning.planner import (
+    GRADES,
+    GradeNoise,
+    Ladder,
+    best_positions,
+    expected,
+)
 
 G = 9.81
-UNIT = Grade(1e-3, 0.0, 1e-5, 0.0)
+UNIT = GradeNoise(1e-3, 0.0, 1e-5, 0.0)
 
 
 def test_the_paper_s_five_positions_reach_the_published_bound(shared: Path) -> None:
@@ -84,10 +90,10 @@ def test_an_extra_position_is_new_and_helps() -> None:
 
 def test_aliases_that_follow_from_the_geometry() -> None:
     """Six faces load each axis with 0 and +-g alone: K2 looks like K+/K-."""
-    six = aliases(SIX_FACES, G)
+    six = find_aliases(SIX_FACES, G)
     assert "gravity_error" in six.hidden and "cubic" in six.hidden
     assert dict(six.pairs)["quadratic"] == ("scale_asymmetry",)
-    two = aliases(TWO, G)
+    two = find_aliases(TWO, G)
     assert {"base_tilt", "angle_offset", "quadratic"} <= set(two.hidden)
 
 
@@ -119,7 +125,7 @@ def test_the_command_writes_a_plan_that_run_takes(
 def test_a_plan_says_from_when_flicker_wins(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    grade = Grade(2e-3, 4e-4, 1e-4, 2e-5)
+    grade = GradeNoise(2e-3, 4e-4, 1e-4, 2e-5)
     assert grade.acc(grade.acc_seconds) == pytest.approx(2**0.5 * grade.acc_floor)
     assert grade.gyr(grade.gyr_seconds) == pytest.approx(2**0.5 * grade.gyr_floor)
     assert main(["plan", "--set", "five", "--noise", "consumer"]) == 0

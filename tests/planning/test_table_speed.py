@@ -15,8 +15,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import PlanError
 from fieldcal.core.samples import Array, Block
-from fieldcal.evaluation.observations import observe, rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.planning.table_speed import NAMES, expected_by_speed, spin_axes
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
@@ -51,7 +51,7 @@ def by_means(session: Session) -> Calibration:
 
 def by_rows(session: Session) -> Calibration:
     perfect = {"squareness": 0.0, "quadratic": 0.0, "g_sensitivity": 0.0}
-    return solved(session, rests(session), left=perfect)
+    return solve_session(session, usable_windows(session), left=perfect)
 
 
 @pytest.mark.parametrize(("estimate", "most"), [(by_means, 1.25), (by_rows, 1.6)])

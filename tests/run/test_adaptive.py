@@ -15,7 +15,7 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.run_results import first_result
 from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
-from fieldcal.evaluation.so_far import SoFar
+from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.history.store import History
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.planning.steps import Hold
@@ -159,9 +159,12 @@ def test_at_go_it_ends_if_a_further_position_is_left_out(
     """Then nobody is asked for another one, and what ends it is judged in full once."""
     full: list[int] = []
 
-    def counted(folder: Path, *given: Any) -> SoFar:
+    def counted(folder: Path, *given: Any) -> InterimResult:
         so_far = judged(folder, *given)
-        full.extend([len(so_far.laid.still.rows)] * (not so_far.quick))
+        full.extend(
+            [len(so_far.prepared_session.windows.position_numbers)]
+            * (not so_far.incremental)
+        )
         return so_far
 
     monkeypatch.setattr(session_run, "judged", counted)
@@ -196,7 +199,7 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     two = {"procedure": "positions"}
     start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
     bench.run(two, until_go=True, position=start)
-    assert max(bench.numbers) >= 3 and judged(bench.folder, BOUNDS).enough
+    assert max(bench.numbers) >= 3 and judged(bench.folder, BOUNDS).sufficient
     said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
     assert len(said) == max(bench.numbers) - 2
     assert all("one position more" in t and "then GO is expected" in t for t in said)
@@ -233,9 +236,9 @@ def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
     chances = {"time": 0.6}
     standing = [Standing(n, (), chances.get(n, 0.9999), ()) for n in names]
     so_far = SimpleNamespace(
-        enough=False,
+        sufficient=False,
         explanation=SimpleNamespace(standing=standing),
-        found=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
+        calibration=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
     )
     assert adaptive._named(so_far) == said  # type: ignore[arg-type]
 

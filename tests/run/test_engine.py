@@ -22,7 +22,7 @@ from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array, Block, pieces
 from fieldcal.diagnosis import diagnose
 from fieldcal.drivers.driver import Driver, Health, open_driver
-from fieldcal.evaluation.observations import rests
+from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
 from fieldcal.run.engine import Engine
@@ -704,7 +704,7 @@ def test_a_gust_costs_what_it_spoils(tmp_path: Path) -> None:
         assert 2 <= len(window["without_s"]) <= 4
     assert any("of 30 s are kept; hold still" in text for text in turner.told)
     assert max(v.elapsed for v in turner.views) > 29.0
-    again = rests(session)
+    again = usable_windows(session)
     assert not again.warnings
     for live, recorded in zip(taken, again.averages, strict=True):
         np.testing.assert_allclose(live.mean, recorded.mean, atol=1e-6)

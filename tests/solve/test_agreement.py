@@ -13,10 +13,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
-from fieldcal.solve.estimation import Estimated, estimated
-from fieldcal.solve.given import Wanted, seen_by
+from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
 from fieldcal.solve.observations import Index
-from fieldcal.solve.rows import of_means
+from fieldcal.solve.parameter_set import ParameterSetOptions, with_base_rate
+from fieldcal.solve.rows import rows_of_means
 
 SIZE = np.array([1e-3, 2e-3, 0.7e-3])
 PLACES = tuple(
@@ -28,14 +28,18 @@ WIDE = priors.FREE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
 STEP = 1e-4
 
 
-def found(places: tuple[Position, ...], u: Array, degrees: float = 0.0) -> Estimated:
+def found(
+    places: tuple[Position, ...], u: Array, degrees: float = 0.0
+) -> ParameterEstimate:
     seen = observe(places, u)
     seen.covariance[:, range(3), range(3)] = SIZE**2
-    recorded = of_means(seen)
-    rows = seen_by(recorded.rows, np.zeros(3))
+    recorded = rows_of_means(seen)
+    rows = with_base_rate(recorded.rows, np.zeros(3))
     nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
-    wanted = Wanted(angles_deg=degrees)
-    return estimated(type(recorded)(rows, recorded.since), None, nominal, wanted)
+    wanted = ParameterSetOptions(angles_deg=degrees)
+    return estimate_parameters(
+        type(recorded)(rows, recorded.since_turn), None, nominal, wanted
+    )
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,8 @@ def test_what_is_left_out_is_foretold_by_the_others(degrees: float) -> None:
     off = np.array([plain.without(3 * i + np.arange(3)) for i in range(len(PLACES))])
     weight = np.tile(SIZE**-2.0, (len(PLACES), 1))
     expected = np.sqrt(np.average(off**2, weights=weight))
-    assert one.left_out == pytest.approx(expected, rel=2e-3)
-    assert one.left_out > 1.1 * one.rms
+    assert one.held_out_rms == pytest.approx(expected, rel=2e-3)
+    assert one.held_out_rms > 1.1 * one.rms
 
 
 @pytest.mark.parametrize("seed", [2, 5, 9])
@@ -134,9 +138,9 @@ def test_the_furthest_is_the_largest_residual_by_what_it_was_foretold_to(
     off = np.array([plain.without(r) for r in rows])
     sd = np.sqrt([np.diag(plain.unsure(r)) for r in rows])
     i, c = divmod(int(np.argmax(np.abs(off) / sd)), 3)
-    far = found(PLACES, u, 0.02).acc.furthest
+    far = found(PLACES, u, 0.02).acc.largest
     assert far is not None and (far.window, far.axis) == (i, c)
-    assert far.off == pytest.approx(off[i, c], rel=5e-3)
+    assert far.residual == pytest.approx(off[i, c], rel=5e-3)
     assert far.sigma == pytest.approx(sd[i, c], rel=0.1)
 
 
@@ -158,9 +162,9 @@ def test_residuals_are_what_the_estimate_leaves() -> None:
     whole = found(PLACES, u)
     b, k = whole.values[:3], whole.values[3:6]
     perfect = outputs(PLACES, bias=np.zeros(3), scale=np.ones(3))
-    np.testing.assert_allclose(whole.acc.rows, u - b - k * perfect, atol=1e-9)
+    np.testing.assert_allclose(whole.acc.residuals, u - b - k * perfect, atol=1e-9)
     weight = np.tile(SIZE**-2.0, (len(PLACES), 1))
-    rms = np.sqrt(np.average(whole.acc.rows**2, weights=weight))
+    rms = np.sqrt(np.average(whole.acc.residuals**2, weights=weight))
     assert whole.acc.rms == pytest.approx(rms)
     assert np.isnan(whole.gyr.rms) and whole.gyr.dof == 0
 
@@ -196,8 +200,8 @@ def test_of_an_unknown_orientation_the_length_is_one_degree_of_freedom(n: int) -
     off, sd = norms(u, whole.values)
     assert whole.acc.dof == n - 6
     assert whole.acc.chi2 == pytest.approx(float(((off / sd) ** 2).sum()), rel=0.02)
-    assert np.isnan(whole.acc.rows[:, 1:]).all()
-    np.testing.assert_allclose(whole.acc.rows[:, 0], off, rtol=0.01, atol=1e-6)
+    assert np.isnan(whole.acc.residuals[:, 1:]).all()
+    np.testing.assert_allclose(whole.acc.residuals[:, 0], off, rtol=0.01, atol=1e-6)
 
 
 def test_known_and_unknown_orientations_count_together() -> None:
@@ -210,9 +214,11 @@ def test_directions_that_nothing_shows_take_no_degree_of_freedom() -> None:
     faces = np.vstack([np.eye(3), -np.eye(3)])
     u = BIAS + SCALE * G * np.vstack([faces, faces])
     seen = observe((HAND,) * 12, u)
-    recorded = of_means(seen)
+    recorded = rows_of_means(seen)
     nominal = State(np.zeros(6), np.ones(6), np.zeros((12, 2)), np.zeros(3))
-    crossed = estimated(recorded, None, nominal, Wanted(cross=True))
+    crossed = estimate_parameters(
+        recorded, None, nominal, ParameterSetOptions(cross=True)
+    )
     assert crossed.acc.dof == 12 - 6
 
 
@@ -221,10 +227,14 @@ def test_what_does_not_turn_has_no_direction_of_its_rate() -> None:
     places = (*PLACES, HAND)
     one = found(places, outputs([*PLACES, PLACES[0]]))
     known = (one.search.gram.info[: len(places), 3:] > 0).ravel()
-    means = agreement._Seen(one.search.gram, one.given, (3, 4, 5), known)
-    assert np.isnan(means._normal(len(places) - 1)).all()
-    forces = agreement._Seen(one.search.gram, one.given, (0, 1, 2), known)
-    assert np.isfinite(forces._normal(len(places) - 1)).all()
+    means = agreement._MeasuredMeans(
+        one.search.gram, one.parameter_set, (3, 4, 5), known
+    )
+    assert np.isnan(means._force_direction(len(places) - 1)).all()
+    forces = agreement._MeasuredMeans(
+        one.search.gram, one.parameter_set, (0, 1, 2), known
+    )
+    assert np.isfinite(forces._force_direction(len(places) - 1)).all()
 
 
 def test_a_length_of_which_an_axis_is_clipped_is_no_length() -> None:
@@ -233,9 +243,9 @@ def test_a_length_of_which_an_axis_is_clipped_is_no_length() -> None:
     u = by_hand(n)
     seen = observe((HAND,) * n, u)
     seen.mean[clipped, 1] = np.nan
-    recorded = of_means(seen)
+    recorded = rows_of_means(seen)
     nominal = State(np.zeros(6), np.ones(6), np.zeros((n, 2)), np.zeros(3))
-    one = estimated(recorded, None, nominal, Wanted())
-    assert np.isnan(one.acc.rows[clipped]).all()
-    assert np.isfinite(np.delete(one.acc.rows[:, 0], clipped)).all()
+    one = estimate_parameters(recorded, None, nominal, ParameterSetOptions())
+    assert np.isnan(one.acc.residuals[clipped]).all()
+    assert np.isfinite(np.delete(one.acc.residuals[:, 0], clipped)).all()
     assert one.acc.dof == n - 1 - 6

@@ -101,7 +101,10 @@ def test_what_two_positions_leave_open_is_as_the_lot_has_it() -> None:
 
 def chance_of_odd(alone: Calibration, known: LotPrior) -> float:
     """By the density of the unit's own estimate under each hypothesis."""
-    k, odd = len(known.names), known.odd[0] / (1 - known.odd[0])
+    k, odd = (
+        len(known.names),
+        known.outlier_probability[0] / (1 - known.outlier_probability[0]),
+    )
     wide = [known.covariance]
     for j in range(k):
         more = np.zeros((k, k))

@@ -13,8 +13,8 @@ from session_folders import write_session
 from fieldcal.core.factory import FACTORY
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import observe, rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 
@@ -60,7 +60,9 @@ def test_the_length_of_the_earths_rate_gives_the_bias(
     for seed in range(3 if recorded else 6):
         session = held(tmp_path / str(seed), seed)
         if recorded:
-            found = solved(session, rests(session), "no", dict.fromkeys(FACTORY, 0.0))
+            found = solve_session(
+                session, usable_windows(session), "no", dict.fromkeys(FACTORY, 0.0)
+            )
         else:
             found = solve(observe(session)[0])
         assert found.method == "scalar"

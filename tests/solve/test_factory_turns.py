@@ -21,8 +21,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import gravity
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import Laid
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 
@@ -79,9 +79,9 @@ def solved(device: Device, turns: Iterable[Array], cross: bool) -> Calibration:
     block, places = device.recorded(turns)
     with TemporaryDirectory() as folder:
         session = Session.open(write_session(Path(folder) / "s", block, places))
-        laid = Laid(session, rests(session))
+        laid = PreparedSession(session, usable_windows(session))
         return solve(
-            laid.observations, recorded=laid.recorded(True), cross=cross,
+            laid.observations, recorded=laid.recorded_rows(True), cross=cross,
             factory=FactoryErrors(cross_coupling=LEFT),
         )  # fmt: skip
 

@@ -24,7 +24,7 @@ from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.solve import Observations, choose, rank, solve
-from fieldcal.solve.estimation import scatter_of
+from fieldcal.solve.estimation import window_scatter
 from fieldcal.windows import Average
 
 SIGMA = 1e-3
@@ -254,8 +254,8 @@ def test_what_windows_scatter_by_is_an_rms_of_a_triad() -> None:
     none = np.empty(0)
     scatter = np.array([3e-3, 4e-3, 5e-3, 1e-4, 2e-4, 2e-4, 0.0])
     mixture = Mixture(none.astype(int), none, none, none, none, scatter, 0.0)
-    assert scatter_of(mixture, (0, 1, 2)) == pytest.approx(1e-3 * np.sqrt(50 / 3))
-    assert scatter_of(mixture, (3, 4, 5)) == pytest.approx(1e-4 * np.sqrt(3))
+    assert window_scatter(mixture, (0, 1, 2)) == pytest.approx(1e-3 * np.sqrt(50 / 3))
+    assert window_scatter(mixture, (3, 4, 5)) == pytest.approx(1e-4 * np.sqrt(3))
 
 
 def test_a_base_known_to_be_nearly_level_helps() -> None:

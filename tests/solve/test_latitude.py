@@ -10,7 +10,7 @@ import pytest
 from fieldcal.calibration import Calibration
 from fieldcal.core.positions import Position
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.latitude import EarthVertical
+from fieldcal.solve.latitude import VerticalEarthRate
 
 EARTH = 7.292115e-5
 UNSURE = 5e-5
@@ -102,10 +102,12 @@ def test_positions_that_hardly_lean_show_nothing_of_it() -> None:
 
 
 def test_what_no_latitude_has_is_no_latitude() -> None:
-    far = EarthVertical(4e-5, 5e-4, 1e-6, 10.0)
-    near = EarthVertical(4e-5, EARTH * 1.001, 1e-6, 10.0)
-    unlikely = EarthVertical(4e-5, 0.0, 1e-6, -1.0)
-    assert near.wrong and not far.wrong and not unlikely.wrong
+    far = VerticalEarthRate(4e-5, 5e-4, 1e-6, 10.0)
+    near = VerticalEarthRate(4e-5, EARTH * 1.001, 1e-6, 10.0)
+    unlikely = VerticalEarthRate(4e-5, 0.0, 1e-6, -1.0)
+    assert (
+        near.latitude_wrong and not far.latitude_wrong and not unlikely.latitude_wrong
+    )
     assert "latitude 90°" in near.sentence
 
 

@@ -10,35 +10,41 @@ from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design, parameters
 from fieldcal.solve import solve
-from fieldcal.solve.rank import LADDER, MOST, determined, ladder_remedy, remedy
+from fieldcal.solve.rank import (
+    LADDER,
+    MAX_POSITIONS,
+    determined_parameters,
+    ladder_remedy,
+    positions_to_add,
+)
 
 TILTED = parameters("angle_offset")
 
 
 def test_a_parameter_with_a_part_in_a_hidden_direction_is_not_determined() -> None:
     rows = np.array([[1.0, 1, 0], [2, 2, 0], [0, 0, 1]])
-    known, rank = determined(rows)
+    known, rank = determined_parameters(rows)
     assert known.tolist() == [False, False, True] and rank == 2
 
 
 def test_units_do_not_matter() -> None:
     rng = np.random.default_rng(1)
     rows = rng.standard_normal((6, 4)) * [1e-4, 1.0, 1e4, 1.0]
-    known, rank = determined(rows)
+    known, rank = determined_parameters(rows)
     assert known.all() and rank == 4
     rows[:, 3] = rows[:, 0] / 1e-4 + rows[:, 2] / 1e4
-    known, rank = determined(rows)
+    known, rank = determined_parameters(rows)
     assert known.tolist() == [False, True, False, False] and rank == 3
 
 
 def test_fewer_rows_than_parameters_leave_all_that_share_them_open() -> None:
-    known, rank = determined(np.array([[1.0, 0, 0], [0, 1, 1]]))
+    known, rank = determined_parameters(np.array([[1.0, 0, 0], [0, 1, 1]]))
     assert known.tolist() == [True, False, False] and rank == 2
 
 
 def test_what_is_left_of_a_sine_by_rounding_is_nothing() -> None:
     rows = np.column_stack([[1.0, 1, 1], np.sin(np.pi * np.arange(3)), [1.0, 2, 4]])
-    known, rank = determined(rows)
+    known, rank = determined_parameters(rows)
     assert known.tolist() == [True, False, True] and rank == 2
 
 
@@ -49,20 +55,20 @@ def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
     def rows(places: tuple[Position, ...]) -> Array:
         return design(TILTED, places, G)
 
-    extra = remedy(lambda p: rows(tuple(p)), taken, LADDER)
-    assert 0 < len(extra) <= MOST
+    extra = positions_to_add(lambda p: rows(tuple(p)), taken, LADDER)
+    assert 0 < len(extra) <= MAX_POSITIONS
     for left in [None, *extra]:
         kept = [p for p in extra if p is not left]
         table = rows((*taken, *kept)).reshape(-1, len(TILTED))
-        assert determined(table)[0].all() == (left is None)
+        assert determined_parameters(table)[0].all() == (left is None)
 
 
 def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None:
     def rows(places: Sequence[Position]) -> Array:
         return np.ones((len(places), 1, 2))
 
-    assert remedy(lambda p: design(TILTED, p, G), FIVE, LADDER) == []
-    assert remedy(rows, TWO, LADDER) == []
+    assert positions_to_add(lambda p: design(TILTED, p, G), FIVE, LADDER) == []
+    assert positions_to_add(rows, TWO, LADDER) == []
 
 
 def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:

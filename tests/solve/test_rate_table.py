@@ -15,8 +15,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.evaluation.observations import observe, rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
@@ -141,13 +141,13 @@ def test_left_in_as_printed_the_earth_is_in_the_bias(tmp_path: Path) -> None:
 
 def test_windows_on_a_table_are_no_rests_between_turns(tmp_path: Path) -> None:
     opened = session(tmp_path, 1e-4, 1)
-    still = rests(opened)
-    assert not still.at_rest(opened).rows
-    found = solved(opened, still)
+    still = usable_windows(opened)
+    assert not still.at_rest(opened).position_numbers
+    found = solve_session(opened, still)
     assert found.method == "least_squares" and "turns" not in found.info
     assert (np.abs(pulls(found)) < 4).all()
     with pytest.raises(NotObservable, match="no position was held at rest"):
-        solved(opened, still, "yes")
+        solve_session(opened, still, "yes")
 
 
 @pytest.mark.parametrize(

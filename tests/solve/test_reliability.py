@@ -71,14 +71,14 @@ def test_five_small_turns_have_no_witness_of_a_gauge_and_six_faces_need_none() -
 
 def test_a_mistake_is_carried_to_another_position() -> None:
     gauge = WrongAngles(1, None, None, 0.0, {})
-    assert gauge.off_at(0.3, 0.5) == pytest.approx((0.0, GAUGE * 0.5))
+    assert gauge.error_at(0.3, 0.5) == pytest.approx((0.0, GAUGE * 0.5))
     detent = WrongAngles(0, 45.0, None, 0.0, {})
     wide = np.deg2rad(REPEATED_DEG)
-    assert detent.off_at(np.pi / 4, 0.1) == pytest.approx((wide, 0.0))
-    assert detent.off_at(0.1, np.pi / 4) == (0.0, 0.0)
-    assert WrongAngles(0, None, 2, 0.0, {}).off_at(0.1, 0.1) == (0.0, 0.0)
+    assert detent.error_at(np.pi / 4, 0.1) == pytest.approx((wide, 0.0))
+    assert detent.error_at(0.1, np.pi / 4) == (0.0, 0.0)
+    assert WrongAngles(0, None, 2, 0.0, {}).error_at(0.1, 0.1) == (0.0, 0.0)
     assert WrongAngles.from_json(detent.to_json()) == detent
-    said = [w.says for w in (gauge, detent, WrongAngles(0, None, 2, 0.0, {}))]
+    said = [w.description for w in (gauge, detent, WrongAngles(0, None, 2, 0.0, {}))]
     assert said == [
         "every β set 0.5% too far",
         "α = 45° set 0.2° off each time",

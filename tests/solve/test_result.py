@@ -14,34 +14,35 @@ from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.solve import observations, result, solve
-from fieldcal.solve.assumed import Asked
-from fieldcal.solve.estimation import Estimated
+from fieldcal.solve.estimation import ParameterEstimate
 from fieldcal.solve.observations import Observations
+from fieldcal.solve.options import SolveOptions
 from fieldcal.solve.reliability import WrongAngles
 
 HOME = "α = 0°, β = 0°"
 
 
 def fit(**known: Any) -> SimpleNamespace:
-    nothing = {"chi2": 3.0, "dof": 6, "rms": 1e-3, "left_out": np.nan}
+    nothing = {"chi2": 3.0, "dof": 6, "rms": 1e-3, "held_out_rms": np.nan}
     return SimpleNamespace(**(nothing | known))
 
 
-def estimated(**known: Any) -> Estimated:
+def estimated(**known: Any) -> ParameterEstimate:
     """An estimate of which only what is asked for is known."""
-    wanted = SimpleNamespace(
+    options = SimpleNamespace(
         turned=False, gyr_scale=True, level_deg=None, cross=False, tilt="none",
         factory=FactoryErrors(),
     )  # fmt: skip
     given = SimpleNamespace(
-        wanted=wanted, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
+        options=options, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
     )
     nothing: dict[str, Any] = {
-        "names": ("acc_bias.x",), "missing": (), "given": given, "acc": fit(),
-        "gyr": fit(rms=np.nan), "closures": (0.0, 0), "ended_s": None, "score": -12.5,
-        "found": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
+        "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,
+        "acc": fit(), "score": -12.5, "valid_at_s": None,
+        "gyr": fit(rms=np.nan), "closure_squares": (0.0, 0),
+        "mixture": SimpleNamespace(scatter=np.array([3, 4, 0, 2, 1, 0, 5.0])),
     }  # fmt: skip
-    return cast(Estimated, SimpleNamespace(**(nothing | known)))
+    return cast(ParameterEstimate, SimpleNamespace(**(nothing | known)))
 
 
 def observed(
@@ -53,12 +54,22 @@ def observed(
 
 
 def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
-    none = estimated(names=(), missing=("acc_bias.x", "acc_scale.x"), found=None)
-    none.given.names, none.given.left_out = ("acc_bias.x", "acc_scale.x"), None
-    carried = {"sure": 0.0, "causes": {}, "moved": np.zeros(0), "ended_s": None}
+    none = estimated(names=(), undetermined=("acc_bias.x", "acc_scale.x"), mixture=None)
+    none.parameter_set.names, none.parameter_set.omitted_cross_coupling = (
+        ("acc_bias.x", "acc_scale.x"),
+        None,
+    )
+    carried = {
+        "any_cause_probability": 0.0,
+        "causes": {},
+        "shift_sigmas": np.zeros(0),
+        "valid_at_s": None,
+    }
     vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
     with pytest.raises(NotObservable) as error:
-        result.calibration("joint", observed(TWO, False), Asked(), none, ["a note"])
+        result.build_calibration(
+            "joint", observed(TWO, False), SolveOptions(), none, ["a note"]
+        )
     text = str(error.value)
     assert text.startswith("these positions determine nothing: acc_bias.x and")
     assert text.endswith("; a note")
@@ -69,19 +80,25 @@ def test_wrong_angles_harm_where_they_move_more_than_the_margin() -> None:
     vars(found)["covariance"] = np.diag([4.0, 1.0])
     for moves, harms in (((9.9, -4.9), False), ((10.1, 0.0), True), ((0, -5.1), True)):
         both = dict(zip(found.names, moves, strict=True))
-        assert result._harms(WrongAngles(0, None, 1, 0.5, both), found) == harms
+        assert result._is_harmful(WrongAngles(0, None, 1, 0.5, both), found) == harms
 
 
 def test_what_is_carried_says_when_and_at_which_temperature() -> None:
-    known = {"moved": np.array([1.5]), "causes": {"bias_drift": 0.9}, "ended_s": 300.0}
+    known = {
+        "shift_sigmas": np.array([1.5]),
+        "causes": {"bias_drift": 0.9},
+        "valid_at_s": 300.0,
+    }
     seen = observed(temperature=np.array([20.0, 21.0, 22.0, 23.0, 24.0]))
-    assert result._carried(seen, estimated(**known)) == {
+    assert result._carried_info(seen, estimated(**known)) == {
         "causes": {"bias_drift": 0.9}, "moved_sigmas": {"acc_bias.x": 1.5},
         "as_of": {"since_start_s": 300.0, "temperature_degc": 24.0},
     }  # fmt: skip
-    unknown = result._carried(observed(), estimated(**known))
+    unknown = result._carried_info(observed(), estimated(**known))
     assert unknown["as_of"]["temperature_degc"] is None
-    assert "as_of" not in result._carried(seen, estimated(**known | {"ended_s": None}))
+    assert "as_of" not in result._carried_info(
+        seen, estimated(**known | {"valid_at_s": None})
+    )
 
 
 @pytest.mark.parametrize("missed", [0.0, 0.2])
@@ -114,8 +131,10 @@ def test_conditions_are_those_that_were_given() -> None:
     assert plain["conditions"]["temperature_degc"] is None
     assert plain["gyroscopes"]["unit"] == "rad/s" and plain["gyroscopes"]["dof"] == 12
     assert plain["gyroscopes"]["rms"] == pytest.approx(0.0, abs=1e-9)
-    unknown = estimated(bad=np.zeros(5), wrong_angles=(), causes={}, turns=())
-    said = result._info("joint", observed(), Asked(), unknown)
+    unknown = estimated(
+        bad_probability=np.zeros(5), wrong_angles=(), causes={}, turn_rows=()
+    )
+    said = result._info("joint", observed(), SolveOptions(), unknown)
     assert said["gyroscopes"]["rms"] is None, "JSON has no nan"
     assert "level_sigma_deg" not in plain
     two = solve(observed(TWO, gyr=False), level_sigma_deg=0.3).info
@@ -146,21 +165,21 @@ def test_correlations_that_a_window_is_too_short_to_know_are_dropped() -> None:
     size = np.array([1.0, 2.0, 3.0, 1e-3, 2e-3, 3e-3])
     alike = np.full((6, 6), 0.5) + 0.5 * np.eye(6)
     kept = alike * np.outer(size, size)
-    np.testing.assert_array_equal(observations._regular(kept), kept)
+    np.testing.assert_array_equal(observations._regularised(kept), kept)
     one = alike.copy()
     one[0, 1] = one[1, 0] = 1.0
     one[0, 2] = one[1, 2] = one[2, 0] = one[2, 1] = 0.5
     singular = one * np.outer(size, size)
-    found = observations._regular(singular)
+    found = observations._regularised(singular)
     np.testing.assert_allclose(found[:3, :3], np.diag(size[:3] ** 2))
     np.testing.assert_array_equal(found[3:, 3:], singular[3:, 3:])
     assert not found[:3, 3:].any() and not found[3:, :3].any()
     nowhere = kept.copy()
     nowhere[3:, :] = nowhere[:, 3:] = np.nan
-    np.testing.assert_array_equal(observations._regular(nowhere), nowhere)
+    np.testing.assert_array_equal(observations._regularised(nowhere), nowhere)
     still = kept.copy()
     still[1, :] = still[:, 1] = 0.0
-    np.testing.assert_array_equal(observations._regular(still), still)
+    np.testing.assert_array_equal(observations._regularised(still), still)
 
 
 @pytest.mark.parametrize(

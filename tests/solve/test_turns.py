@@ -27,9 +27,9 @@ from fieldcal.core.gravity import gravity
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import Laid
-from fieldcal.evaluation.solution import solved as solve_session
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import PreparedSession
+from fieldcal.evaluation.solution import solve_session as solve_session
 from fieldcal.model.turns import rotation
 from fieldcal.model.turns.rotation import carry, small_turns
 from fieldcal.session.folder import Session
@@ -173,13 +173,13 @@ def calibrated(
     opened = Session.open(folder)
     if not whole_way:
         return fitted(opened)
-    return solve_session(opened, rests(opened), turns)  # type: ignore[arg-type]
+    return solve_session(opened, usable_windows(opened), turns)  # type: ignore[arg-type]
 
 
 def fitted(session: Session, **asked: bool) -> Calibration:
     """Without what is said of effects that the calibration does not carry."""
-    laid = Laid(session, rests(session))
-    return solve(laid.observations, recorded=laid.recorded(True), **asked)  # type: ignore[arg-type]
+    laid = PreparedSession(session, usable_windows(session))
+    return solve(laid.observations, recorded=laid.recorded_rows(True), **asked)  # type: ignore[arg-type]
 
 
 def many_ways(seed: int, n: int) -> list[tuple[Array, Array]]:

@@ -18,10 +18,14 @@ from fieldcal.model.causes.effect_causes import of_effects
 from fieldcal.model.causes.unknown_causes import of_no_effect
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
-from fieldcal.solve.estimation import Estimated, Recorded, estimated
-from fieldcal.solve.given import Given, Wanted
-from fieldcal.solve.rows import of_means
-from fieldcal.solve.shown import Shown
+from fieldcal.solve.estimation import (
+    ParameterEstimate,
+    RecordedRows,
+    estimate_parameters,
+)
+from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
+from fieldcal.solve.rows import rows_of_means
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 PLACES = (*SIX_FACES, *(Position.deg(a, b) for a, b in [(45, 0), (0, 45), (0, 0)]))
@@ -32,11 +36,11 @@ SIZE = float(np.sqrt(np.mean(DRIFT**2)))
 NOMINAL = State(np.zeros(6), np.ones(6), np.zeros((COUNT, 2)), np.zeros(3))
 
 
-def recording(change: Array, noise: Array, drift: Array = DRIFT) -> Recorded:
+def recording(change: Array, noise: Array, drift: Array = DRIFT) -> RecordedRows:
     """Windows of a device that changes with time: biases, and scale factors."""
     force = (outputs(PLACES, bias=np.zeros(3)) / SCALE) * TIMES[:, None]
     acc = outputs(PLACES) + drift * TIMES[:, None] + change * force + noise
-    rows = of_means(replace(observe(PLACES, acc), time=TIMES))
+    rows = rows_of_means(replace(observe(PLACES, acc), time=TIMES))
     return replace(
         rows, rows=replace(rows.rows, x=replace(rows.rows.x, since_start=TIMES))
     )
@@ -45,17 +49,21 @@ def recording(change: Array, noise: Array, drift: Array = DRIFT) -> Recorded:
 CALM = recording(np.zeros(3), np.zeros((COUNT, 3)))
 
 
-def given(wanted: Wanted | None = None) -> Given:
-    return Given(CALM.rows, np.ones(6), CALM.since, False, wanted or Wanted())
+def given(wanted: ParameterSetOptions | None = None) -> ParameterSet:
+    return ParameterSet(
+        CALM.rows, np.ones(6), CALM.since_turn, False, wanted or ParameterSetOptions()
+    )
 
 
-def with_gyroscopes() -> Given:
+def with_gyroscopes() -> ParameterSet:
     seen = observe(PLACES, outputs(PLACES), gyr=np.zeros((COUNT, 3)))
-    rows = of_means(replace(seen, time=TIMES))
-    return Given(rows.rows, np.ones(6), rows.since, False, Wanted())
+    rows = rows_of_means(replace(seen, time=TIMES))
+    return ParameterSet(
+        rows.rows, np.ones(6), rows.since_turn, False, ParameterSetOptions()
+    )
 
 
-def drift(d: Given) -> Member:
+def drift(d: ParameterSet) -> Member:
     """A cause on all accelerometers, as large as the biases drift."""
     cause = next(c for c in of_effects(d) if c.key == "bias_drift:acc")
     group = next(g for g in cause.variants if len(g.params) == 3)
@@ -63,10 +71,12 @@ def drift(d: Given) -> Member:
     return cause, cause.variants[0]
 
 
-def fitted(recorded: Recorded) -> Estimated:
+def fitted(recorded: RecordedRows) -> ParameterEstimate:
     cause, group = drift(given())
-    shown = (Shown(((cause, group),), 1.0, sizes=(group.fixed or 0.0,)),)
-    return estimated(replace(recorded, shown=shown), None, NOMINAL, Wanted())
+    shown = (WeightedExplanation(((cause, group),), 1.0, sizes=(group.fixed or 0.0,)),)
+    return estimate_parameters(
+        replace(recorded, explanations=shown), None, NOMINAL, ParameterSetOptions()
+    )
 
 
 def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> None:
@@ -114,7 +124,7 @@ def test_nothing_comes_of_gyroscopes_or_of_what_is_no_bias() -> None:
     assert warm_scale(d, replace(group, effect=None)) is None
 
 
-def unknown(d: Given, name: str, part: str) -> Group:
+def unknown(d: ParameterSet, name: str, part: str) -> Group:
     """A function without physics."""
     causes = of_no_effect(d)
     return next(c for c in causes if (c.name, c.part) == (name, part)).variants[0]
@@ -156,7 +166,7 @@ def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() ->
     group = cause.variants[0]
     count = len(group.columns) // 3
     size = group.sizes(1.0)[:count]
-    shown = (Shown(((cause, group),), 1.0, sizes=(1.0,)),)
+    shown = (WeightedExplanation(((cause, group),), 1.0, sizes=(1.0,)),)
     waves, force = d.span.waves(d.x)[:, :count], outputs(PLACES, bias=np.zeros(3))
     end = np.cos(np.pi * np.arange(1, count + 1))
     for _ in range(40):
@@ -164,8 +174,12 @@ def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() ->
         scales *= 0.25 / 9.80665
         noise = 1e-4 * rng.standard_normal((COUNT, 3))
         acc = outputs(PLACES) + waves @ bias.T + waves @ scales.T * force / SCALE
-        rows = of_means(replace(observe(PLACES, acc + noise, sigma=1e-4), time=TIMES))
-        one = estimated(replace(rows, shown=shown), None, NOMINAL, Wanted())
+        rows = rows_of_means(
+            replace(observe(PLACES, acc + noise, sigma=1e-4), time=TIMES)
+        )
+        one = estimate_parameters(
+            replace(rows, explanations=shown), None, NOMINAL, ParameterSetOptions()
+        )
         at = [one.names.index(f"acc_scale.{a}") for a in "xyz"]
         truth = SCALE + scales @ end
         sigma = np.sqrt(np.diag(one.covariance)[at])
@@ -176,12 +190,14 @@ def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() ->
 def test_what_the_device_warms_up_by_unseen_is_in_its_scale_factors() -> None:
     """0.01 m/s^2/K and 2 K of a device that nobody saw to warm up."""
     left = FactoryErrors(acc_per_k=0.01, warming_k=2.0)
-    names = [cause.name for cause, _ in given(Wanted(factory=left)).asked]
+    names = [
+        cause.name for cause, _ in given(ParameterSetOptions(factory=left)).base_members
+    ]
     assert WARM_SCALE in names
     nothing = np.zeros((COUNT, 3))
     still = recording(nothing[0], nothing, nothing[0])
     before, after = (
-        estimated(still, None, NOMINAL, Wanted(factory=one))
+        estimate_parameters(still, None, NOMINAL, ParameterSetOptions(factory=one))
         for one in (FactoryErrors(), left)
     )
     at = before.names.index("acc_scale.x")

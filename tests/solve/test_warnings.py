@@ -9,7 +9,7 @@ from test_result import estimated, fit, observed
 from fieldcal.core.gravity import G0
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.solve import warnings, words
-from fieldcal.solve.assumed import Asked
+from fieldcal.solve.options import SolveOptions
 
 
 @pytest.mark.parametrize(
@@ -34,11 +34,11 @@ def test_what_turns_or_rates_leave_open(
     turned: bool, rates: bool, gyr: list[str], cross: list[str], says: str
 ) -> None:
     found = estimated()
-    found.given.wanted.turned = turned  # type: ignore[misc]
+    found.parameter_set.options.turned = turned  # type: ignore[misc]
     seen = observed()
     if rates:
         seen = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
-    assert warnings._turning(gyr, cross, seen, found) == says
+    assert warnings._gyroscope_warning(gyr, cross, seen, found) == says
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_what_turns_or_rates_leave_open(
 def test_what_lengths_leave_open(
     missing: list[str], n: int, dof: int, says: str
 ) -> None:
-    assert warnings._scalar(missing, estimated(acc=fit(dof=dof)), n) == says
+    assert warnings._norm_warning(missing, estimated(acc=fit(dof=dof)), n) == says
 
 
 @pytest.mark.parametrize(
@@ -77,61 +77,70 @@ def test_a_force_that_no_parameter_explains_is_said(
     seen = observed((FIVE[0],) * 3, gravity=G0)
     force = np.array([3.0, 4.0, np.sqrt(G0**2 - 25)])
     seen.mean[:, :3] = stretched * force
-    told = warnings._length(seen)
+    told = warnings._force_length_warning(seen)
     assert told.startswith(says) and bool(told) == bool(says)
 
 
 def test_of_so_few_windows_the_residual_says_nothing() -> None:
-    assert warnings._few("joint", estimated(acc=fit(dof=0))) == [words.NO_DOF]
-    assert warnings._few("joint", estimated(acc=fit(dof=1))) == []
+    assert warnings._few_windows_warnings("joint", estimated(acc=fit(dof=0))) == [
+        words.NO_DOF
+    ]
+    assert warnings._few_windows_warnings("joint", estimated(acc=fit(dof=1))) == []
     one = "only one degree of freedom: too few to check the fit; add"
-    assert warnings._few("scalar", estimated(acc=fit(dof=1))) == [
+    assert warnings._few_windows_warnings("scalar", estimated(acc=fit(dof=1))) == [
         f"{one} positions in other orientations"
     ]
-    assert warnings._few("scalar", estimated(acc=fit(dof=3))) == []
-    assert warnings._few("joint", estimated(acc=fit(dof=0, rms=np.nan))) == []
+    assert warnings._few_windows_warnings("scalar", estimated(acc=fit(dof=3))) == []
+    assert (
+        warnings._few_windows_warnings("joint", estimated(acc=fit(dof=0, rms=np.nan)))
+        == []
+    )
 
 
 def test_a_base_that_two_positions_take_for_level_is_said() -> None:
     seen = observed(TWO, gravity=10.0)
-    (text,) = warnings.not_levelled("two_position", Asked(), seen)
+    (text,) = warnings.level_warnings("two_position", SolveOptions(), seen)
     assert text == (
         "the base is assumed exactly level: a tilt of 0.1° would change a bias by up to"
         " 0.017 m/s² unnoticed; take five positions, or state how level it is (--level)"
     )
-    assert warnings.not_levelled("two_position", Asked(level_deg=0.1), seen) == []
-    assert warnings.not_levelled("joint", Asked(), seen) == []
+    assert (
+        warnings.level_warnings("two_position", SolveOptions(level_deg=0.1), seen) == []
+    )
+    assert warnings.level_warnings("joint", SolveOptions(), seen) == []
 
 
 def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
     loud = {"chi2": 60.0, "dof": 6, "rms": 1e-3}
     spread = "the uncertainties include an additional scatter of {} {}"
-    both = estimated(acc=fit(**loud), gyr=fit(**loud), closures=(90.0, 6))
-    acc, gyr, turns = warnings._scattered(both)
+    both = estimated(acc=fit(**loud), gyr=fit(**loud), closure_squares=(90.0, 6))
+    acc, gyr, turns = warnings._scatter_warnings(both)
     assert acc.startswith("the positions scatter")
     assert spread.format("2.9", "m/s^2") in acc
     assert gyr.startswith("the gyroscopes' means scatter")
     assert spread.format("1.3", "rad/s") in gyr
     assert turns.startswith("the turns scatter") and "6 degrees" in turns
     assert spread.format("5", "rad") in turns
-    both.given.free[:] = True
-    assert warnings._scattered(both)[0].startswith("the norms scatter")
-    few = estimated(closures=(90.0, 5), names=("gyr_scale.x",))
-    assert len(warnings._scattered(few)) == 1, "four of five are left over"
+    both.parameter_set.free[:] = True
+    assert warnings._scatter_warnings(both)[0].startswith("the norms scatter")
+    few = estimated(closure_squares=(90.0, 5), names=("gyr_scale.x",))
+    assert len(warnings._scatter_warnings(few)) == 1, "four of five are left over"
     assert warnings.closure_chi2(few) == (90.0, 4)
     more = estimated(
-        closures=(1.0, 1), names=("gyr_scale.x", "gyro_cross_coupling.s12")
+        closure_squares=(1.0, 1), names=("gyr_scale.x", "gyro_cross_coupling.s12")
     )
     assert warnings.closure_chi2(more) == (1.0, 0)
 
 
 def test_gyroscopes_of_which_no_scale_factor_is_asked_for() -> None:
     found = estimated()
-    found.given.wanted.gyr_scale = False  # type: ignore[misc]
-    assert warnings.left_open("joint", observed(), found) == [words.NO_SCALE]
+    found.parameter_set.options.gyr_scale = False  # type: ignore[misc]
+    assert warnings.undetermined_warnings("joint", observed(), found) == [
+        words.NO_SCALE
+    ]
     earth = observed(grade="navigation", latitude=0.8)
-    assert warnings.left_open("joint", earth, found) == [
+    assert warnings.undetermined_warnings("joint", earth, found) == [
         "gyr_scale is not determined: the Earth's rate gives it only with two known"
         " positions and the latitude"
     ]
-    assert warnings.left_open("joint", observed(gyr=False), found) == []
+    assert warnings.undetermined_warnings("joint", observed(gyr=False), found) == []

@@ -6,7 +6,7 @@ from observed import BIAS, COUPLING, G, observe, outputs
 from scipy.stats import chi2 as chi_square
 
 from fieldcal.calibration import Nominal
-from fieldcal.calibration.plausible import senseless
+from fieldcal.calibration.plausible import implausible_values
 from fieldcal.core.positions import FIVE, WIDE, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
@@ -57,26 +57,31 @@ def test_an_axis_that_does_not_follow_is_said() -> None:
 def test_numbers_are_only_called_senseless_when_they_are_sure() -> None:
     names, plain = ["acc_scale.x", "acc_bias.y", "gyr_scale.z"], Nominal()
     values = np.array([1.4, 6.0, 0.05])
-    sure = senseless(names, values, np.full(3, 1e-3), plain)
+    sure = implausible_values(names, values, np.full(3, 1e-3), plain)
     assert [s.partition(" ")[0] for s in sure] == names
-    unsure = senseless(names[:2], values[:2], np.array([0.08, 1.3]), plain)
+    unsure = implausible_values(names[:2], values[:2], np.array([0.08, 1.3]), plain)
     assert unsure == []
-    assert senseless(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain) == []
+    assert (
+        implausible_values(["base_tilt.about_x_deg"], values[1:2], values[1:2], plain)
+        == []
+    )
 
 
 @pytest.mark.parametrize(("chi2", "dof"), [(3.0, 1), (12.0, 7), (60.0, 20)])
 def test_chance_is_that_of_a_larger_chi2(chi2: float, dof: int) -> None:
-    assert words.chance(chi2, dof) == pytest.approx(chi_square.sf(chi2, dof), rel=1e-9)
-    assert words.chance(chi2, 0) == 1.0
+    assert words.chi2_chance(chi2, dof) == pytest.approx(
+        chi_square.sf(chi2, dof), rel=1e-9
+    )
+    assert words.chi2_chance(chi2, 0) == 1.0
 
 
 def test_scatter_is_told_from_one_in_a_hundred_on() -> None:
     limit = chi_square.isf(thresholds.BEYOND_NOISE, 10)
-    assert words.excess("positions", 0.99 * limit, 10, 0.01, "m/s^2") == ""
-    said = words.excess("positions", 1.01 * limit, 10, 0.01, "m/s^2")
+    assert words.scatter_warning("positions", 0.99 * limit, 10, 0.01, "m/s^2") == ""
+    said = words.scatter_warning("positions", 1.01 * limit, 10, 0.01, "m/s^2")
     assert "10 degrees of freedom" in said and "0.01 m/s^2" in said and "0.06°" in said
     assert "itself uncertain" not in said
-    assert "itself uncertain" in words.excess("norms", 90.0, 4, 0.01, "m/s^2")
+    assert "itself uncertain" in words.scatter_warning("norms", 90.0, 4, 0.01, "m/s^2")
 
 
 @pytest.mark.parametrize(
@@ -119,7 +124,9 @@ def test_two_positions_of_the_same_kind_say_what_a_tilt_would_do() -> None:
 
 
 def test_what_a_recording_shows_is_said_of_one_that_determines_nothing() -> None:
-    said = words.carried(1.0, {"random_walk": 0.97}, (), np.zeros(0), 60.0)
+    said = words.effects_warning(1.0, {"random_walk": 0.97}, (), np.zeros(0), 60.0)
     assert said.startswith("the recording shows random_walk (probability 0.97);")
-    of_one = words.carried(1.0, {"random_walk": 0.97}, ("acc_bias.x",), np.ones(1), 60)
+    of_one = words.effects_warning(
+        1.0, {"random_walk": 0.97}, ("acc_bias.x",), np.ones(1), 60
+    )
     assert "otherwise acc_bias.x would be off by 1.0 σ" in of_one

@@ -12,9 +12,9 @@ from thermal_devices import Warming, exact, session
 
 from fieldcal.acceptance.assessment import assess, store_in_history
 from fieldcal.acceptance.change import check_change
-from fieldcal.acceptance.warmed import warmed
+from fieldcal.acceptance.family_at_temperature import family_at_temperature
 from fieldcal.calibration import Calibration, limits
-from fieldcal.evaluation.observations import observe, rests, with_provenance
+from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
 from fieldcal.history.store import History, HistoryRun
 from fieldcal.history.trend import trend
 from fieldcal.session.folder import Session
@@ -59,7 +59,7 @@ def assessed(folder: Path, temperature: float, seed: int) -> Calibration:
     write_session(folder, block, positions, site=site, device={"serial": "SIM-1"})
     recorded, history = Session.open(folder), History(folder.parent / "h.db")
     means = with_provenance(solve(observe(recorded)[0]), recorded.about)
-    found = assess(means, recorded, rests(recorded), BOUNDS, history)
+    found = assess(means, recorded, usable_windows(recorded), BOUNDS, history)
     assert not store_in_history(history, recorded, found)
     return found
 
@@ -109,7 +109,7 @@ def steady(step: float) -> Warming:
 
 def refused(found: Calibration, earlier: list[HistoryRun]) -> list[str]:
     """What is out of family, at its temperature."""
-    family = warmed(found, earlier, BOUNDS)
+    family = family_at_temperature(found, earlier, BOUNDS)
     checks = check_change(found, BOUNDS, family.calibrations, family.sigma)
     return [c.says for c in checks if c.ok is False]
 
@@ -134,7 +134,9 @@ def test_what_the_history_knows_of_temperature_is_taken_off() -> None:
     assert not refused(session(of, 6.0, np.zeros(3), exact(of)), earlier)
     wrong = session(of, 6.0, np.array([0.25, 0, 0]), exact(of))
     assert "at other temperatures" in refused(wrong, earlier)[0]
-    family = warmed(session(of, 6.0, np.zeros(3), exact(of)), earlier, BOUNDS)
+    family = family_at_temperature(
+        session(of, 6.0, np.zeros(3), exact(of)), earlier, BOUNDS
+    )
     true = of.values(6.0)["acc_bias"][0]
     for one in family.calibrations:
         assert abs(one.value("acc_bias.x") - true) < 5 * 1.5e-3

@@ -11,7 +11,7 @@ import pytest
 from session_folders import write_session
 from thermal_devices import Warming, drawn, exact, session
 
-from fieldcal.acceptance.temperature import since_last
+from fieldcal.acceptance.temperature import effect_of_temperature_change
 from fieldcal.calibration import Calibration, limits
 from fieldcal.cli import main
 from fieldcal.evaluation.observations import observe
@@ -117,7 +117,7 @@ def run(number: int, found: Calibration) -> HistoryRun:
 def test_at_go_the_difference_of_temperature_is_told_by_the_history() -> None:
     of = drawn(np.random.default_rng(9))
     earlier = [run(i + 1, at(of, t)) for i, t in enumerate((3.0, 46.0, 25.0, 12.0))]
-    told = since_last(at(of, 36.0), earlier, BOUNDS)
+    told = effect_of_temperature_change(at(of, 36.0), earlier, BOUNDS)
     assert told is not None and told["then_degc"] == 12.0 and told["now_degc"] == 36.0
     for name, change in told["parameters"].items():
         group, axis = name.split(".")
@@ -130,10 +130,13 @@ def test_at_go_the_difference_of_temperature_is_told_by_the_history() -> None:
 
 def test_without_enough_history_it_is_said_that_nobody_knows() -> None:
     of = drawn(np.random.default_rng(9))
-    told = since_last(at(of, 36.0), [run(1, at(of, 12.0))], BOUNDS)
+    told = effect_of_temperature_change(at(of, 36.0), [run(1, at(of, 12.0))], BOUNDS)
     assert told is not None and told["parameters"] is None
     assert "three calibrations over at least 10 K" in told["says"][0]
-    assert since_last(at(of, 12.5), [run(1, at(of, 12.0))], BOUNDS) is None
-    assert since_last(at(of, 36.0), [], BOUNDS) is None
+    assert (
+        effect_of_temperature_change(at(of, 12.5), [run(1, at(of, 12.0))], BOUNDS)
+        is None
+    )
+    assert effect_of_temperature_change(at(of, 36.0), [], BOUNDS) is None
     unknown = replace(at(of, 36.0), info={})
-    assert since_last(unknown, [run(1, at(of, 12.0))], BOUNDS) is None
+    assert effect_of_temperature_change(unknown, [run(1, at(of, 12.0))], BOUNDS) is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from fieldcal.calibration.wording import pretty, title
+from fieldcal.calibration.wording import format_unit, parameter_title
 from fieldcal.diagnosis.result import EffectLine, FoundEffect, Quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 from fieldcal.effects import catalogue
@@ -91,7 +91,7 @@ def pretty_quantity(quantity: Quantity) -> str:
     """A value with its uncertainty, its unit with raised figures."""
     text = with_uncertainty(quantity)
     unit = quantity.unit
-    return text.removesuffix(unit) + pretty(unit) if unit != "1" else text
+    return text.removesuffix(unit) + format_unit(unit) if unit != "1" else text
 
 
 def _significance(quantity: Quantity) -> float:
@@ -117,9 +117,9 @@ def _calibration_change(found: FoundEffect) -> str:
     sigmas = _significance(most)
     if sigmas < thresholds.MOVED:
         return f"less than {thresholds.MOVED:g} σ"
-    unit = pretty(most.unit)
+    unit = format_unit(most.unit)
     by = f"{most.value:+.2g} {unit}".rstrip()
-    return f"{title(name)} {by} ({sigmas:.0f} σ)"
+    return f"{parameter_title(name)} {by} ({sigmas:.0f} σ)"
 
 
 def of_verdict(verdict: str, probability: float, named: int) -> str:

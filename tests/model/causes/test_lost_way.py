@@ -16,8 +16,8 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.wording.paragraph import notes
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.lost_way import lost_ways
 from fieldcal.model.turns.turn import only
@@ -79,7 +79,7 @@ def calibrated(folder: Path, seed: int, way: int | None) -> Calibration:
     tables = about()
     write_session(folder, lossy(seed, way), held(way), **tables)
     session = Session.open(folder)
-    return solved(session, rests(session))
+    return solve_session(session, usable_windows(session))
 
 
 @pytest.mark.thorough

@@ -15,8 +15,8 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare
 from fieldcal.diagnosis.wording.paragraph import notes
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.sinking import NAME, sinking
 from fieldcal.session.description import parse
@@ -64,7 +64,7 @@ def test_biases_are_right_and_as_uncertain_as_is_said(tmp_path: Path) -> None:
         folder = write_session(tmp_path / str(seed), sunk(seed, 6e-3), PLACES,
                                site=SITE)  # fmt: skip
         session = Session.open(folder)
-        found = solved(session, rests(session))
+        found = solve_session(session, usable_windows(session))
         value, sigma = found.vector("acc_bias")
         pulls.append((value - ACC) / sigma)
         assert any("The base turned slowly" in text for text in found.warnings)

@@ -16,8 +16,12 @@ from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.solve.given import Given, Wanted, seen_by
-from fieldcal.solve.rows import of_means
+from fieldcal.solve.parameter_set import (
+    ParameterSet,
+    ParameterSetOptions,
+    with_base_rate,
+)
+from fieldcal.solve.rows import rows_of_means
 
 SD = 1e-3
 PLACES = tuple(
@@ -41,9 +45,11 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     """Means of a perfect device that are off by something."""
     perfect = outputs(places, bias=np.zeros(3), scale=np.ones(3))
     seen = observe(places, perfect + off, sigma=SD)
-    recorded = of_means(seen)
-    rows = seen_by(recorded.rows, np.zeros(3))
-    d = Given(rows, np.ones(6), recorded.since, False, Wanted())
+    recorded = rows_of_means(seen)
+    rows = with_base_rate(recorded.rows, np.zeros(3))
+    d = ParameterSet(
+        rows, np.ones(6), recorded.since_turn, False, ParameterSetOptions()
+    )
     nominal = State(np.zeros(6), np.ones(6), np.zeros((len(places), 2)), np.zeros(3))
     gram = Inference(WindowSystem(rows, d), nominal).gram(
         nominal, np.zeros(d.width), None
@@ -52,7 +58,7 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     there = search.evaluated(())
     found = Mixing(d, gram, there, search.unstable).run()
     names = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
-    assert found.columns.tolist() == [int(d.place(n)[0]) for n in names]
+    assert found.columns.tolist() == [int(d.columns_for(n)[0]) for n in names]
     design = np.zeros((len(places), 3, 6))
     for c in range(3):
         design[:, c, c], design[:, c, 3 + c] = 1.0, perfect[:, c]

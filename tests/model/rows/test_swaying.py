@@ -18,8 +18,8 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare
-from fieldcal.evaluation.observations import rests
-from fieldcal.evaluation.solution import Laid, solved
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import PreparedSession, solve_session
 from fieldcal.model.rows.swaying import swaying
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
@@ -74,10 +74,10 @@ def session(folder: Path, block: Block, **site: Any) -> Session:
 
 def fitted(session: Session) -> Calibration:
     """Solve without a search for effects that the calibration does not carry."""
-    laid = Laid(session, rests(session))
+    laid = PreparedSession(session, usable_windows(session))
     return solve(
         laid.observations,
-        recorded=laid.recorded(True),
+        recorded=laid.recorded_rows(True),
         level_sigma_deg=LEVEL["level_deg"],
         angle_sigma_deg=LEVEL["angle_setting_deg"],
         factory=factory_errors(session.about),
@@ -99,7 +99,7 @@ def test_it_calibrates_through_sway(tmp_path: Path) -> None:
     """Biases as on firm ground; scale factors by turns that begin and end aslant."""
     block = played(3, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))
     one = session(tmp_path / "pier", block)
-    swaying = solved(one, rests(one))
+    swaying = solve_session(one, usable_windows(one))
     firm = session(tmp_path / "firm", played(3))
     there, here = off(swaying), off(fitted(firm))
     assert np.abs(there[0]).max() < 3.5
@@ -126,7 +126,7 @@ def test_it_calibrates_accelerometers_without_gyroscopes(tmp_path: Path) -> None
     for name, one in (("pier", block), ("firm", played(3))):
         alone = replace(one, gyr=np.full_like(one.gyr, np.nan))
         held = session(tmp_path / name, alone, level_deg=1e-4, angle_setting_deg=1e-4)
-        pair.append(solved(held, rests(held), left=PERFECT))
+        pair.append(solve_session(held, usable_windows(held), left=PERFECT))
     at = [pair[0].names.index(f"acc_{n}.{x}") for n in NAMES for x in "xyz"]
     assert pair[0].names == pair[1].names
     there, here = ((f.values[at], np.sqrt(np.diag(f.covariance))[at]) for f in pair)
@@ -193,8 +193,10 @@ def test_means_of_windows_pull_right(tmp_path: Path) -> None:
     pulls = []
     for seed in range(2):
         effects = [IRREGULAR.format(70 * seed, a) for a in (20, 100)]
-        quiet = rests(session(tmp_path / f"q{seed}", played(seed))).averages
-        found = rests(session(tmp_path / f"s{seed}", played(seed, *effects))).averages
+        quiet = usable_windows(session(tmp_path / f"q{seed}", played(seed))).averages
+        found = usable_windows(
+            session(tmp_path / f"s{seed}", played(seed, *effects))
+        ).averages
         for one, other in zip(found, quiet, strict=True):
             assert (one.sigma < 1.5 * WHITE).all()
             pulls.append((one.mean - other.mean) / one.sigma)
@@ -213,23 +215,25 @@ def test_a_window_too_short_to_show_it_is_as_uncertain_as_its_ends(
     short = Session.open(write_session(tmp_path / "s", block, places))
     found = swaying(block, short.about)
     assert found is not None and found.left[2, 0] > 100 * found.left[1, 0]
-    still = rests(short)  # eight seconds of it creep, and are no rest
-    assert 2 not in still.rows and any("position 3" in w for w in still.warnings)
+    still = usable_windows(short)  # eight seconds of it creep, and are no rest
+    assert 2 not in still.position_numbers and any(
+        "position 3" in w for w in still.warnings
+    )
 
 
 def test_samples_that_are_left_out_part_a_window(tmp_path: Path) -> None:
     block = played(2, IRREGULAR.format(40, 30))
     gap = (block.t > 15.0) & (block.t < 19.0)
     block.acc[gap] = block.gyr[gap] = np.nan
-    plain = rests(session(tmp_path / "plain", played(2))).averages[0]
-    found = rests(session(tmp_path / "gap", block)).averages[0]
+    plain = usable_windows(session(tmp_path / "plain", played(2))).averages[0]
+    found = usable_windows(session(tmp_path / "gap", block)).averages[0]
     assert (np.abs(found.mean - plain.mean) < 3 * found.sigma).all()
 
 
 def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:
     block = played(1, IRREGULAR.format(40, 30))
     held = write_session(tmp_path / "s", block, positions(angles=False))
-    assert not any("sways" in w for w in rests(Session.open(held)).warnings)
+    assert not any("sways" in w for w in usable_windows(Session.open(held)).warnings)
 
 
 def test_who_says_that_it_sways() -> None:

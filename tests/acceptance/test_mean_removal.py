@@ -9,13 +9,19 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal, norm
 
-from fieldcal.acceptance.centred import (
-    biases_taken_out,
-    centred,
-    centred_and_altered,
-    centred_and_rounded,
+from fieldcal.acceptance.bias_removal import (
+    DOUBT,
+    POSITION_DEPENDENCE,
+    TRACKING,
+    BiasSpread,
+    bias_removal_probability,
 )
-from fieldcal.acceptance.tracked import DOUBT, LEANING, TRACKING, BiasSpread, tracked
+from fieldcal.acceptance.mean_removal import (
+    altered_mean_probability,
+    mean_probabilities,
+    removed_bias_sentences,
+    rounded_mean_probability,
+)
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
@@ -64,7 +70,7 @@ def test_a_bias_or_the_earths_rate_stands_out() -> None:
     rng = np.random.default_rng(1)
     for bias, earth in ((1e-3, 0.0), (-1e-4, 0.0), (0.0, EARTH)):
         found = [
-            tracked(*at_rest(rng, bias, earth=earth), KEEPS, LEAST)[0]
+            bias_removal_probability(*at_rest(rng, bias, earth=earth), KEEPS, LEAST)[0]
             for _ in range(20)
         ]
         assert np.mean(np.array(found) > DOUBT) <= 0.1
@@ -74,16 +80,16 @@ def test_so_noisy_a_device_may_be_at_zero_by_chance() -> None:
     rng = np.random.default_rng(5)
     windows, block = at_rest(rng, 0.0)
     block.gyr[:] *= 100.0
-    assert tracked(windows, block, KEEPS, LEAST)[0] < DOUBT
+    assert bias_removal_probability(windows, block, KEEPS, LEAST)[0] < DOUBT
 
 
 def test_a_bias_that_is_tracked_leaves_nothing() -> None:
     rng = np.random.default_rng(2)
     for seconds in (0.5, 1.0, 3.0, 6.0):
         windows, block = at_rest(rng, -7e-3, seconds)
-        chance, what = tracked(windows, block, KEEPS, LEAST)
+        chance, what = bias_removal_probability(windows, block, KEEPS, LEAST)
         assert chance > 0.5 and "18 means" in what
-    assert tracked(windows[:1], block, KEEPS, LEAST) == (0.0, "")
+    assert bias_removal_probability(windows[:1], block, KEEPS, LEAST) == (0.0, "")
 
 
 @pytest.mark.parametrize("each", [2, 6])
@@ -97,7 +103,7 @@ def test_what_is_tracked_is_seen_behind_lines_between_samples(each: int) -> None
                 np.interp(block.t, block.t[::each], w[::each]) for w in block.gyr.T
             ]
             block.gyr[:] = np.column_stack(lines)
-            found.append(tracked(windows, block, KEEPS, LEAST)[0])
+            found.append(bias_removal_probability(windows, block, KEEPS, LEAST)[0])
     assert min(found[:10]) > DOUBT > 1e-3 > max(found[10:])
 
 
@@ -125,7 +131,7 @@ def test_a_bias_that_is_taken_out_at_each_stop_leaves_noise(seconds: float) -> N
     rng = np.random.default_rng(4)
     for _ in range(3):
         windows, block = zeroed_at_rest(rng, -7e-3, seconds)
-        chance, what = tracked(windows, block, KEEPS, LEAST)
+        chance, what = bias_removal_probability(windows, block, KEEPS, LEAST)
         assert chance > 0.5 and "18 means" in what
 
 
@@ -154,10 +160,14 @@ def test_an_autopilot_that_averaged_once_keeps_its_bias() -> None:
         block.gyr[:] += 1e-3 * rng.standard_normal(block.gyr.shape)
         for found, averaged in ((told, True), (unknown, False)):
             keeps = BiasSpread(REPEAT, averaged)
-            found.append(bool(tracked(windows, block, keeps, LEAST)[0] > DOUBT))
+            found.append(
+                bool(bias_removal_probability(windows, block, keeps, LEAST)[0] > DOUBT)
+            )
         windows, block = at_rest(rng, -7e-3, 3.0)
         keeps = BiasSpread(REPEAT, averaged=True)
-        tracking.append(bool(tracked(windows, block, keeps, LEAST)[0] > DOUBT))
+        tracking.append(
+            bool(bias_removal_probability(windows, block, keeps, LEAST)[0] > DOUBT)
+        )
     assert sum(told) <= 2
     assert sum(unknown) > 10  # without that they cannot be told apart
     assert np.mean(tracking) > 0.9
@@ -171,30 +181,36 @@ def test_windows_too_short_or_too_coarse_show_no_stop() -> None:
     slow = Block.of(block.t * 50, block.acc, block.gyr)
     long = [replace(w, start=50 * w.start, end=50 * w.end) for w in windows]
     for some, recorded in ((short, block), (long, slow)):
-        assert 0 <= tracked(some, recorded, KEEPS, LEAST)[0] <= 1
+        assert 0 <= bias_removal_probability(some, recorded, KEEPS, LEAST)[0] <= 1
 
 
 def test_a_recording_without_its_mean() -> None:
     rng = np.random.default_rng(3)
-    chances = [p for _ in range(200) for _, p in centred(recording(rng, 0.0))]
+    chances = [
+        p for _ in range(200) for _, p in mean_probabilities(recording(rng, 0.0))
+    ]
     assert 0.4 < np.mean(chances) < 0.6 and np.mean(np.array(chances) < 1e-2) < 0.04
     block = recording(rng, 5.0)
-    assert all(p == 1.0 for _, p in centred(block))
+    assert all(p == 1.0 for _, p in mean_probabilities(block))
     block.acc[:] -= block.acc.mean(axis=0)
-    assert [name for name, p in centred(block) if p < 1e-9] == ["ax", "ay", "az"]
+    assert [name for name, p in mean_probabilities(block) if p < 1e-9] == [
+        "ax",
+        "ay",
+        "az",
+    ]
 
 
 def test_both_are_told_apart_and_said() -> None:
     rng = np.random.default_rng(4)
     windows, block = at_rest(rng, 1e-3)
     block.acc[:] = 5.0 + rng.standard_normal(block.acc.shape)
-    assert biases_taken_out(windows, block, BOTH, NONE, LEAST) == []
+    assert removed_bias_sentences(windows, block, BOTH, NONE, LEAST) == []
     block.gyr[:] -= 1e-3
-    (said,) = biases_taken_out(windows, block, BOTH, NONE, LEAST)
+    (said,) = removed_bias_sentences(windows, block, BOTH, NONE, LEAST)
     assert "removes its bias at rest" in said
     block.gyr[:] += 1e-3
     block.acc[:, 1] -= block.acc[:, 1].mean()
-    (said,) = biases_taken_out(windows, block, BOTH, NONE, LEAST)
+    (said,) = removed_bias_sentences(windows, block, BOTH, NONE, LEAST)
     assert "closer to zero in ay than noise" in said
 
 
@@ -229,13 +245,13 @@ def test_a_mean_that_was_taken_before_rounding(mode: str) -> None:
         windows, block = faces(rng, 0.05)
         own = block.acc.copy()
         block.acc[:] = ROUNDED[mode](own)
-        assert centred_and_rounded(windows, block, 0.05, LEAST) > LEAST
+        assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
         block.acc[:] = ROUNDED[mode](own - own.mean(axis=0))
-        assert all(p > LEAST for _, p in centred(block))
-        found.append(centred_and_rounded(windows, block, 0.05, LEAST))
+        assert all(p > LEAST for _, p in mean_probabilities(block))
+        found.append(rounded_mean_probability(windows, block, 0.05, LEAST))
     assert np.mean(np.array(found) < LEAST) > 0.6
     block.acc[:] += 1e-3 * rng.standard_normal(block.acc.shape)
-    assert centred_and_rounded(windows, block, 0.05, LEAST) == 1.0
+    assert rounded_mean_probability(windows, block, 0.05, LEAST) == 1.0
 
 
 def near_zero(sigma: Array, spread: float) -> float:
@@ -267,14 +283,14 @@ def test_the_odds_of_gyroscopes_at_zero_are_those_of_two_normal_laws(seed: int) 
     spread = 1e-4
     zero, ways = sigma**2 * np.eye(6), []
     likely = np.prod([multivariate_normal(cov=zero).pdf(axis) for axis in settled.T])
-    for leaning in LEANING:
+    for leaning in POSITION_DEPENDENCE:
         felt = (EARTH**2 / 3 if leaning else 0.0) + (leaning * spread) ** 2
         cov = zero + felt * np.eye(6) + spread**2 * np.ones((6, 6))
         ways.append(np.prod([multivariate_normal(cov=cov).pdf(a) for a in settled.T]))
     alone = [sphere(c, sigma, np.random.default_rng(9)) for c in settled]
     ways.append(np.prod(alone))
     expected = TRACKING / (TRACKING + np.mean(ways) / likely)
-    chance, _ = tracked(windows, block, BiasSpread(spread), LEAST)
+    chance, _ = bias_removal_probability(windows, block, BiasSpread(spread), LEAST)
     assert 1e-4 < expected < 0.999
     assert chance == pytest.approx(expected, rel=0.15, abs=0.02)
 
@@ -290,9 +306,9 @@ def test_of_gyroscopes_with_biases_hardly_any_are_taken_for_such_a_device(
         windows, block = at_rest(rng, 0.0)
         block.gyr[:] *= rng.choice([1.0, 4.0, 16.0])
         block.gyr[:] += REPEAT * rng.standard_normal(3)
-        lying = LEANING[-1] * REPEAT * rng.standard_normal((6, 3))
+        lying = POSITION_DEPENDENCE[-1] * REPEAT * rng.standard_normal((6, 3))
         block.gyr[:] += np.repeat(lying, COUNT, axis=0)
-        taken += tracked(windows, block, KEEPS, LEAST)[0] > DOUBT
+        taken += bias_removal_probability(windows, block, KEEPS, LEAST)[0] > DOUBT
     assert taken <= 0.01 * count
 
 
@@ -300,12 +316,12 @@ def test_windows_without_noise_or_without_an_axis_do_not_count() -> None:
     windows, block = at_rest(np.random.default_rng(3), 0.0)
     block.gyr[COUNT : 2 * COUNT] = 0.0
     block.gyr[2 * COUNT : 3 * COUNT, 1] = np.nan
-    assert "of 14 means" in tracked(windows, block, KEEPS, LEAST)[1]
+    assert "of 14 means" in bias_removal_probability(windows, block, KEEPS, LEAST)[1]
     # two windows of three axes are the fewest
-    assert tracked(windows[3:5], block, KEEPS, LEAST)[0] > 0.5
-    assert tracked(windows[2:4], block, KEEPS, LEAST) == (0.0, "")
+    assert bias_removal_probability(windows[3:5], block, KEEPS, LEAST)[0] > 0.5
+    assert bias_removal_probability(windows[2:4], block, KEEPS, LEAST) == (0.0, "")
     block.gyr[:, 0] = np.nan
-    assert tracked(windows, block, KEEPS, LEAST) == (0.0, "")
+    assert bias_removal_probability(windows, block, KEEPS, LEAST) == (0.0, "")
 
 
 @pytest.mark.parametrize("sigmas", [0.1, 0.5, 1.5])
@@ -313,7 +329,7 @@ def test_the_chance_of_a_mean_so_small_is_that_of_the_normal(sigmas: float) -> N
     block = recording(np.random.default_rng(8), 0.0)
     block.acc[:] += sigmas / np.sqrt(COUNT) - block.acc.mean(axis=0)
     expected = float(norm.cdf(sigmas) - norm.cdf(-sigmas))
-    for _, p in centred(block):
+    for _, p in mean_probabilities(block):
         assert p == pytest.approx(expected, rel=0.05)
 
 
@@ -345,15 +361,15 @@ def test_the_chance_of_a_mean_that_rounding_leaves_is_as_written(mode: str) -> N
             chances.append(chi2.cdf(square, 3) * near_zero(np.sqrt(var), spread))
     expected = 4 * min(chances)
     block = Block.of(np.arange(len(acc)) / RATE, acc, np.zeros_like(acc))
-    found = centred_and_rounded(windows, block, spread, LEAST)
+    found = rounded_mean_probability(windows, block, spread, LEAST)
     assert 0 < expected < 1 and found == pytest.approx(expected, rel=0.05)
     large = np.array([1.0, 1.0, 1e3]) * spread  # a bias that is found on one axis
-    assert centred_and_rounded(windows, block, large, LEAST) < 0.02 * found
+    assert rounded_mean_probability(windows, block, large, LEAST) < 0.02 * found
     block.acc[5, 1] = np.nan
-    assert centred_and_rounded(windows, block, spread, LEAST) == 1.0
+    assert rounded_mean_probability(windows, block, spread, LEAST) == 1.0
     block.acc[5, 1] = 0.0
     block.acc[:, 0] += 1e-3 * rng.standard_normal(len(acc))
-    assert centred_and_rounded(windows, block, spread, LEAST) == 1.0
+    assert rounded_mean_probability(windows, block, spread, LEAST) == 1.0
 
 
 def test_few_digits_of_what_was_on_a_grid_of_its_own() -> None:
@@ -363,9 +379,9 @@ def test_few_digits_of_what_was_on_a_grid_of_its_own() -> None:
         windows, block = faces(rng, 0.05)
         own = np.round(block.acc / 2.39e-3) * 2.39e-3
         block.acc[:] = np.round(own, 3)
-        assert centred_and_rounded(windows, block, 0.05, LEAST) > LEAST
+        assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
         block.acc[:] = np.round(own - own.mean(axis=0), 3)
-        assert centred_and_rounded(windows, block, 0.05, LEAST) < LEAST
+        assert rounded_mean_probability(windows, block, 0.05, LEAST) < LEAST
 
 
 @pytest.mark.parametrize(("step", "shows"), [(1e-3, True), (1e-2, False)])
@@ -382,10 +398,10 @@ def test_few_digits_of_what_was_on_the_same_grid_move_all_alike(
         windows, block = faces(rng, 0.05)
         own = np.round(block.acc / step) * step
         block.acc[:] = own
-        assert centred_and_rounded(windows, block, 0.05, LEAST) > LEAST
+        assert rounded_mean_probability(windows, block, 0.05, LEAST) > LEAST
         block.acc[:] = np.round((own - own.mean(axis=0)) / step) * step
         left.append(np.abs(block.acc.mean(axis=0)).max())
-        found = centred_and_rounded(windows, block, 0.05, LEAST)
+        found = rounded_mean_probability(windows, block, 0.05, LEAST)
         assert (found < LEAST) == shows
     assert 0.3 * step < np.median(left) < 0.5 * step
 
@@ -401,25 +417,27 @@ def test_a_mean_that_was_taken_before_something_else() -> None:
         windows, block = faces(rng, 0.05)
         bias = rng.normal(0, 0.3, 3)
         block.acc[:] += bias - block.acc.mean(axis=0) + rng.normal(0, 0.3, 3)
-        sound.append(centred_and_altered(block, bias))
+        sound.append(altered_mean_probability(block, bias))
     for share in (0.01, 0.05):
         assert (np.array(sound) < share).mean() < share + 0.02
     block.acc[:] += 0.1 - block.acc.mean(axis=0)
-    assert centred_and_altered(block, np.full(3, 0.1)) > 0.1
+    assert altered_mean_probability(block, np.full(3, 0.1)) > 0.1
     own = block.acc - block.acc.mean(axis=0)
     for each in (2, 5):
         lines = [np.interp(block.t, block.t[::each], a[::each]) for a in own.T]
         block.acc[:] = np.column_stack(lines)
-        assert all(p > LEAST for _, p in centred(block))
-        assert centred_and_altered(block, np.array([-2.0, 0.3, 0.05])) < 1e-6
-    assert centred_and_altered(block, NONE) == 1.0
-    (said,) = biases_taken_out(windows, block, BOTH, np.array([2.0, 1.0, 0.1]), LEAST)
+        assert all(p > LEAST for _, p in mean_probabilities(block))
+        assert altered_mean_probability(block, np.array([-2.0, 0.3, 0.05])) < 1e-6
+    assert altered_mean_probability(block, NONE) == 1.0
+    (said,) = removed_bias_sentences(
+        windows, block, BOTH, np.array([2.0, 1.0, 0.1]), LEAST
+    )
     assert "subtracted the mean" in said
     block.acc[:, 1] = np.nan
-    assert centred_and_altered(block, np.ones(3)) == 1.0
+    assert altered_mean_probability(block, np.ones(3)) == 1.0
 
 
 def test_means_of_exactly_zero_are_no_fault_of_the_check() -> None:
     windows, block = at_rest(np.random.default_rng(13), 0.0)
     block.gyr[:] = 5e-4 * np.where(np.arange(len(block)) % 2, 1.0, -1.0)[:, None]
-    assert 0.0 <= tracked(windows, block, KEEPS, LEAST)[0] <= 1.0
+    assert 0.0 <= bias_removal_probability(windows, block, KEEPS, LEAST)[0] <= 1.0

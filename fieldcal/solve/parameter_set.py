@@ -1,10 +1,10 @@
-"""The given set of `solve`: the parameters that describe the device.
+"""The parameter set of `solve`: the parameters that describe the device.
 
-It is a set of the model (`fieldcal.model`) that is given instead of searched for. The
-priors of the estimated parameters are so wide that they do not matter. The tilt of the
-base, the errors of set angles, and the uncertainty of the Earth's rate have the stated
-sizes. The error of an angle has two parts of equal variance: one is repeated by the
-fixture each time the same detent is set, the other is new in each position.
+It is a set of causes of the model (`fieldcal.model`) that is given instead of searched
+for. The priors of the estimated parameters are so wide that they do not matter. The
+tilt of the base, the errors of set angles, and the uncertainty of the Earth's rate have
+the stated sizes. The error of an angle has two parts of equal variance: one is repeated
+by the fixture each time the same detent is set, the other is new in each position.
 """
 
 from __future__ import annotations
@@ -32,26 +32,31 @@ from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Effect
-from fieldcal.solve.shown import Shown, at_end, carried
+from fieldcal.solve.explanations import (
+    WeightedExplanation,
+    bias_scale_at_end,
+    translate_explanations,
+)
 from fieldcal.solve.warm_scales import WARM_SCALE, warm_scale
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is to be estimated beside bias and scale factor, and what is known.
+class ParameterSetOptions:
+    """Contents of a parameter set besides bias and scale factor; uncertainties 1 sigma.
 
     Attributes
     ----------
-    tilt : how the base is tilted
-    cross, gyro_cross : cross-coupling of the accelerometers, of the gyroscopes
-    gyr_scale : whether the scale factor of the gyroscopes is
-    level_deg : how level the base is, about each level axis; None if it is not stated
-    beside_tilt_deg : how large the other kind of tilt may be beside it
-    angles_deg : how well each angle is set
-    factory : what the factory left of errors, where they are not estimated
-    earth : (3,) rad/s, what is not known of the Earth's rate in base axes
+    tilt : kind of the estimated tilt
+    cross, gyro_cross : whether cross-coupling of the accelerometers, of the gyroscopes,
+        is estimated
+    gyr_scale : whether the scale factor of the gyroscopes is estimated
+    level_deg : uncertainty of the level about each level axis; None if not stated
+    beside_tilt_deg : possible size of the other kind of tilt
+    angles_deg : uncertainty of each set angle
+    factory : sizes of the errors that the factory left and that are not estimated
+    earth : (3,) rad/s, uncertainty of the Earth's rate in base axes
     turned : whether turns between positions were recorded
-    lot : what the unit's lot says of its parameters; None where nobody asks it
+    lot : prior of the parameters from the unit's lot; None if not used
 
     """
 
@@ -68,23 +73,25 @@ class Wanted:
     lot: LotPrior | None = None
 
 
-class Given(Dictionary):
-    """The columns of a given set, and those by which a window may be off by itself.
+class ParameterSet(Dictionary):
+    """Columns of the parameters, and of errors that affect single windows.
 
     Parameters
     ----------
-    rows : of the windows
+    rows : rows of the windows
     unit : (6,) outputs per SI unit
-    since : (o, n) s since the turn, by origin
-    turns : whether the way between positions is seen
-    wanted : what the set is made of
-    shown : explanations of the recording, of which the set takes what it lacks
-    cut : what each accelerometer's values may have lost in size, 1 sigma
+    since : (o, n) time since the last turn, s, by origin
+    turns : whether the turns between positions are used
+    wanted : contents of the set
+    shown : explanations of the recording; the set adds their causes that it lacks
+    cut : how much smaller each accelerometer's values may be because they were rounded
+        toward zero, 1 sigma
 
     Attributes
     ----------
-    explanations : the same by its own columns, the likeliest first
-    left_out : cross-coupling of the accelerometers, where it is not in the set
+    explanations : the explanations in the columns of this set, the likeliest first
+    omitted_cross_coupling : cross-coupling of the accelerometers if it is not in the
+        set; else None
 
     """
 
@@ -94,12 +101,12 @@ class Given(Dictionary):
         unit: Array,
         since: Array,
         turns: bool,
-        wanted: Wanted,
-        shown: Sequence[Shown] = (),
+        wanted: ParameterSetOptions,
+        shown: Sequence[WeightedExplanation] = (),
         cut: Sequence[float] = (),
     ) -> None:
-        self.wanted, self.cut = wanted, np.array(cut, dtype=float)
-        self.sign = _signs(rows, self.cut)
+        self.options, self.cut = wanted, np.array(cut, dtype=float)
+        self.sign = _mean_signs(rows, self.cut)
         held = np.unique(rows.x.position)
         common = np.array([rows.common[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
@@ -107,45 +114,49 @@ class Given(Dictionary):
             rows.x, rows.used, since, common, unit, turns, wander, rows.alike
         )
         has = {group_of(n) for n in self.names}
-        self.explanations = carried(self, shown, has) or (Shown((), 1.0),)
-        left = self._warm_scales(self.asked)
+        self.explanations = translate_explanations(self, shown, has) or (
+            WeightedExplanation((), 1.0),
+        )
+        left = self._warm_scales(self.base_members)
         self.causes = [*self.causes, *(cause for cause, _ in left.values())]
         every = [m for one in self.explanations for m in one.members]
         self._warm = self._warm_scales(every)
-        self.left_out = self._left_out()
+        self.omitted_cross_coupling = self._usual_cross_coupling()
 
     @property
-    def asked(self) -> tuple[Member, ...]:
-        """What was asked for, and what is known of it."""
+    def base_members(self) -> tuple[Member, ...]:
+        """Requested parameters, and errors of known size."""
         return tuple((c, c.variants[0]) for c in self.causes)
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """The set, with what the likeliest explanation of the recording has."""
-        return self.beside(self.explanations[0].members)
+        """The set with the causes of the likeliest explanation."""
+        return self.with_causes(self.explanations[0].members)
 
-    def beside(self, carried: Sequence[Member]) -> tuple[Member, ...]:
-        """The set with some causes, and with what these do to scale factors."""
+    def with_causes(self, carried: Sequence[Member]) -> tuple[Member, ...]:
+        """The set with further causes and their changes of scale factors."""
         warm = [self._warm[c.key] for c, _ in carried if c.key in self._warm]
-        return (*self.asked, *carried, *warm)
+        return (*self.base_members, *carried, *warm)
 
     @cached_property
-    def ending(self) -> Array:
-        """What columns make of biases and scale factors at the end, (2, 6, k)."""
-        known = (*self.asked, *self._warm.values())
+    def bias_scale_at_end(self) -> Array:
+        """Derivative of final biases and scale factors by the columns, (2, 6, k)."""
+        known = (*self.base_members, *self._warm.values())
         left = tuple(
             (cause, group)
             for cause, group in known
             if cause.name == WARM_SCALE or group.part in WARMING
         )
-        return at_end(self, (Shown(left, 1.0), *self.explanations))
+        return bias_scale_at_end(
+            self, (WeightedExplanation(left, 1.0), *self.explanations)
+        )
 
     @property
     def groups(self) -> list[Group]:
-        """All groups, those that are always in first."""
+        """All groups; those that every set has come first."""
         return [*self.always, *(g for _, g in self.members)]
 
-    # -- what is in it
+    # -- contents
 
     def _calibration(self) -> Iterator[Group]:
         """Bias and scale factor, free."""
@@ -156,58 +167,58 @@ class Given(Dictionary):
                 continue
             yield Group("bias", part, self.bias + at, sizes[at], fixed=priors.FREE,
                         in_state=True)  # fmt: skip
-            if part == "acc" or self.wanted.gyr_scale:
+            if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
                 yield Group("scale", part, self.scale + at, size, fixed=priors.FREE,
                             in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
-        """What was asked for, and how well the rest is known."""
-        w, oriented = self.wanted, bool(self.x.oriented.any())
+        """Causes of the requested parameters, and of errors of known size."""
+        w, oriented = self.options, bool(self.x.oriented.any())
         if w.tilt != "none" and oriented:
-            yield self._estimated(w.tilt, known=w.level_deg)
+            yield self._effect_cause(w.tilt, known=w.level_deg)
             if w.beside_tilt_deg:
                 (other,) = set(TILTS) - {w.tilt}
-                yield self._estimated(other, known=w.beside_tilt_deg)
+                yield self._effect_cause(other, known=w.beside_tilt_deg)
         if w.cross:
-            yield self._estimated("cross_coupling", turned=not oriented)
+            yield self._effect_cause("cross_coupling", turned=not oriented)
         left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))
         for one in of_factory(self, left, turned=not oriented):
             yield _given_cause(one)
         if w.gyro_cross:
-            yield self._estimated("gyro_cross_coupling", free=priors.COUPLED)
+            yield self._effect_cause("gyro_cross_coupling", free=priors.COUPLED)
         if any(w.earth) and oriented:
-            yield self._earth(np.array(w.earth))
+            yield self._earth_rate_cause(np.array(w.earth))
         if w.angles_deg:
-            yield from self._angles(float(np.deg2rad(w.angles_deg)))
+            yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
-            at = self.add(General("cut", self._shorter), 3) + lost
+            at = self.add(General("cut", self._truncated_outputs), 3) + lost
             yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
 
     def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
-        """What changes scale factors beside causes that change biases, by their key."""
+        """Changes of scale factors that accompany changes of biases, by cause key."""
         found = {cause.key: warm_scale(self, group) for cause, group in members}
         return {key: scale for key, scale in found.items() if scale is not None}
 
-    def _left_out(self) -> Group | None:
-        """Cross-coupling that the set has not, of its usual size."""
+    def _usual_cross_coupling(self) -> Group | None:
+        """Cross-coupling of usual size if it is not in the set; else None."""
         there = {c.name for c, _ in self.members}
         if "cross_coupling" in there or not self.x.f.any():
             return None
         oriented = bool(self.x.oriented.any())
-        return self._estimated("cross_coupling", turned=not oriented).variants[0]
+        return self._effect_cause("cross_coupling", turned=not oriented).variants[0]
 
-    def _estimated(
+    def _effect_cause(
         self,
         name: str,
         turned: bool = False,
         known: float | None = None,
         free: float = priors.FREE,
     ) -> Cause:
-        """An effect with its parameters, free or of a known size.
+        """Cause of an effect with all its parameters, free or of a known size.
 
-        Those that a turn of the whole device makes of others are left out of one that
-        is `turned` as nobody knows.
+        If the device is `turned` by an unknown rotation, the parameters that such a
+        rotation can produce from others are left out.
         """
         one = whole(self, name, turned)
         if known is None:
@@ -215,8 +226,8 @@ class Given(Dictionary):
         size = np.full(len(one.params), known)
         return _given_cause(replace(one, typical=size, fixed=1.0))
 
-    def _earth(self, size: Array) -> Cause:
-        """What is not known of the Earth's rate."""
+    def _earth_rate_cause(self, size: Array) -> Cause:
+        """Uncertainty of the Earth's rate."""
         sides = columns.earth_sides
         self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
         kept = np.flatnonzero(size)
@@ -224,17 +235,19 @@ class Given(Dictionary):
             Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
         )
 
-    def _shorter(self, view: RowView) -> Array:
-        """Outputs of accelerometers whose size is less by one, (n, 6, 3)."""
+    def _truncated_outputs(self, view: RowView) -> Array:
+        """Change of outputs if each accelerometer's size is less by one, (n, 6, 3)."""
         out = np.zeros((len(view.x), 6, 3))
         for c in range(3):
             out[:, c, c] = -self.sign[view.x.position, c]
         return out
 
-    def _angles(self, sigma: float) -> Iterator[Cause]:
-        """How well angles are set: anew in each position, and wherever repeated."""
+    def _angle_causes(self, sigma: float) -> Iterator[Cause]:
+        """Errors of set angles: new in each position, and repeated with each detent."""
         x = self.x
-        alike = x.oriented & ~np.isfinite(x.attitude_sigma)  # others have their own
+        alike = x.oriented & ~np.isfinite(
+            x.attitude_sigma
+        )  # the others have their own uncertainty
         oriented = [p for p in self.held if alike[x.position == p].all()]
         if not oriented:
             return
@@ -250,9 +263,9 @@ class Given(Dictionary):
             wide = np.full(len(at), size)
             yield _given_cause(Group("angle_setting", "repeated", at, wide, fixed=1.0))
 
-    # -- where it stands
+    # -- places of the parameters
 
-    def place(self, name: str) -> Index:
+    def columns_for(self, name: str) -> Index:
         """Columns of a parameter by its full name; none if it is not in the set."""
         parameter = ParameterName.of(name)
         if parameter.sensor:
@@ -261,7 +274,7 @@ class Given(Dictionary):
             first = self.scale if parameter.is_scale else self.bias
             at = first + parameter.channel
             return np.array([at] if at in every else [], dtype=np.intp)
-        for cause, one in self.asked:
+        for cause, one in self.base_members:
             if cause.name == parameter.group and isinstance(one.effect, Effect):
                 names = [one.effect.params[j].name for j in one.params]
                 if parameter.component in names:
@@ -278,15 +291,15 @@ class Given(Dictionary):
             axes = [CHANNELS[c][-1] for c in channels if c in self.observed]
             groups = [f"{sensor}_bias", f"{sensor}_scale"]
             out += [f"{g}.{a}" for g in groups for a in axes]
-            out += self._of(cross)
+            out += self._effect_names(cross)
             if sensor == "acc":
-                out += self._of(self.wanted.tilt)
-        return tuple(n for n in out if len(self.place(n)))
+                out += self._effect_names(self.options.tilt)
+        return tuple(n for n in out if len(self.columns_for(n)))
 
-    def _of(self, name: str) -> list[str]:
+    def _effect_names(self, name: str) -> list[str]:
         return [
             f"{name}.{one.effect.params[j].name}"
-            for cause, one in self.asked
+            for cause, one in self.base_members
             if cause.name == name and isinstance(one.effect, Effect)
             for j in one.params
         ]
@@ -296,10 +309,10 @@ def _given_cause(group: Group) -> Cause:
     return Cause(group.cause, group.part, 1.0, (group,), "given")
 
 
-def _signs(rows: Rows, cut: Array) -> Array:
-    """Sign of each accelerometer's mean by position, (p + 1, 3); none on the way.
+def _mean_signs(rows: Rows, cut: Array) -> Array:
+    """Sign of each accelerometer's mean by position, (p + 1, 3); 0 during turns.
 
-    Less near zero, where values of both signs come.
+    Its size is less than 1 near zero, where values of both signs occur.
     """
     held = rows.x.position
     out = np.zeros((int(held.max()) + 2, 3))
@@ -309,17 +322,17 @@ def _signs(rows: Rows, cut: Array) -> Array:
     return out
 
 
-def earth_known(
+def known_earth_rate(
     latitude: float | None,
     navigation: bool,
     heading: float | None,
     under_way: UnderWay | None = None,
 ) -> tuple[Array, tuple[float, float, float]]:
-    """What is known of the Earth's rate in base axes, and how uncertain it is, rad/s.
+    """The Earth's rate in base axes, and its uncertainty, rad/s.
 
-    The vertical part by the latitude, the level part by the heading of z from north,
-    rad; tactical grade has it pointing anywhere where nobody says, and navigation grade
-    exactly north.
+    The vertical part follows from the latitude, the level part from the uncertainty of
+    the heading, rad, with z pointing north. If no heading is stated, z may point
+    anywhere for tactical grade, and points exactly north for navigation grade.
     """
     if latitude is None:
         free = EARTH_RATE / float(np.sqrt(3.0))
@@ -335,6 +348,6 @@ def earth_known(
     return home * [0.0, 1.0, 0.0], (anywhere, 0.0, anywhere)
 
 
-def seen_by(rows: Rows, base_rate: Array) -> Rows:
-    """Rows on a base that turns with the Earth."""
+def with_base_rate(rows: Rows, base_rate: Array) -> Rows:
+    """The rows with the rate of the base, (3,) rad/s."""
     return replace(rows, x=rows.x.turned(base_rate=base_rate))

@@ -23,79 +23,85 @@ from fieldcal.calibration.names import ParameterName
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Group
-from fieldcal.solve.averaging import picked_by
-from fieldcal.solve.estimation import Estimated
+from fieldcal.solve.averaging import parameter_matrix
+from fieldcal.solve.estimation import ParameterEstimate
 
 
 @dataclass(frozen=True, slots=True)
-class Magnified:
-    """What cross-coupling that is left out does to the parameter it moves most.
+class CrossCouplingEffect:
+    """Effect of omitted cross-coupling on the parameter that it moves most.
 
     Attributes
     ----------
-    name, unit : of the parameter
-    moved : 1 sigma for a coefficient of one
-    times : the same over gravity for a bias, over one for a scale factor
-    square : cross-coupling that the set counts with, 1 sigma
+    name, unit : name and unit of the parameter
+    shift_per_unit : 1 sigma of the parameter for a coefficient of one
+    magnification : `shift_per_unit` over gravity for a bias, over 1 for a scale factor
+    assumed_sigma : cross-coupling that the set assumes, 1 sigma
 
     """
 
     name: str
     unit: str
-    moved: float
-    times: float
-    square: float
+    shift_per_unit: float
+    magnification: float
+    assumed_sigma: float
 
     @property
     def sentence(self) -> str:
-        """What it costs and what to do."""
-        moved = f"{self.moved / 1000:.2g} {self.unit}".removesuffix(" 1")
+        """The size of the effect, and the remedy."""
+        moved = f"{self.shift_per_unit / 1000:.2g} {self.unit}".removesuffix(" 1")
         return (
             f"cross-coupling {self._beyond}is taken as zero, and these positions"
-            f" magnify its effect {self.times:.1f} times: each 0.1 % moves {self.name}"
-            f" by {moved}, which"
+            f" magnify its effect {self.magnification:.1f} times: each 0.1 % moves"
+            f" {self.name} by {moved}, which"
             " the uncertainties do not include; hold each axis up and down, or estimate"
             " cross-coupling (--cross) from nine positions or more"
         )
 
     @property
     def _beyond(self) -> str:
-        return f"beyond ± {100 * self.square:.2g} % " if self.square else ""
+        return (
+            f"beyond ± {100 * self.assumed_sigma:.2g} % " if self.assumed_sigma else ""
+        )
 
 
-def magnified(found: Estimated) -> Magnified | None:
+def largest_cross_coupling_effect(
+    estimate: ParameterEstimate,
+) -> CrossCouplingEffect | None:
     """The largest effect of cross-coupling on the parameters of a set, by (1).
 
-    None where the set estimates it, determines nothing of the accelerometers, or the
-    positions magnify nothing.
+    None if the set estimates it, if no parameter of the accelerometers is determined,
+    or if the positions do not magnify it.
     """
-    given = found.given
-    if given.left_out is None:
+    parameter_set = estimate.parameter_set
+    if parameter_set.omitted_cross_coupling is None:
         return None
-    added = _added(found, given.left_out)
+    added = _added_sigma(estimate, parameter_set.omitted_cross_coupling)
     every = []
-    for name in found.names:
+    for name in estimate.names:
         parameter = ParameterName.of(name)
         if parameter.sensor == "acc":
-            moved = float(added[given.names.index(name)])
+            moved = float(added[parameter_set.names.index(name)])
             times = moved / (1.0 if parameter.is_scale else G0)
             unit = GROUPS[parameter.group][2]
-            square = given.wanted.factory.cross_coupling
-            every.append(Magnified(name, unit, moved, times, square))
-    worst = max(every, key=lambda m: m.times, default=None)
-    return worst if worst and worst.times > 1 else None
+            square = parameter_set.options.factory.cross_coupling
+            every.append(CrossCouplingEffect(name, unit, moved, times, square))
+    worst = max(every, key=lambda m: m.magnification, default=None)
+    return worst if worst and worst.magnification > 1 else None
 
 
-def _added(found: Estimated, group: Group) -> Array:
-    """What an unknown group adds to each parameter, over its usual size.
+def _added_sigma(estimate: ParameterEstimate, group: Group) -> Array:
+    """Uncertainty of each parameter from an unknown group, over its usual size.
 
-    Back comes (k,), 1 sigma, in units of the parameter.
+    Returns (k,), 1 sigma, in units of the parameter.
     """
-    there = found.search.evaluated(found.given.members).state
+    there = estimate.search.evaluated(estimate.parameter_set.members).state
     inner, _ = there.rest(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
     rows = there.rows.matrix(there.columns, group.columns)
-    moved = picked_by(found.given, there.columns) @ there.inverse @ rows  # D
+    moved = (
+        parameter_matrix(estimate.parameter_set, there.columns) @ there.inverse @ rows
+    )  # D
     var = np.einsum("ki,ij,kj->k", moved, unknown, moved)
     out: Array = np.sqrt(np.maximum(var, 0.0))
     return out

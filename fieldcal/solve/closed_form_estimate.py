@@ -1,4 +1,4 @@
-"""Result of a printed formula: parameters that are linear in the means."""
+"""Estimate by a printed formula: parameters that are linear in the means."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fieldcal.solve.observations import Mask, Observations
 
 
 @dataclass(frozen=True, slots=True)
-class Closed:
-    """Parameters with the windows' covariance carried through.
+class ClosedFormEstimate:
+    """Parameters with the covariance that follows from that of the windows.
 
     Attributes
     ----------
@@ -33,14 +33,14 @@ class Closed:
         gain: Array,
         observations: Observations,
         channels: slice,
-    ) -> Closed:
-        """Values by their derivatives (p, n, 3) by the means of a triad."""
+    ) -> ClosedFormEstimate:
+        """Make the estimate from derivatives (p, n, 3) by the means of a triad."""
         noise = observations.covariance[:, channels, channels]
         values = np.einsum("pnc,nc->p", gain, observations.mean[:, channels])
         covariance = np.einsum("pnc,ncd,qnd->pq", gain, noise, gain)
         return cls(tuple(names), values, covariance)
 
-    def only(self, kept: Mask) -> Closed:
+    def subset(self, kept: Mask) -> ClosedFormEstimate:
         """Keep some of the parameters, (p,) bool."""
         rows = np.flatnonzero(kept)
         return replace(

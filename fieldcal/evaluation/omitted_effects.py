@@ -1,13 +1,13 @@
-"""What a recording shows and a calibration does not carry.
+"""Effects that a recording shows and a calibration does not contain.
 
-The estimators of `solve` fit bias, scale factor and what they are told to; a bias that
-drifted, a joint that was read wrongly or a byte that was decoded wrongly is in their
-windows all the same. Here the one model of the diagnosis says what is there, what of it
-the calibration has not in it, and by how much each of its parameters moves with it:
+`solve` fits bias, scale factor and the requested parameters. A bias that drifted, a
+joint that was read wrongly or a byte that was decoded wrongly is in its windows as
+well. The diagnosis states which effects are present. For those that the calibration
+does not contain, the change of each parameter is
 
-    moved_k = (value with all that is there - value without what is missing) / sigma_k
+    shift_k = (value with all effects - value without the omitted ones) / sigma_k
 
-Both values are the model's own, of the same rows, so that conventions do not count.
+Both values come from the same model and rows, so that conventions do not matter.
 """
 
 from __future__ import annotations
@@ -37,30 +37,32 @@ BYTES = "decode_fault"
 
 
 @dataclass(frozen=True, slots=True)
-class Uncarried:
-    """What a calibration does not carry.
+class OmittedEffects:
+    """Effects that a recording shows and its calibration does not contain.
 
     Attributes
     ----------
     causes : probability by id of the effect
-    moved : by how many sigmas each parameter moves with them
-    described : a cause in words, by its id, where the id is none of the catalogue
+    shift_sigmas : by how many sigmas they move each parameter
+    described : cause in words by its id, for ids that are not in the catalogue
 
     """
 
     causes: Mapping[str, float]
-    moved: Mapping[str, float]
+    shift_sigmas: Mapping[str, float]
     described: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def most(self) -> tuple[str, float]:
-        """The parameter that moves most, and by how many sigmas."""
-        name = max(self.moved, key=lambda n: abs(self.moved[n]), default="")
-        return name, self.moved.get(name, 0.0)
+    def largest_shift(self) -> tuple[str, float]:
+        """The parameter with the largest shift, and the shift in sigmas."""
+        name = max(
+            self.shift_sigmas, key=lambda n: abs(self.shift_sigmas[n]), default=""
+        )
+        return name, self.shift_sigmas.get(name, 0.0)
 
 
-def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
-    """The session with bytes put right that were decoded wrongly, and what was done."""
+def with_repaired_bytes(session: Session) -> tuple[Session, tuple[str, ...]]:
+    """The session with wrongly decoded bytes corrected, and sentences about them."""
     if not session.positions:
         return session, ()
     found = found_first(BYTES, session.block, session.about)
@@ -83,20 +85,26 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     return right, tuple(sentences)
 
 
-def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
-    """What a recording shows that a calibration of it does not carry."""
-    out = [s for s in explanation.standing if not _carries(calibration, s)]
+def omitted_effects(
+    explanation: Explanation, calibration: Calibration
+) -> OmittedEffects:
+    """Effects that a recording shows and its calibration does not contain."""
+    out = [s for s in explanation.standing if not _is_included(calibration, s)]
     if not out:
-        return Uncarried({}, {})
-    return Uncarried(
+        return OmittedEffects({}, {})
+    return OmittedEffects(
         {s.name: s.probability for s in out},
-        _moved(explanation, out),
-        {s.name: _wrong_angles(explanation, s) for s in out if s.kind == "position"},
+        _shift_sigmas(explanation, out),
+        {
+            s.name: _describe_wrong_angles(explanation, s)
+            for s in out
+            if s.kind == "position"
+        },
     )
 
 
-def wrong_angles(explanation: Explanation) -> list[str]:
-    """Sentences about angles that were wrong, in one position or wherever set."""
+def wrong_angle_sentences(explanation: Explanation) -> list[str]:
+    """Sentences about wrong angles, in one position or wherever they are set."""
     out = []
     for s in explanation.standing:
         if s.kind == "position":
@@ -106,14 +114,14 @@ def wrong_angles(explanation: Explanation) -> list[str]:
                 else "set it again and repeat it, and this is known better"
             )
             out.append(
-                f"the recording shows {_wrong_angles(explanation, s)}: the result is"
-                f" for the angle that was found; {cure}"
+                f"the recording shows {_describe_wrong_angles(explanation, s)}: the"
+                f" result is for the angle that was found; {cure}"
             )
     return out
 
 
-def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
-    """Angles that were set wrongly, with positions and size."""
+def _describe_wrong_angles(explanation: Explanation, standing: Standing) -> str:
+    """Wrong angles in words, with their positions and sizes."""
     errors = angle_errors(explanation, standing)
     return " and ".join(
         f"a wrong angle, as {off_by(angles)} in {listed(positions)}"
@@ -123,11 +131,11 @@ def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
     )
 
 
-def _carries(calibration: Calibration, standing: Standing) -> bool:
-    """Whether a cause is no effect, is random, or is in the calibration itself.
+def _is_included(calibration: Calibration, standing: Standing) -> bool:
+    """Whether a cause is in the calibration, is random, or is not an effect.
 
-    An angle that was wrong is no effect; the squareness that a grade has may hide it
-    from the fit, and no position is then left out.
+    A wrong angle is not an effect. The fit may attribute it to cross-coupling within
+    the grade, and then no position is left out.
     """
     with_it = calibration.info.get("carried", {}).get("causes", {})
     if any(cause.kind == "position" for cause, _ in standing.members):
@@ -137,12 +145,14 @@ def _carries(calibration: Calibration, standing: Standing) -> bool:
         return True
     carrying = {standing.name, *standing.aliases, effect.carried_by}
     if standing.name in TILTS and "beside_tilt_sigma_deg" in calibration.info:
-        carrying |= {*TILTS}  # the one that fits, with some of the other one
+        carrying |= {*TILTS}  # both kinds of tilt are included then
     return bool(carrying & {*calibration.groups, *with_it})
 
 
-def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float]:
-    """By how many sigmas each parameter moves with some causes, by full name."""
+def _shift_sigmas(
+    explanation: Explanation, out: Sequence[Standing]
+) -> dict[str, float]:
+    """Shift of each parameter by some causes, in sigmas, by full name."""
     names = {s.name for s in out}
     best = explanation.posterior.best
     kept = tuple(m for m in best.members if m[0].name not in names)
@@ -156,8 +166,10 @@ def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float
     }
 
 
-def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
-    """The calibration, not to be used where session.toml is found to be wrong."""
+def with_description_faults(
+    prepared: Prepared, calibration: Calibration
+) -> Calibration:
+    """The calibration, marked as bad if session.toml is found to be wrong."""
     sentences = []
     for name, fault in prepared.checked.faults:
         effect = catalogue()[name]
@@ -175,16 +187,18 @@ def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
     return replace(calibration, warnings=warnings, good=False)
 
 
-def with_not_carried(calibration: Calibration, missing: Uncarried) -> Calibration:
-    """The calibration with a warning about causes that it does not carry."""
+def with_omitted_effects(
+    calibration: Calibration, missing: OmittedEffects
+) -> Calibration:
+    """The calibration with a warning about effects that it does not contain."""
     if not missing.causes:
         return calibration
-    name, sigmas = missing.most
+    name, sigmas = missing.largest_shift
     shown = " and ".join(
         f"{missing.described.get(id_, id_)} (probability {p:.2f})"
         for id_, p in missing.causes.items()
     )
-    info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.moved)}
+    info = {"causes": dict(missing.causes), "moved_sigmas": dict(missing.shift_sigmas)}
     found = replace(calibration, info={**calibration.info, "not_carried": info})
     if abs(sigmas) < thresholds.MOVED:
         return found

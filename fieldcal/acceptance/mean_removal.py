@@ -1,4 +1,4 @@
-"""Outputs without bias, since the device or a program has subtracted their mean.
+"""Detects outputs from which the device or a program has subtracted the mean.
 
 If a program subtracts the mean of a whole recording of N samples with noise s, a mean
 as small as the one that is left, m, has by chance the probability
@@ -14,13 +14,13 @@ with d = 0 if values are rounded to the nearest step, -1/2 if they are rounded d
 -1/2 times the mean of their signs if they are rounded toward zero; in windows that are
 rounded to zero q is twice as large. Values that were on this grid before are all moved
 by the same part of a step, so d = 0 and the sum in (2) is 1. For each of the four, the
-probability follows from (1) and (2) of `tracked` over all axes, with s_b of
+probability follows from (1) and (2) of `bias_removal` over all axes, with s_b of
 accelerometers; the least of them counts, times four (Bonferroni).
 
-Whatever else was done to the samples afterwards, such as drawing new ones between them,
-moves a mean a little. Of a recording from which none was subtracted, the mean m is that
-of the force and the bias b: for m to be so small, the mean force has to be -b, and
-whatever it is spread by, about zero, the chance of that is on each axis at most
+Later changes of the samples, such as interpolation, move a mean slightly. If no mean
+was subtracted, m is the sum of the mean force and the bias b. For m to be so small, the
+mean force has to be near -b. For any normal distribution of the mean force about zero,
+the probability of that on each axis is at most
 
     x = 2 |m| / (sqrt(2 pi e) |b|),   P = x (1 + L + L^2 / 2),   L = -ln x          (3)
 
@@ -35,39 +35,39 @@ from math import e, erf, log, pi, sqrt
 
 import numpy as np
 
-from fieldcal.acceptance.tracked import (
+from fieldcal.acceptance.bias_removal import (
     DOUBT,
     BiasSpread,
+    bias_removal_probability,
     chance_near_zero,
     chi2_about_zero,
-    tracked,
 )
 from fieldcal.core.samples import ACC, CHANNELS, Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import Average
 
 
-def biases_taken_out(
+def removed_bias_sentences(
     windows: Sequence[Average],
     block: Block,
     repeat: tuple[float, BiasSpread],
     seen: Array,
     least: float,
 ) -> list[str]:
-    """Sentences about biases that the recording no longer contains.
+    """Sentences about biases that were subtracted from the recording.
 
     Parameters
     ----------
-    windows : at rest
+    windows : windows at rest
     block : the whole recording
     repeat : spread of an accelerometer's bias from run to run, 1 sigma, m/s^2, and of a
         gyroscope's
-    seen : (3,) biases of the accelerometers as they are found, m/s^2; 0 where none is
+    seen : (3,) estimated biases of the accelerometers, m/s^2; 0 if there is none
     least : probability below which chance is excluded
 
     """
     said = []
-    removes, what = tracked(windows, block, repeat[1], least)
+    removes, what = bias_removal_probability(windows, block, repeat[1], least)
     if removes > DOUBT:
         said.append(
             "the gyroscopes' means at rest are zero within their noise, with neither a"
@@ -76,11 +76,11 @@ def biases_taken_out(
             " bias estimation, auto calibration, zero velocity update) and record"
             " again"
         )
-    odd = [name for name, p in centred(block) if p < least]
+    odd = [name for name, p in mean_probabilities(block) if p < least]
     spread = np.hypot(repeat[0], seen)
     if not odd and (
-        centred_and_rounded(windows, block, spread, least) < least
-        or centred_and_altered(block, seen) < least
+        rounded_mean_probability(windows, block, spread, least) < least
+        or altered_mean_probability(block, seen) < least
     ):
         odd = list(CHANNELS[ACC])
     if odd:
@@ -92,8 +92,8 @@ def biases_taken_out(
     return said
 
 
-def centred(block: Block) -> list[tuple[str, float]]:
-    """Accelerometers by channel with the probability of their mean, (1)."""
+def mean_probabilities(block: Block) -> list[tuple[str, float]]:
+    """Probability (1) of a mean as small as this one by chance, by channel."""
     out = []
     for name, values in zip(CHANNELS[ACC], block.acc.T, strict=True):
         known = values[np.isfinite(values)]
@@ -103,12 +103,12 @@ def centred(block: Block) -> list[tuple[str, float]]:
     return out
 
 
-def centred_and_rounded(
+def rounded_mean_probability(
     windows: Sequence[Average], block: Block, repeat: float | Array, least: float
 ) -> float:
-    """Probability that the means come so close to those that rounding leaves, (2).
+    """Probability that means are so close to those left by rounding by chance, (2).
 
-    1 if values are not rounded to a grid, or differ significantly from these means.
+    1 if values are not rounded to a grid, or if the means differ significantly.
     """
     step = grids_of(block)[:3]
     held = [block.between(w.start, w.end).acc for w in windows]
@@ -131,8 +131,8 @@ def centred_and_rounded(
     return min(len(ways) * min(found), 1.0)
 
 
-def centred_and_altered(block: Block, seen: Array) -> float:
-    """Probability that the force makes up for biases of that size on all axes, (3)."""
+def altered_mean_probability(block: Block, seen: Array) -> float:
+    """Probability that the force cancels biases of this size on all axes, (3)."""
     known = np.isfinite(block.acc)
     if not known.any(axis=0).all():
         return 1.0

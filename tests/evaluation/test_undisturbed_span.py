@@ -12,7 +12,7 @@ from session_folders import CALM, FACES, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.evaluation.held_on import held_on
+from fieldcal.evaluation.undisturbed_span import undisturbed_span
 from fieldcal.sim_device.vocabulary import effect
 from fieldcal.windows import Average
 
@@ -42,10 +42,10 @@ def test_a_window_goes_on_where_the_force_stays(
     block = felt(turned, *calm)
     mean = np.r_[FORCE, np.zeros(3)]
     one = Average(mean, np.eye(6), 20.0, 100, *calm)
-    assert held_on(block, (0.0, 30.0), one) == counts
-    assert held_on(block, None, one) == calm
+    assert undisturbed_span(block, (0.0, 30.0), one) == counts
+    assert undisturbed_span(block, None, one) == calm
     blind = replace(one, mean=np.r_[np.full(3, np.nan), np.zeros(3)])
-    assert held_on(block, (0.0, 30.0), blind) == calm, "without accelerometers"
+    assert undisturbed_span(block, (0.0, 30.0), blind) == calm, "without accelerometers"
 
 
 def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(

@@ -17,13 +17,13 @@ from fieldcal.model.causes.detents import detents
 from fieldcal.model.causes.detents import together as turned_alike
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.given import (
-    Given,
-    Wanted,
-    earth_known,
-    seen_by,
+from fieldcal.solve.parameter_set import (
+    ParameterSet,
+    ParameterSetOptions,
+    known_earth_rate,
+    with_base_rate,
 )
-from fieldcal.solve.rows import of_means
+from fieldcal.solve.rows import rows_of_means
 
 HAND = Position("by hand")
 ACC = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
@@ -37,10 +37,12 @@ def seen(places: tuple[Position, ...], gyr: bool = False) -> Observations:
     )
 
 
-def given(places: tuple[Position, ...], wanted: Wanted, gyr: bool = False) -> Given:
-    recorded = of_means(seen(places, gyr))
-    rows = seen_by(recorded.rows, np.zeros(3))
-    return Given(rows, np.ones(6), recorded.since, wanted.turned, wanted)
+def given(
+    places: tuple[Position, ...], wanted: ParameterSetOptions, gyr: bool = False
+) -> ParameterSet:
+    recorded = rows_of_means(seen(places, gyr))
+    rows = with_base_rate(recorded.rows, np.zeros(3))
+    return ParameterSet(rows, np.ones(6), recorded.since_turn, wanted.turned, wanted)
 
 
 def experience(places: tuple[Position, ...]) -> Experience:
@@ -87,7 +89,7 @@ def test_what_nobody_set_has_no_detent() -> None:
 
 def test_a_repeated_angle_is_off_by_the_same_in_half_of_the_variance() -> None:
     places = (Position.deg(0, 0), *[Position.deg(20, 0)] * 4, Position.deg(30, 0))
-    d = given(places, Wanted(angles_deg=0.3))
+    d = given(places, ParameterSetOptions(angles_deg=0.3))
     size = np.deg2rad(0.3) / np.sqrt(2)
     parts = {g.part: g for _, g in d.members}
     assert set(parts) == {"own", "repeated"}
@@ -120,18 +122,18 @@ def test_the_earth_is_known_by_latitude_and_heading() -> None:
     phi = 0.7
     home = OMEGA * np.array([0, -np.sin(phi), np.cos(phi)])
     level = OMEGA * np.cos(phi)
-    base, unsure = earth_known(phi, True, None)
+    base, unsure = known_earth_rate(phi, True, None)
     np.testing.assert_allclose(base, home)
     assert unsure == (0.0, 0.0, 0.0)
     for navigation in (False, True):
-        base, unsure = earth_known(phi, navigation, 0.02)
+        base, unsure = known_earth_rate(phi, navigation, 0.02)
         np.testing.assert_allclose(base, home)
         np.testing.assert_allclose(unsure, [0.02 * level, 0, 0])
-    base, unsure = earth_known(phi, False, None)
+    base, unsure = known_earth_rate(phi, False, None)
     np.testing.assert_allclose(base, [0, home[1], 0])
     np.testing.assert_allclose(unsure, [level / np.sqrt(2), 0, level / np.sqrt(2)])
     # as far as it may be in any direction: its mean square is that of the rate
-    base, unsure = earth_known(None, False, None)
+    base, unsure = known_earth_rate(None, False, None)
     assert not base.any()
     assert np.sum(np.square(unsure)) == pytest.approx(OMEGA**2)
 
@@ -165,17 +167,20 @@ def test_what_is_known_of_the_earth_is_in_the_gyroscopes_bias(
 @pytest.mark.parametrize(
     ("wanted", "names"),
     [
-        (Wanted(), ACC),
-        (Wanted("base_tilt"), [*ACC, "base_tilt.about_x_deg", "base_tilt.about_z_deg"]),
-        (Wanted("angle_offset", cross=True),
+        (ParameterSetOptions(), ACC),
+        (ParameterSetOptions("base_tilt"),
+         [*ACC, "base_tilt.about_x_deg", "base_tilt.about_z_deg"]),
+        (ParameterSetOptions("angle_offset", cross=True),
          [*ACC, *(f"cross_coupling.k{i}" for i in ("12", "13", "21", "23", "31", "32")),
           "angle_offset.alpha0_deg", "angle_offset.beta0_deg"]),
     ],
 )  # fmt: skip
-def test_names_are_in_the_order_of_results(wanted: Wanted, names: list[str]) -> None:
+def test_names_are_in_the_order_of_results(
+    wanted: ParameterSetOptions, names: list[str]
+) -> None:
     d = given(SIX_FACES, wanted)
     assert list(d.names) == names
-    places = np.concatenate([d.place(n) for n in names])
+    places = np.concatenate([d.columns_for(n) for n in names])
     assert len(set(places.tolist())) == len(names)
     columns = {c for g in d.always for c in g.columns.tolist()}
     columns |= {c for _, g in d.members for c in g.columns.tolist()}
@@ -183,10 +188,10 @@ def test_names_are_in_the_order_of_results(wanted: Wanted, names: list[str]) -> 
 
 
 def test_gyroscopes_have_a_scale_factor_if_it_is_wanted() -> None:
-    plain = given(FIVE, Wanted(), gyr=True)
+    plain = given(FIVE, ParameterSetOptions(), gyr=True)
     assert list(plain.names) == [*ACC, *GYR[:3]]
-    assert len(plain.place("gyr_scale.x")) == 0
-    scaled = given(FIVE, Wanted(gyr_scale=True, gyro_cross=True), gyr=True)
+    assert len(plain.columns_for("gyr_scale.x")) == 0
+    scaled = given(FIVE, ParameterSetOptions(gyr_scale=True, gyro_cross=True), gyr=True)
     assert list(scaled.names[:12]) == [*ACC, *GYR]
     assert [n[-3:] for n in scaled.names[12:]] == [
         "s12", "s13", "s21", "s23", "s31", "s32",
@@ -196,7 +201,7 @@ def test_gyroscopes_have_a_scale_factor_if_it_is_wanted() -> None:
 
 
 def test_where_nobody_knows_an_orientation_a_common_rotation_is_left_out() -> None:
-    d = given((HAND,) * 12, Wanted("base_tilt", cross=True))
+    d = given((HAND,) * 12, ParameterSetOptions("base_tilt", cross=True))
     kept = [n for n in d.names if n.startswith("cross")]
     assert kept == [f"cross_coupling.k{i}" for i in ("12", "13", "23")]
     assert not {"k21", "k31", "k32"} & {n[-3:] for n in d.names}
@@ -205,19 +210,19 @@ def test_where_nobody_knows_an_orientation_a_common_rotation_is_left_out() -> No
 
 @pytest.mark.parametrize("name", ["acc_bias.x", "acc_scale.z", "gyr_bias.y"])
 def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
-    d = given(FIVE, Wanted(), gyr=True)
-    (at,) = d.place(name)
+    d = given(FIVE, ParameterSetOptions(), gyr=True)
+    (at,) = d.columns_for(name)
     start = d.bias if "bias" in name else d.scale
     channel = "xyz".index(name[-1]) + 3 * name.startswith("gyr")
     assert at == start + channel
 
 
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
-    free = given(FIVE, Wanted("base_tilt"))
+    free = given(FIVE, ParameterSetOptions("base_tilt"))
     assert all(g.fixed == priors.FREE for g in free.always)
     (tilt,) = [g for c, g in free.members if c.name == "base_tilt"]
     assert tilt.fixed == priors.FREE
-    level = given(FIVE, Wanted("base_tilt", level_deg=0.2))
+    level = given(FIVE, ParameterSetOptions("base_tilt", level_deg=0.2))
     (tilt,) = [g for c, g in level.members if c.name == "base_tilt"]
     sizes: Array = tilt.sizes(tilt.fixed or 0.0)
     np.testing.assert_allclose(sizes, [0.2, 0.2])
@@ -226,7 +231,7 @@ def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
 def test_turns_are_followed_with_what_the_factory_left() -> None:
     """A cross-coupling of 2 % to first order alone moved a bias by 7 sigma."""
     left = FactoryErrors(1e-2, 2.5e-4, 9e-5)
-    d = given(FIVE, Wanted(factory=left, turned=True), gyr=True)
+    d = given(FIVE, ParameterSetOptions(factory=left, turned=True), gyr=True)
     groups = [g for c, g in d.members if c.name == "factory"]
     assert [g.part for g in groups] == list(left.by_effect)
     assert all(g.in_state and g.effect is catalogue()[g.part] for g in groups)
@@ -235,7 +240,7 @@ def test_turns_are_followed_with_what_the_factory_left() -> None:
 
 
 def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
-    d = given(FIVE, Wanted("base_tilt", cross=True, angles_deg=0.1))
+    d = given(FIVE, ParameterSetOptions("base_tilt", cross=True, angles_deg=0.1))
     assert {c.kind for c in d.causes} == {"given"}
     assert {c.name for c in d.causes} - {"detents"} == {
         "base_tilt", "cross_coupling", "angle_setting",
@@ -247,21 +252,30 @@ def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
 
 def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     """Toward zero from either side; of values of both signs by less."""
-    recorded = of_means(seen(FIVE))
+    recorded = rows_of_means(seen(FIVE))
     y = recorded.rows.y.copy()
     y[:, 0] = [0.5, -0.5, 0.005, -0.02, np.nan]
-    rows = seen_by(replace(recorded.rows, y=y), np.zeros(3))
-    d = Given(rows, np.ones(6), recorded.since, False, Wanted(), cut=(0.01, 0.0, 0.02))
-    (one,) = (g for _, g in d.asked if g.cause == "rounding")
+    rows = with_base_rate(replace(recorded.rows, y=y), np.zeros(3))
+    d = ParameterSet(
+        rows,
+        np.ones(6),
+        recorded.since_turn,
+        False,
+        ParameterSetOptions(),
+        cut=(0.01, 0.0, 0.02),
+    )
+    (one,) = (g for _, g in d.base_members if g.cause == "rounding")
     assert one.typical.tolist() == [0.01, 0.02] and one.fixed == 1.0
     np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
     assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
-    view = RowView.of(rows.x, recorded.since, nominal(len(FIVE)))
+    view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE)))
     table = basis.of(view)
     np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
     np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])
     assert np.count_nonzero(table[:, 1:, 0]) == 0
-    plain = Given(rows, np.ones(6), recorded.since, False, Wanted())
-    assert "rounding" not in {g.cause for _, g in plain.asked}
+    plain = ParameterSet(
+        rows, np.ones(6), recorded.since_turn, False, ParameterSetOptions()
+    )
+    assert "rounding" not in {g.cause for _, g in plain.base_members}
     assert d.width == plain.width + 3, "a column for each accelerometer"

@@ -20,11 +20,15 @@ from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve import Observations
-from fieldcal.solve.estimation import Estimated, Recorded, estimated
-from fieldcal.solve.given import Given, Wanted
-from fieldcal.solve.rows import of_means
-from fieldcal.solve.shown import Shown
-from fieldcal.solve.variants import spread, variants
+from fieldcal.solve.estimation import (
+    ParameterEstimate,
+    RecordedRows,
+    estimate_parameters,
+)
+from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
+from fieldcal.solve.rows import rows_of_means
+from fieldcal.solve.variants import spread_points, variants
 
 PLACES = (
     *SIX_FACES,
@@ -46,16 +50,23 @@ def seen(drift: float = DRIFT, noise: int | None = None) -> Observations:
     return replace(observe(PLACES, acc), time=TIMES)
 
 
-def recording(drift: float = DRIFT, noise: int | None = None) -> Recorded:
+def recording(drift: float = DRIFT, noise: int | None = None) -> RecordedRows:
     """Its rows, with the time since the start."""
-    rows = of_means(seen(drift, noise))
+    rows = rows_of_means(seen(drift, noise))
     x = replace(rows.rows.x, since_start=TIMES)
     return replace(rows, rows=replace(rows.rows, x=x))
 
 
-def given(shown: Sequence[Shown] = ()) -> Given:
+def given(shown: Sequence[WeightedExplanation] = ()) -> ParameterSet:
     recorded = recording()
-    return Given(recorded.rows, np.ones(6), recorded.since, False, Wanted(), shown)
+    return ParameterSet(
+        recorded.rows,
+        np.ones(6),
+        recorded.since_turn,
+        False,
+        ParameterSetOptions(),
+        shown,
+    )
 
 
 def member(name: str, params: tuple[int, ...] | None = None) -> Member:
@@ -67,14 +78,22 @@ def member(name: str, params: tuple[int, ...] | None = None) -> Member:
     return next((cause, g) for g in cause.variants if params in (None, g.params))
 
 
-def fitted(shown: Sequence[Shown], noise: int | None = None) -> Estimated:
-    recorded = replace(recording(noise=noise), shown=tuple(shown))
-    return estimated(recorded, None, NOMINAL, Wanted())
+def fitted(
+    shown: Sequence[WeightedExplanation], noise: int | None = None
+) -> ParameterEstimate:
+    recorded = replace(recording(noise=noise), explanations=tuple(shown))
+    return estimate_parameters(recorded, None, NOMINAL, ParameterSetOptions())
 
 
 def test_explanations_that_differ_in_nothing_that_is_carried_are_one() -> None:
     drift = member("bias_drift")
-    d = given([Shown((drift,), 0.5), Shown((), 0.2), Shown((drift,), 0.3)])
+    d = given(
+        [
+            WeightedExplanation((drift,), 0.5),
+            WeightedExplanation((), 0.2),
+            WeightedExplanation((drift,), 0.3),
+        ]
+    )
     assert [len(s.members) for s in d.explanations] == [1, 0]
     assert [s.probability for s in d.explanations] == pytest.approx([0.8, 0.2])
 
@@ -83,11 +102,16 @@ def test_explanations_that_differ_in_nothing_that_is_carried_are_one() -> None:
 def test_a_cause_is_as_large_as_its_likeliest_explanation_has_it(name: str) -> None:
     """In all its variants; one whose size nobody tells has that of its rows."""
     one = member(name)
-    shown = [Shown((one,), 0.3, sizes=(2.0,)), Shown((one,), 0.7, sizes=(5.0,))]
+    shown = [
+        WeightedExplanation((one,), 0.3, sizes=(2.0,)),
+        WeightedExplanation((one,), 0.7, sizes=(5.0,)),
+    ]
     ((cause, group),) = given(shown).explanations[0].members
     assert {g.fixed for g in (*cause.variants, group)} == {5.0}
     assert group in cause.variants
-    ((cause, group),) = given([Shown((one,), 1.0)]).explanations[0].members
+    ((cause, group),) = (
+        given([WeightedExplanation((one,), 1.0)]).explanations[0].members
+    )
     assert {g.fixed for g in (*cause.variants, group)} == {None}
 
 
@@ -97,9 +121,11 @@ def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
     truth = BIAS[0] + DRIFT * TIMES[-1]
 
     def off(sizes: tuple[float, ...], seed: int) -> float:
-        shown = (Shown((member("bias_drift", (0,)),), 1.0, sizes=sizes),)
-        recorded = replace(recording(noise=seed), shown=shown)
-        found = estimated(recorded, None, NOMINAL, Wanted(angles_deg=0.1))
+        shown = (WeightedExplanation((member("bias_drift", (0,)),), 1.0, sizes=sizes),)
+        recorded = replace(recording(noise=seed), explanations=shown)
+        found = estimate_parameters(
+            recorded, None, NOMINAL, ParameterSetOptions(angles_deg=0.1)
+        )
         at = found.names.index("acc_bias.x")
         assert (
             abs(float(found.values[at]) - truth) < 2 * found.covariance[at, at] ** 0.5
@@ -114,14 +140,21 @@ def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
 
 def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None:
     drift = member("bias_drift")
-    unlikely = given([Shown((drift,), 0.002), Shown((), 0.998)])
+    unlikely = given(
+        [WeightedExplanation((drift,), 0.002), WeightedExplanation((), 0.998)]
+    )
     assert [s.probability for s in unlikely.explanations] == [1.0]
     d = given()
     (cause,) = [c for c in of_effects(d) if c.name == "base_tilt"]
-    shown = [Shown(((cause, cause.variants[0]),), 1.0)]
+    shown = [WeightedExplanation(((cause, cause.variants[0]),), 1.0)]
     rows = recording()
-    same = Given(
-        rows.rows, np.ones(6), rows.since, False, Wanted("angle_offset"), shown
+    same = ParameterSet(
+        rows.rows,
+        np.ones(6),
+        rows.since_turn,
+        False,
+        ParameterSetOptions("angle_offset"),
+        shown,
     )
     assert not same.explanations[0].members
 
@@ -130,9 +163,11 @@ def test_a_tilt_is_carried_beside_the_other_one_where_both_are_shown() -> None:
     d, rows = given(), recording()
     both = {c.name: (c, c.variants[0]) for c in of_effects(d) if c.name in TILTS}
     for names, carried in ((TILTS, ["base_tilt"]), (("base_tilt",), [])):
-        shown = [Shown(tuple(both[name] for name in names), 1.0)]
-        wanted = Wanted("angle_offset")
-        found = Given(rows.rows, np.ones(6), rows.since, False, wanted, shown)
+        shown = [WeightedExplanation(tuple(both[name] for name in names), 1.0)]
+        wanted = ParameterSetOptions("angle_offset")
+        found = ParameterSet(
+            rows.rows, np.ones(6), rows.since_turn, False, wanted, shown
+        )
         assert [c.name for c, _ in found.explanations[0].members] == carried
 
 
@@ -142,19 +177,31 @@ def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
     every = [*of_chance(d), *of_no_effect(d)]
     for name in ("window", "position"):
         cause = next(c for c in every if c.name == name)
-        shown = given([Shown(((cause, cause.variants[0]),), 0.9), Shown((), 0.1)])
+        shown = given(
+            [
+                WeightedExplanation(((cause, cause.variants[0]),), 0.9),
+                WeightedExplanation((), 0.1),
+            ]
+        )
         assert [s.members for s in shown.explanations] == [()]
         assert shown.explanations[0].probability == pytest.approx(1.0)
     (angles,) = (c for c in every if c.name == "angle_setting")
-    shown = given([Shown(((angles, angles.variants[0]),), 1.0)])
-    assert shown.explanations == (Shown((), 1.0),), "how well they are set is in"
-    assert given().explanations == (Shown((), 1.0),)
+    shown = given([WeightedExplanation(((angles, angles.variants[0]),), 1.0)])
+    assert shown.explanations == (WeightedExplanation((), 1.0),), (
+        "how well they are set is in"
+    )
+    assert given().explanations == (WeightedExplanation((), 1.0),)
 
 
 def test_a_position_that_was_set_wrongly_is_carried() -> None:
     """Axes that may be out of square hide it from a set of six faces."""
     cause = next(c for c in of_chance(given()) if c.name == "misset")
-    shown = given([Shown(((cause, cause.variants[3]),), 0.9), Shown((), 0.1)])
+    shown = given(
+        [
+            WeightedExplanation(((cause, cause.variants[3]),), 0.9),
+            WeightedExplanation((), 0.1),
+        ]
+    )
     assert [s.probability for s in shown.explanations] == pytest.approx([0.9, 0.1])
     ((same, group),) = shown.explanations[0].members
     assert (same.name, group.position) == ("misset", 3)
@@ -163,11 +210,11 @@ def test_a_position_that_was_set_wrongly_is_carried() -> None:
 def test_functions_without_physics_are_carried_by_their_place() -> None:
     d = given()
     cause = next(c for c in of_no_effect(d) if c.key == "time:ay")
-    shown = given([Shown(((cause, cause.variants[2]),), 1.0)])
+    shown = given([WeightedExplanation(((cause, cause.variants[2]),), 1.0)])
     ((same, group),) = shown.explanations[0].members
     assert same.key == "time:ay" and group.shape == cause.variants[2].shape
     assert same.kind == "unknown"
-    ends = shown.ending[0]
+    ends = shown.bias_scale_at_end[0]
     assert np.flatnonzero(ends.any(axis=1)).tolist() == [1]
     expected = (-1.0) ** np.arange(1, len(group.columns) + 1)
     np.testing.assert_allclose(ends[1, group.columns], expected)
@@ -177,18 +224,18 @@ def test_a_scale_factor_that_changes_has_its_value_at_the_end() -> None:
     """Of a function of force and time: at the end every Legendre polynomial is 1."""
     d = given()
     cause = next(c for c in of_no_effect(d) if c.key == "force and time:ax")
-    shown = given([Shown(((cause, cause.variants[1]),), 1.0)])
+    shown = given([WeightedExplanation(((cause, cause.variants[1]),), 1.0)])
     ((_, group),) = shown.explanations[0].members
-    bias, scale = shown.ending
+    bias, scale = shown.bias_scale_at_end
     assert not bias.any()
     np.testing.assert_allclose(scale[0, group.columns], 1 / 9.81, rtol=1e-6)
     assert np.count_nonzero(scale) == len(group.columns)
 
 
 def test_an_effect_of_one_triad_may_be_on_the_other_as_well() -> None:
-    shown = given([Shown((member("bias_drift"),), 1.0)])
+    shown = given([WeightedExplanation((member("bias_drift"),), 1.0)])
     (one,) = shown.explanations
-    assert one.maybe == (), "no gyroscopes were measured"
+    assert one.possible_members == (), "no gyroscopes were measured"
     ((cause, group),) = one.members
     params = {g.params for g in cause.variants}
     assert params == {(0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2)}
@@ -197,13 +244,15 @@ def test_an_effect_of_one_triad_may_be_on_the_other_as_well() -> None:
 
 def test_the_bias_is_that_at_the_end() -> None:
     """Of a drift, what it has come to, and what scale factors have beside it."""
-    d = given([Shown((member("bias_drift"),), 1.0)])
+    d = given([WeightedExplanation((member("bias_drift"),), 1.0)])
     ((_, group),) = d.explanations[0].members
-    bias, scale = d.ending
+    bias, scale = d.bias_scale_at_end
     for j, column in zip(group.params, group.columns, strict=True):
         assert bias[j, column] == pytest.approx(TIMES[-1])
     assert np.count_nonzero(bias) == len(group.params)
-    ((_, beside),) = set(d.members) - set(d.asked) - set(d.explanations[0].members)
+    ((_, beside),) = (
+        set(d.members) - set(d.base_members) - set(d.explanations[0].members)
+    )
     for c, column in enumerate(beside.columns):
         assert scale[c, column] == pytest.approx(TIMES[-1])
     assert np.count_nonzero(scale) == 3
@@ -211,16 +260,16 @@ def test_the_bias_is_that_at_the_end() -> None:
 
 def test_a_walk_ends_where_its_cosines_do() -> None:
     """At the end cosine k is (-1)^k."""
-    d = given([Shown((member("random_walk"),), 1.0)])
+    d = given([WeightedExplanation((member("random_walk"),), 1.0)])
     ((_, group),) = d.explanations[0].members
     channel = group.params[0]
-    ends = d.ending[0][channel, group.columns]
+    ends = d.bias_scale_at_end[0][channel, group.columns]
     own = ends[ends != 0.0]
     assert own[:4] == pytest.approx([-1.0, 1.0, -1.0, 1.0])
 
 
 def test_the_drift_is_found_and_the_bias_is_right_at_the_end() -> None:
-    found = fitted([Shown((member("bias_drift", (0,)),), 1.0)])
+    found = fitted([WeightedExplanation((member("bias_drift", (0,)),), 1.0)])
     value = dict(zip(found.names, found.values, strict=True))
     sigma = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
     assert value["acc_bias.x"] == pytest.approx(
@@ -236,8 +285,8 @@ def test_the_drift_is_found_and_the_bias_is_right_at_the_end() -> None:
 def test_the_answer_is_the_mean_over_explanations() -> None:
     """Equation (1) of the module, of each explanation alone."""
     drift = member("bias_drift")
-    one, none = fitted([Shown((drift,), 1.0)], 3), fitted((), 3)
-    both = fitted([Shown((drift,), 0.7), Shown((), 0.3)], 3)
+    one, none = fitted([WeightedExplanation((drift,), 1.0)], 3), fitted((), 3)
+    both = fitted([WeightedExplanation((drift,), 0.7), WeightedExplanation((), 0.3)], 3)
     assert one.names == none.names == both.names
     mean = 0.7 * one.values + 0.3 * none.values
     # a less likely explanation is that of fewer of its variants
@@ -249,18 +298,25 @@ def test_the_answer_is_the_mean_over_explanations() -> None:
         spread += share * (each.covariance + np.outer(off, off))
     np.testing.assert_allclose(np.diag(both.covariance), np.diag(spread), rtol=0.02)
     assert both.causes == {"bias_drift": pytest.approx(0.7)}
-    assert both.sure == pytest.approx(0.7)
+    assert both.any_cause_probability == pytest.approx(0.7)
 
 
 def test_a_cause_is_on_every_axis_that_it_may_be_on() -> None:
     """The one that shows it beyond doubt is in nearly all of them."""
     recorded = recording(1e-4)
-    shown = [Shown((member("bias_drift", (0,)),), 1.0)]
-    d = Given(recorded.rows, np.ones(6), recorded.since, False, Wanted(), shown)
+    shown = [WeightedExplanation((member("bias_drift", (0,)),), 1.0)]
+    d = ParameterSet(
+        recorded.rows,
+        np.ones(6),
+        recorded.since_turn,
+        False,
+        ParameterSetOptions(),
+        shown,
+    )
     gram = Inference(WindowSystem(recorded.rows, d), NOMINAL).gram(
         NOMINAL, np.zeros(d.width), None
     )
-    found = variants(Search(d, gram), d.asked, d.explanations[0])
+    found = variants(Search(d, gram), d.base_members, d.explanations[0])
     assert sum(s.probability for s in found) == pytest.approx(1.0)
     sets = {s.members[0][1].params: s.probability for s in found}
     assert sum(p for axes, p in sets.items() if 0 in axes) > 0.99
@@ -270,18 +326,18 @@ def test_a_cause_is_on_every_axis_that_it_may_be_on() -> None:
 def test_points_stand_evenly_for_the_variants_of_every_cause() -> None:
     """Of each cause by itself, and of two together."""
     for count in (1, 2, 3):
-        at = spread(count)
+        at = spread_points(count)
         assert ((at >= 0) & (at < 1)).all()
         for column in at.T:
             inside = np.histogram(column, 6, (0.0, 1.0))[0] / len(at)
             assert np.abs(inside - 1 / 6).max() <= 0.5 / 6
-    one, two = spread(2).T > 0.5
+    one, two = spread_points(2).T > 0.5
     for quarter in (one & two, one & ~two, ~one & two, ~one & ~two):
         assert 4 <= quarter.sum() <= 8
-    assert len(spread(0)) == 1
-    line = spread(1, 5)[:, 0]
+    assert len(spread_points(0)) == 1
+    line = spread_points(1, 5)[:, 0]
     np.testing.assert_allclose(line, [0.1, 0.3, 0.5, 0.7, 0.9])
-    two = spread(3, 4)
+    two = spread_points(3, 4)
     np.testing.assert_allclose(two[:, 1], (np.arange(4) * 2**0.5 + 0.125) % 1)
     np.testing.assert_allclose(two[:, 2], (np.arange(4) * 3**0.5 + 0.125) % 1)
 
@@ -296,9 +352,10 @@ def test_cross_coupling_is_carried_in_the_axes_of_the_set() -> None:
     )
     carried = {}
     for x in (rows.x, unknown):
-        d = Given(
-            replace(rows, x=x), np.ones(6), recording().since, False, Wanted(),
-            [Shown(((cause, group),), 1.0)],
+        d = ParameterSet(
+            replace(rows, x=x), np.ones(6), recording().since_turn, False,
+            ParameterSetOptions(),
+            [WeightedExplanation(((cause, group),), 1.0)],
         )  # fmt: skip
         ((_, one),) = d.explanations[0].members
         assert one.effect is not None

@@ -15,7 +15,7 @@ from session_folders import CALM, FACES, SITE, WIDE, places, recorded, write_ses
 from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
-from fieldcal.evaluation import angles_shown, not_carried
+from fieldcal.evaluation import angles_shown, omitted_effects
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import effect
@@ -300,8 +300,8 @@ def test_a_tilt_that_a_result_has_some_of_beside_the_other_is_carried() -> None:
     only = solve(seen, tilt="base_tilt", beside_tilt_sigma_deg=0.05)
     for name in TILTS:
         shown = Standing(name, (), 0.99, ())
-        assert not_carried._carries(both, shown)
-        assert not_carried._carries(only, shown) == (name == "base_tilt")
+        assert omitted_effects._is_included(both, shown)
+        assert omitted_effects._is_included(only, shown) == (name == "base_tilt")
 
 
 @pytest.mark.thorough

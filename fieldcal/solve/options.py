@@ -1,4 +1,4 @@
-"""Defaults of a requested calibration: the method, and with it the set."""
+"""Options of `solve`, and the default method for the recorded positions."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from fieldcal.core.sentences import join
 from fieldcal.solve.observations import Observations
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
-CHOICES = ("auto", "none", *TILTS)
+TILT_CHOICES = ("auto", "none", *TILTS)
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What the user asked for.
+class SolveOptions:
+    """Options of a requested calibration; angles are 1 sigma.
 
     Attributes
     ----------
-    method, tilt : or "auto"
+    method, tilt : by name, or "auto"
     cross : whether cross-coupling is estimated
-    as_printed : closed forms with the misprints of the paper
-    level_deg, heading_deg : how level the base is, how well z points north; None where
-        nobody said
-    angles_deg : how well each position's angles are set
-    beside_tilt_deg : how large a tilt of the base may be beside the offsets of joints
-        that explain the positions, and the other way round
-    lot : what the unit's lot says of it; None where it is not asked
-    factory : what the factory left of errors that are not estimated
-    at_best : the same by the grade that the device is called, where biases show a
-        coarser one; each kind of error then has one of the two sizes
+    as_printed : use the closed forms with the misprints of the paper
+    level_deg, heading_deg : uncertainty of the level of the base, and of the direction
+        of z from north; None if not stated
+    angles_deg : uncertainty of the set angles of each position
+    beside_tilt_deg : possible size of the other kind of tilt: a tilt of the base beside
+        offsets of the joints, or the other way round
+    lot : prior from the unit's production lot; None if not used
+    factory : sizes of the errors that the factory left and that are not estimated
+    at_best : the same for the stated grade, if biases show a coarser one; each kind of
+        error then has one of the two sizes
 
     """
 
@@ -54,23 +54,23 @@ class Asked:
     at_best: FactoryErrors | None = None
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS or self.tilt not in CHOICES:
+        if self.method not in METHODS or self.tilt not in TILT_CHOICES:
             raise InputError(
                 f"method {self.method!r} with tilt {self.tilt!r} is unknown: methods"
-                f" are {join(METHODS)}, tilts are {join(CHOICES)}"
+                f" are {join(METHODS)}, tilts are {join(TILT_CHOICES)}"
             )
         if self.lot is not None and self.as_printed:
             raise InputError("printed formulas know of no lot: leave one of them out")
-        _refuse_none((self.level_deg, self.heading_deg, self.angles_deg))
-        _refuse_none((self.beside_tilt_deg,))
+        _check_angle_sigmas((self.level_deg, self.heading_deg, self.angles_deg))
+        _check_angle_sigmas((self.beside_tilt_deg,))
 
     def method_for(self, observations: Observations) -> Method:
-        """The method that suits the positions, or the one that is asked for.
+        """The requested method, or for "auto" the one that suits the positions.
 
         Raises
         ------
         NotObservable
-            If the one that is asked for needs other positions.
+            If the requested method needs other positions.
 
         """
         still = ~observations.rotating
@@ -87,10 +87,10 @@ class Asked:
                 f"the method {self.method} needs the angles of every position: the"
                 " scalar method does without"
             )
-        self._refuse_tilt()
+        self._check_tilt()
         return self.method
 
-    def _refuse_tilt(self) -> None:
+    def _check_tilt(self) -> None:
         if self.method == "two_position":
             if self.tilt in TILTS or self.cross:
                 raise NotObservable(
@@ -102,12 +102,12 @@ class Asked:
 
     @property
     def heading(self) -> float | None:
-        """Rad."""
+        """Uncertainty of the heading, rad; None if not stated."""
         return None if self.heading_deg is None else float(np.deg2rad(self.heading_deg))
 
 
 def _suitable_method(still: int, known: int) -> Method:
-    """Take the method that suits so many positions, some of them with known angles."""
+    """Choose the method for positions at rest, some of them with known angles."""
     if not still:
         return "least_squares"
     if known < still and known < 3:
@@ -115,7 +115,7 @@ def _suitable_method(still: int, known: int) -> Method:
     return "two_position" if known == 2 else "joint"
 
 
-def _refuse_none(sigmas_deg: Iterable[float | None]) -> None:
+def _check_angle_sigmas(sigmas_deg: Iterable[float | None]) -> None:
     for degrees in sigmas_deg:
         if degrees is not None and not 0 <= degrees < 90:
             raise InputError(f"an uncertainty of {degrees:g}° is none: give 0 to 90°")

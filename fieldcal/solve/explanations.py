@@ -42,56 +42,59 @@ from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.solve.warm_scales import WARM_SCALE
 
 AXES = 3
-"""Parameters from which on an effect is not taken on some of them alone."""
+"""Largest number of parameters of which subsets are taken as variants."""
 
 CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
-"""Functions without physics whose value at the end is part of what the device has come
-to; those of angles and forces have no zero."""
+"""Functions without physics whose value at the end belongs to the biases and scale
+factors there; functions of angles and forces have no zero."""
 
 SMALL = 1e-3
 """d of (2), m/s^2 and rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """An explanation of a recording.
+class WeightedExplanation:
+    """An explanation of a recording with its probability.
 
     Attributes
     ----------
     members : its causes, of any dictionary
-    probability : that it is the right one
-    maybe : the same causes on triads that do not show them, and may have them
-    sizes : how large the recording shows each of the members to be, v; it is told here
-        beside more that is uncertain, and a size sought again would shrink it
+    probability : probability of the explanation
+    possible_members : the same causes on triads that do not show them, and may have
+        them
+    sizes : size v of each member as found in the recording. It is kept: together with
+        the further uncertain parameters here, a new search would find it too small
 
     """
 
     members: tuple[Member, ...]
     probability: float
-    maybe: tuple[Member, ...] = ()
+    possible_members: tuple[Member, ...] = ()
     sizes: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, one: Set, probability: float) -> Shown:
-        """A set of a search, as large as it has its causes."""
+    def of(cls, one: Set, probability: float) -> WeightedExplanation:
+        """From a set of a search, with the sizes that it has for its causes."""
         sizes = priors.SIZES[list(one.sizes.members)].tolist()
         return cls(one.members, probability, sizes=tuple(sizes))
 
     @property
-    def size_of(self) -> dict[str, float]:
-        """How large each cause is, by its key; none where that is not known."""
+    def sizes_by_key(self) -> dict[str, float]:
+        """Size of each cause by its key; empty if not known."""
         keys = [cause.key for cause, _ in self.members]
         return dict(zip(keys, self.sizes, strict=True)) if self.sizes else {}
 
 
-def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown, ...]:
-    """Explanations by the columns of another dictionary, the likeliest first.
+def translate_explanations(
+    d: Dictionary, shown: Sequence[WeightedExplanation], has: set[str]
+) -> tuple[WeightedExplanation, ...]:
+    """Explanations in the columns of another dictionary, the likeliest first.
 
     Parameters
     ----------
     d : the dictionary; columns that it lacks are appended
-    shown : explanations; those that differ in nothing that is carried become one
-    has : names of what the set has already
+    shown : explanations; those with the same transferred causes become one
+    has : names of the effects that the set already contains
 
     """
     total: dict[frozenset[Group], float] = {}
@@ -100,34 +103,36 @@ def carried(d: Dictionary, shown: Sequence[Shown], has: set[str]) -> tuple[Shown
     for one in shown:
         # one tilt stands for the other, where there are not both
         both = bool(has & unseen) and unseen <= {cause.name for cause, _ in one.members}
-        kept = [m for m in one.members if _adds(m, has if both else has | unseen)]
+        kept = [m for m in one.members if _is_missing(m, has if both else has | unseen)]
         own |= {group: cause for cause, group in kept}
         key = frozenset(group for _, group in kept)
         total[key] = total.get(key, 0.0) + one.probability
     least = thresholds.LOOKED_AT * sum(total.values())
     likely = {k: p for k, p in total.items() if p >= least}
-    # in the order in which they came: that of a set is another one in every run
+    # in their original order: the order of a Python set differs from run to run
     wanted = {g: c for g, c in own.items() if any(g in key for key in likely)}
     size: dict[str, float] = {}
     for one in sorted(shown, key=lambda s: s.probability):
-        size |= one.size_of
+        size |= one.sizes_by_key
     here = {g: m for g, m in _in_other_dictionary(d, wanted, size)}
     also = list(_on_other_triad(d, [c for c, _ in here.values()]))
-    out: dict[frozenset[Group], Shown] = {}
+    out: dict[frozenset[Group], WeightedExplanation] = {}
     for key, p in likely.items():
         members = tuple(m for g, m in here.items() if g in key)
         same = frozenset(g for _, g in members)
         before = out[same].probability if same in out else 0.0
         maybe = tuple(m for m in also if m[0].name in {c.name for c, _ in members})
-        out[same] = Shown(members, before + p / sum(likely.values()), maybe)
+        out[same] = WeightedExplanation(
+            members, before + p / sum(likely.values()), maybe
+        )
     return tuple(sorted(out.values(), key=lambda s: -s.probability))
 
 
-def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
-    """Tilts that a set does without: all if it has one, otherwise unlikely ones.
+def _unseen_tilts(shown: Sequence[WeightedExplanation], has: set[str]) -> set[str]:
+    """Tilts that are not transferred: all if the set has one, otherwise unlikely ones.
 
-    Of positions that do not show the tilt it is stated how level the base is, or it is
-    said that nobody did.
+    If positions do not show the tilt, the level of the base is stated, or a warning
+    says that it is not.
     """
     if has & set(TILTS):
         return set(TILTS)
@@ -139,18 +144,18 @@ def _unseen_tilts(shown: Sequence[Shown], has: set[str]) -> set[str]:
     return {name for name, p in share.items() if p < thresholds.NAMED}
 
 
-def _adds(member: Member, has: set[str]) -> bool:
-    """Whether a given set lacks a cause."""
+def _is_missing(member: Member, has: set[str]) -> bool:
+    """Whether the set lacks a cause, so that it has to be transferred."""
     cause, group = member
     if cause.by_window and cause.kind != "position":
-        return False  # it has those already, as windows that scatter or have no weight
+        return False  # scatter and bad windows are part of every fit
     effect = group.effect
     if isinstance(effect, Scatter) and not {p.name for p in effect.params} <= set(
         CHANNELS
     ):
-        return False  # how well angles are set is always in
+        return False  # the uncertainty of angles is always included
     if effect is not None and effect.like_calibration:
-        return False  # nothing tells it from what is estimated
+        return False  # indistinguishable from the estimated parameters
     carrying = {cause.name, *([effect.carried_by] if effect else [])}
     return not carrying & has
 
@@ -158,9 +163,9 @@ def _adds(member: Member, has: set[str]) -> bool:
 def _in_other_dictionary(
     d: Dictionary, wanted: Mapping[Group, Cause], size: Mapping[str, float]
 ) -> Iterator[tuple[Group, Member]]:
-    """Groups of another dictionary, each with the member that it is in this one.
+    """Each group of another dictionary with its member in this one.
 
-    Causes whose size is known by their key have that.
+    Causes whose size is given by their key take it.
     """
     every: dict[str, Cause] = {}
     if not all(has_equation(g) for g in wanted):
@@ -170,7 +175,7 @@ def _in_other_dictionary(
     for group, cause in wanted.items():
         if has_equation(group):
             if group.effect is not None and group.effect.applies(d.x):
-                new.setdefault(cause.key, []).append((group, _variants(d, group)))
+                new.setdefault(cause.key, []).append((group, _group_variants(d, group)))
         elif cause.key in every:
             same = every[cause.key]
             yield group, (same, same.variants[cause.variants.index(group)])
@@ -186,8 +191,8 @@ def _in_other_dictionary(
             yield group, (same, next(off, own) if group in cause.expected else own)
 
 
-def _variants(d: Dictionary, group: Group) -> list[Group]:
-    """A group of an effect by columns of `d`, and its effect elsewhere."""
+def _group_variants(d: Dictionary, group: Group) -> list[Group]:
+    """A group of an effect in columns of `d`, followed by its other variants."""
     effect = group.effect
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
@@ -207,11 +212,11 @@ def _variants(d: Dictionary, group: Group) -> list[Group]:
 
 
 def _in_axes_of(d: Dictionary, group: Group) -> tuple[int, ...]:
-    """Parameters of an effect in the axes that a given set has.
+    """Parameters of an effect in the axes of the parameter set.
 
-    Where nobody knows how the device stood, these are the axes in which the parameters
-    that a turn of the device makes of others are zero. A search leaves such a turn to
-    the sizes of all of them; a mean of both has gyroscopes in no axes at all.
+    If the orientation is unknown, the axes are chosen so that the parameters that a
+    rotation of the device can produce from others are zero. A search keeps all of them;
+    a mean of both would be in no axes at all.
     """
     effect = group.effect
     if effect is None or d.x.oriented.any():
@@ -222,7 +227,7 @@ def _in_axes_of(d: Dictionary, group: Group) -> tuple[int, ...]:
 
 
 def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
-    """Effects of one triad on the other one: what a device has is often in both."""
+    """Effects of one triad, on the other triad: a device often has them on both."""
     known = {c.key for c in causes}
     for name in dict.fromkeys(c.name for c in causes if c.kind == "effect"):
         first = next(c for c in causes if c.name == name)
@@ -232,12 +237,12 @@ def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
         for part, some in parts(d, group.effect):
             other = replace(first, part=part)
             if part != first.part and some and other.key not in known:
-                every = _variants(d, replace(group, part=part, params=some))
+                every = _group_variants(d, replace(group, part=part, params=some))
                 yield replace(other, variants=tuple(every)), every[0]
 
 
 def _with_parameters(whole: Group, params: tuple[int, ...]) -> Group:
-    """A group with some of its parameters."""
+    """The group with only some of its parameters."""
     at = [whole.params.index(j) for j in params]
     return replace(
         whole, params=params, columns=whole.columns[at], typical=whole.typical[at]
@@ -245,19 +250,20 @@ def _with_parameters(whole: Group, params: tuple[int, ...]) -> Group:
 
 
 def has_equation(group: Group) -> bool:
-    """Whether an effect makes it, and no chance; else it is told by its place."""
+    """Whether the group belongs to an effect that has an equation."""
     return isinstance(group.effect, Motion | Sensor)
 
 
-def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
-    """What columns of what is carried have made of biases and scale factors, (2).
+def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Array:
+    """Derivative of biases and scale factors at the end by the columns of `d`, (2).
 
-    Back come (2, 6, k): biases and scale factors by output and column of `d`.
+    Returns (2, 6, k): biases and scale factors, by output and column. Columns that do
+    not belong to the explanations have 0.
     """
     out = np.zeros((2, 6, d.width))
     there = np.zeros(d.width, dtype=bool)
     for one in shown:
-        for cause, group in (*one.members, *one.maybe):
+        for cause, group in (*one.members, *one.possible_members):
             if not isinstance(group.effect, Motion) and (
                 group.effect is not None or cause.name in CHANGING
             ):
@@ -265,18 +271,18 @@ def at_end(d: Dictionary, shown: Sequence[Shown]) -> Array:
                     there[each.columns] = True
     if not there.any():
         return out
-    out[0] = _outputs(d, there, np.zeros(6))
+    out[0] = _end_outputs(d, there, np.zeros(6))
     for c in range(6):
         step = SMALL * np.eye(6)[c]
-        up, down = (_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
+        up, down = (_end_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
         out[1, c] = (up - down) / (2 * SMALL)
     return out
 
 
-def _outputs(d: Dictionary, there: Array, felt: Array) -> Array:
-    """Outputs by column, (6, k), at the end where f and w are given, (6,).
+def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
+    """Outputs by column, (6, k), at the end of the recording for inputs f, w, (6,).
 
-    Long after the last turn: what joints still do then is nothing of the device.
+    The last turn is taken as long ago, so that motion of the joints is excluded.
     """
     x = only(d.x, [int(np.argmax(d.x.t))])
     nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2

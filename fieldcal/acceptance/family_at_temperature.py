@@ -9,9 +9,9 @@ themselves (`thermal`), or, where they do not show it, theta = 0 and
 
     u_i = c |T - T_i|                                                              (2)
 
-with c the temperature coefficient that is usual for the grade. All u_i are one error:
-what is compared is uncertain by their mean. A run on a cold day is so not taken for a
-broken device, and a broken device is not excused by more than a temperature does.
+with c the usual temperature coefficient of the grade. All u_i are one common error; the
+uncertainty of the comparison is their mean. A run on a cold day is therefore not taken
+for a broken device.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.acceptance.temperature import NEAR_K, as_point
+from fieldcal.acceptance.temperature import NEAR_K, as_thermal_point
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
@@ -31,7 +31,7 @@ from fieldcal.thermal import ThermalModel, thermal_model
 
 
 @dataclass(frozen=True, slots=True)
-class WarmedFamily:
+class FamilyAtTemperature:
     """Earlier calibrations at the present temperature.
 
     Attributes
@@ -45,25 +45,25 @@ class WarmedFamily:
     sigma: Mapping[str, float]
 
 
-def warmed(
-    found: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
-) -> WarmedFamily:
-    """The family of a calibration at its temperature, (1), (2).
+def family_at_temperature(
+    calibration: Calibration, earlier: Sequence[HistoryRun], limits: GradeLimits
+) -> FamilyAtTemperature:
+    """Earlier calibrations at the temperature of the present one, (1), (2).
 
     Parameters
     ----------
-    found : the calibration of now
-    earlier : that it is compared with, oldest first
-    limits : of its grade
+    calibration : the present calibration
+    earlier : calibrations that it is compared with, oldest first
+    limits : limits of its grade
 
     """
-    now = as_point("now", found)
-    points = [as_point(run.taken_at, run.calibration) for run in earlier]
+    now = as_thermal_point("now", calibration)
+    points = [as_thermal_point(run.taken_at, run.calibration) for run in earlier]
     known = [p for p in points if p is not None]
     if now is None or all(
         abs(p.temperature - now.temperature) <= NEAR_K for p in known
     ):
-        return WarmedFamily([run.calibration for run in earlier], {})
+        return FamilyAtTemperature([run.calibration for run in earlier], {})
     try:
         model: ThermalModel | None = thermal_model(known, limits)
     except InputError:
@@ -79,7 +79,7 @@ def warmed(
         )
     names = dict.fromkeys(name for each in wide for name in each)
     sigma = {n: float(np.mean([w[n] for w in wide if n in w])) for n in names}
-    return WarmedFamily(moved, sigma)
+    return FamilyAtTemperature(moved, sigma)
 
 
 def _change(
@@ -95,7 +95,7 @@ def _change(
         try:
             told = model.change(now, then)
         except InputError:
-            told = {}  # no earlier one was so cold, or so warm
+            told = {}  # outside the temperatures of earlier calibrations
     usual = {n: (0.0, limits.per_kelvin(group_of(n)) * abs(now - then))
              for n in of.names}  # fmt: skip
     return np.array([told.get(name, usual[name]) for name in of.names]).reshape(-1, 2)

@@ -15,9 +15,9 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.chances import chi2_tail
 
 
-def turns_disagree(found: Calibration, limits: GradeLimits) -> str:
-    """Sentence if turns miss the positions, with the remedy; else empty."""
-    turns = found.info.get("turns", {})
+def turn_disagreement(calibration: Calibration, limits: GradeLimits) -> str:
+    """Sentence with the remedy if turns contradict the positions; else empty."""
+    turns = calibration.info.get("turns", {})
     scatter, dof = float(turns.get("scatter_rad", 0.0)), int(turns.get("dof", 0))
     chance = chi2_tail(float(turns.get("chi2", 0.0)), dof) if dof > 0 else 1.0
     if chance >= limits.fit_chance or scatter <= limits.gyr_scale_sigma:

@@ -1,6 +1,6 @@
 """Prior of a unit from its production lot, unless the unit is an outlier.
 
-The lot's mean and covariance are rows of the model (`averaging.known_rows`), so that
+The lot's mean and covariance are rows of the model (`averaging.lot_rows`), so that
 estimate, tilt and bad windows are found with them. A unit may differ from its lot, (1)
 of `calibration.lot_prior`. With x, C the estimate and covariance of the unit alone, m
 the lot's mean, and P_h the covariance of the units under hypothesis h,
@@ -23,73 +23,74 @@ import numpy as np
 from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
-from fieldcal.calibration.wording import number, pretty
+from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.mixture import covariance_of_means
-from fieldcal.solve.estimation import Estimated
+from fieldcal.solve.estimation import ParameterEstimate
 
-EVERYTHING = ""
-"""In place of a parameter's name: none of them by itself."""
+ALL_PARAMETERS = ""
+"""In place of a parameter's name: all parameters, not a single one."""
 
 
 @dataclass(frozen=True, slots=True)
-class Borrowed:
-    """What a unit has from its lot.
+class LotContribution:
+    """Contribution of the production lot to the result of a unit.
 
     Attributes
     ----------
-    lot : the parameters that both know
-    odd : probability that the unit is odd
-    parameter : in which it is, if it is; empty for all of them
+    lot : prior of the parameters that unit and lot have in common
+    outlier_probability : probability that the unit is an outlier
+    outlier_parameter : parameter in which it most likely is one; empty for all
     own : value and standard uncertainty by full name, without the lot
-    found : the same with it
+    combined : the same with the lot
 
     """
 
     lot: LotPrior
-    odd: float
-    parameter: str
+    outlier_probability: float
+    outlier_parameter: str
     own: Mapping[str, tuple[float, float]]
-    found: Mapping[str, tuple[float, float]]
+    combined: Mapping[str, tuple[float, float]]
 
     @property
     def refused(self) -> bool:
-        """Whether the unit is odd, and has nothing from its lot."""
-        return self.odd > thresholds.NAMED
+        """Whether the unit is an outlier, so that the lot is not used."""
+        return self.outlier_probability > thresholds.NAMED
 
     @property
     def sentence(self) -> str:
-        """What is in the result, or why nothing is."""
+        """What the lot contributes, or why it is not used."""
         units = f"{min(self.lot.units)} units of {self.lot.label}"
         if self.refused:
             return (
-                f"this unit is odd beside {units} (P = {self.odd:.2f}):"
+                f"this unit is odd beside {units} (P = {self.outlier_probability:.2f}):"
                 f" {self._largest_shift()}; nothing of the lot is in the result:"
                 " see whether it is the right lot, and examine the unit"
             )
-        name = min(self.lot.names, key=self._part_left)
+        name = min(self.lot.names, key=self._remaining_share)
         unit = _unit(name)
         before = self.own.get(name)
         instead = f"± {before[1]:.2g}" if before else "none"
         perhaps = ""
-        if self.odd > thresholds.MENTIONED:
+        if self.outlier_probability > thresholds.MENTIONED:
             perhaps = (
-                f"; the unit may be odd, P = {self.odd:.2f}: {self._largest_shift()},"
+                f"; the unit may be odd, P = {self.outlier_probability:.2f}:"
+                f" {self._largest_shift()},"
                 " which is in the uncertainties"
             )
         return (
             f"what {units} say is in this result: {name} has"
             f" {instead} by itself and"
-            f" {f'± {self.found[name][1]:.2g} {unit}'.strip()} with it{perhaps}"
+            f" {f'± {self.combined[name][1]:.2g} {unit}'.strip()} with it{perhaps}"
         )
 
-    def _part_left(self, name: str) -> float:
-        """What is left of a parameter's uncertainty, as a part."""
-        return self.found[name][1] / self.own.get(name, (0.0, np.inf))[1]
+    def _remaining_share(self, name: str) -> float:
+        """Uncertainty of a parameter with the lot, as a part of that without."""
+        return self.combined[name][1] / self.own.get(name, (0.0, np.inf))[1]
 
     def _largest_shift(self) -> str:
-        """By what the unit differs most from its lot."""
+        """Sentence part: the largest difference of the unit from its lot."""
         known = [n for n in self.lot.names if n in self.own]
         off = {
             n: (self.own[n][0] - m) / np.hypot(self.own[n][1], s)
@@ -98,12 +99,14 @@ class Borrowed:
             )
             if n in known
         }
-        name = self.parameter or max(off, key=lambda n: abs(off[n]), default="")
+        name = self.outlier_parameter or max(off, key=lambda n: abs(off[n]), default="")
         if name not in off:
             return "in what several parameters are together"
         i = self.lot.names.index(name)
-        own = " ± ".join(number(*self.own[name]))
-        usual = " ± ".join(number(float(self.lot.mean[i]), float(self.lot.sigma[i])))
+        own = " ± ".join(format_with_sigma(*self.own[name]))
+        usual = " ± ".join(
+            format_with_sigma(float(self.lot.mean[i]), float(self.lot.sigma[i]))
+        )
         unit = f" {_unit(name)}".rstrip()
         return f"{name} is {own}{unit}, where the lot has {usual}"
 
@@ -115,8 +118,8 @@ class Borrowed:
         )  # fmt: skip
         return {
             "lot": self.lot.label,
-            "odd_probability": self.odd,
-            "odd_parameter": (self.parameter or None) if self.refused else None,
+            "odd_probability": self.outlier_probability,
+            "odd_parameter": (self.outlier_parameter or None) if self.refused else None,
             "refused": self.refused,
             "parameters": {
                 name: {
@@ -125,7 +128,7 @@ class Borrowed:
                     "lot_sigma": sigma,
                     "own_value": self.own.get(name, (None, None))[0],
                     "own_sigma": self.own.get(name, (None, None))[1],
-                    "sigma": self.found[name][1],
+                    "sigma": self.combined[name][1],
                 }
                 for name, mean, sigma, units in rows
             },
@@ -133,61 +136,71 @@ class Borrowed:
 
 
 def _unit(name: str) -> str:
-    return pretty(GROUPS[group_of(name)][2])
+    return format_unit(GROUPS[group_of(name)][2])
 
 
-def borrowed(
-    own: Estimated, found: Estimated, lot: LotPrior
-) -> tuple[Estimated, Borrowed | None]:
-    """An estimate with its lot, unless the unit is odd; None where both share nothing.
+def combine_with_lot(
+    own: ParameterEstimate, found: ParameterEstimate, lot: LotPrior
+) -> tuple[ParameterEstimate, LotContribution | None]:
+    """The estimate with the lot, or without it if the unit is an outlier.
+
+    The contribution is None if unit and lot have no parameter in common.
 
     Parameters
     ----------
-    own, found : without the lot and with it
-    lot : what it says
+    own, found : estimates without the lot and with it
+    lot : prior from the lot
 
     """
-    lot = lot.only([n for n in found.names if n in own.given.names])
+    lot = lot.subset([n for n in found.names if n in own.parameter_set.names])
     if not lot.names:
         return own, None
-    others = _Hypotheses.of(own, lot)
-    kept = own if others.odd > thresholds.NAMED else others.mixed_with(found)
-    lot = lot.only(kept.names)
-    told = Borrowed(
-        lot, others.odd, others.parameter, _estimates(own), _estimates(kept)
+    others = _OutlierHypotheses.of(own, lot)
+    kept = (
+        own
+        if others.outlier_probability > thresholds.NAMED
+        else others.mixture_with(found)
+    )
+    lot = lot.subset(kept.names)
+    told = LotContribution(
+        lot,
+        others.outlier_probability,
+        others.outlier_parameter,
+        _estimates(own),
+        _estimates(kept),
     )
     return kept, told
 
 
-def _estimates(one: Estimated) -> dict[str, tuple[float, float]]:
+def _estimates(one: ParameterEstimate) -> dict[str, tuple[float, float]]:
     """Value and sigma of each parameter by its full name."""
     rows = zip(one.values.tolist(), np.sqrt(np.diag(one.covariance)), strict=True)
     return {n: (v, float(s)) for n, (v, s) in zip(one.names, rows, strict=True)}
 
 
 @dataclass(frozen=True, slots=True)
-class _Hypotheses:
-    """In what a unit may be odd; the first hypothesis is that it is not.
+class _OutlierHypotheses:
+    """Hypotheses of an outlier; the first one is that the unit is none.
 
     Attributes
     ----------
     names : (k,) all parameters of the unit's own set
-    parameters : (h,) in which it is odd; empty where in none by itself
-    share : (h,) probability
+    parameters : (h,) parameter of the outlier; empty if it is not a single one
+    probabilities : (h,)
     means, covariances : (h, k), (h, k, k), (1)
 
     """
 
     names: tuple[str, ...]
     parameters: tuple[str, ...]
-    share: Array
+    probabilities: Array
     means: Array
     covariances: Array
 
     @classmethod
-    def of(cls, own: Estimated, lot: LotPrior) -> _Hypotheses:
-        """Weigh them by what the unit says on its own, (1) and (2)."""
-        names, every = own.given.names, own.every
+    def of(cls, own: ParameterEstimate, lot: LotPrior) -> _OutlierHypotheses:
+        """Weigh the hypotheses by the estimate without the lot, (1) and (2)."""
+        names, every = own.parameter_set.names, own.all_parameters
         at = np.array([names.index(name) for name in lot.names])
         scale = np.sqrt(np.diag(every.covariance))
         told = np.linalg.inv(every.covariance / scale / scale[:, None])
@@ -195,7 +208,7 @@ class _Hypotheses:
         middle[at] = lot.mean / scale[at]
         pull = told @ (every.values / scale - middle)
         wide = lot.covariance / scale[at] / scale[at][:, None]
-        odd, chances, spreads = zip(*_spreads(lot, wide), strict=True)
+        odd, chances, spreads = zip(*_hypothesis_priors(lot, wide), strict=True)
         covariances, score = [], np.log(chances)
         for i, one in enumerate(spreads):
             there = told.copy()
@@ -212,37 +225,43 @@ class _Hypotheses:
         )  # fmt: skip
 
     @property
-    def odd(self) -> float:
-        """Probability that the unit is odd."""
-        return float(self.share[1:].sum())
+    def outlier_probability(self) -> float:
+        """Probability that the unit is an outlier."""
+        return float(self.probabilities[1:].sum())
 
     @property
-    def parameter(self) -> str:
-        """In what it is then."""
-        return self.parameters[1 + int(np.argmax(self.share[1:]))]
+    def outlier_parameter(self) -> str:
+        """Most likely parameter of an outlier; empty for all."""
+        return self.parameters[1 + int(np.argmax(self.probabilities[1:]))]
 
-    def mixed_with(self, found: Estimated) -> Estimated:
-        """The estimate with the lot, and what it is where the unit is odd."""
+    def mixture_with(self, found: ParameterEstimate) -> ParameterEstimate:
+        """Mixture of the estimate with the lot and those of the outlier hypotheses."""
         ours = [i for i, name in enumerate(found.names) if name in self.names]
         at = [self.names.index(found.names[i]) for i in ours]
-        means = np.tile(found.values, (len(self.share), 1))
-        covariances = np.tile(found.covariance, (len(self.share), 1, 1))
+        means = np.tile(found.values, (len(self.probabilities), 1))
+        covariances = np.tile(found.covariance, (len(self.probabilities), 1, 1))
         means[1:, ours] = self.means[1:, at]
-        both = np.ix_(range(1, len(self.share)), ours, ours)
+        both = np.ix_(range(1, len(self.probabilities)), ours, ours)
         covariances[both] = self.covariances[1:][:, at][:, :, at]
-        mean = self.share @ means
-        covariance = np.einsum("h,hij->ij", self.share, covariances)
-        covariance += covariance_of_means(means, self.share)
+        mean = self.probabilities @ means
+        covariance = np.einsum("h,hij->ij", self.probabilities, covariances)
+        covariance += covariance_of_means(means, self.probabilities)
         return replace(found, values=mean, covariance=covariance)
 
 
-def _spreads(lot: LotPrior, wide: Array) -> Iterator[tuple[str, float, Array]]:
-    """In what a unit is odd, if it is, how likely that is, and P_h."""
-    yield EVERYTHING, 1.0, wide
-    more = lot.times**2 - 1
+def _hypothesis_priors(
+    lot: LotPrior, wide: Array
+) -> Iterator[tuple[str, float, Array]]:
+    """Parameter, prior odds and P_h of each hypothesis."""
+    yield ALL_PARAMETERS, 1.0, wide
+    more = lot.outlier_factor**2 - 1
     for j, name in enumerate(lot.names):
         one = wide.copy()
         one[j, j] += more * wide[j, j]
-        yield name, float(lot.odd[j] / (1 - lot.odd[j])), one
-    odd = float(lot.odd.mean())
-    yield EVERYTHING, odd / (1 - odd), (1 + more) * wide
+        yield (
+            name,
+            float(lot.outlier_probability[j] / (1 - lot.outlier_probability[j])),
+            one,
+        )
+    odd = float(lot.outlier_probability.mean())
+    yield ALL_PARAMETERS, odd / (1 - odd), (1 + more) * wide

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fieldcal.acceptance.decision import Circumstances, decide
-from fieldcal.acceptance.turned import turns_disagree
+from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.calibration import Calibration, limits
 from fieldcal.session.description import parse
 
@@ -35,7 +35,7 @@ def calibration(**turns: Any) -> Calibration:
 def test_what_turns_leave_by_chance_or_harmlessly_is_no_reason(
     turns: dict[str, float],
 ) -> None:
-    assert turns_disagree(calibration(**turns), BOUNDS) == ""
+    assert turn_disagreement(calibration(**turns), BOUNDS) == ""
 
 
 def test_outputs_that_are_exchanged_are_no_go() -> None:

@@ -164,7 +164,7 @@ def _named(session: Session, end: SoFar) -> bool:
         return False
     tilted = {e.id for e in session.profile.effects} & TILTS
     truth = set(session.concealed)
-    standing = end.explanation.standing
+    standing = end.explanation.probable_causes
     every = (
         set().union(*({s.name, *s.aliases} for s in standing)) if standing else set()
     )

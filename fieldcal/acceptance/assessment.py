@@ -32,7 +32,7 @@ from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.session.installed import tells_an_offset
 from fieldcal.windows import Average, average
-from fieldcal.windows.dead_axis import broken
+from fieldcal.windows.dead_axis import broken_axis_messages
 
 
 def assess(
@@ -66,7 +66,7 @@ def assess(
             earlier = warmed(found, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
-    dead = broken(session.block.six)
+    dead = broken_axis_messages(session.block.six)
     taken_out = _taken_out(found, session, still, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in still.averages],
@@ -99,7 +99,10 @@ def unassessed(
     about, of_acc = session.about, "acc_scale" in found.groups
     unknown = [gravity_unknown(about)] if of_acc else []
     wrong = [gravity_contradicted(about)] if of_acc else []
-    wrong += [_lacking(found, session, still, limits), *broken(session.block.six)]
+    wrong += [
+        _lacking(found, session, still, limits),
+        *broken_axis_messages(session.block.six),
+    ]
     wrong += [jumps_too_far(found, limits)]
     wrong += _taken_out(found, session, still, limits)
     wrong = [w for w in wrong if w]

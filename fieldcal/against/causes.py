@@ -195,7 +195,9 @@ def _determined(
         if s**2 < thresholds.DETERMINED * b**2
     }
     if there.inference.dictionary.free.all():
-        out = found_effects.whatever_turned(group, values, covariance, before, out)
+        out = found_effects.merge_turned_parameters(
+            group, values, covariance, before, out
+        )
     return out
 
 
@@ -206,7 +208,9 @@ def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
         return {}
     if isinstance(group.effect, Scatter):
         d = there.inference.dictionary
-        return found_effects.sizes_of(there.set, d, group, _size_of(there, member))
+        return found_effects.random_sizes_of_group(
+            there.set, d, group, _size_of(there, member)
+        )
     values, covariance = there.estimate(group.columns)
     before = group.sizes(_size_of(there, member))
     out = _determined(there, group, values, covariance, before)
@@ -231,10 +235,10 @@ def _aliases(source: Side, name: str) -> tuple[str, ...]:
 def _where(source: Side, name: str) -> tuple[Mismatch, ...]:
     """Where the one that has a cause shows it; positions as they are listed."""
     explanation = source.explanation
-    standing = next((s for s in explanation.standing if s.name == name), None)
+    standing = next((s for s in explanation.probable_causes if s.name == name), None)
     if standing is None:
         return ()
-    lost = found_effects.removed(explanation, standing)
+    lost = found_effects.remove_cause(explanation, standing)
     of = mismatches.of_cause if name in catalogue() else mismatches.of_unknown
     numbered = explanation.prepared.source.about.numbered
     return tuple(

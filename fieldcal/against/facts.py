@@ -10,7 +10,7 @@ from fieldcal.against.samples import level
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened
 from fieldcal.core.samples import CHANNELS
-from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.rows.thermometer import Thermometer
 
@@ -45,7 +45,7 @@ def _calibration(there: Widened) -> dict[str, dict[str, Quantity]]:
         values, covariance, _ = offsets.calibration(there, name, axes)
         sigma = np.sqrt(np.diag(covariance))
         out[name] = {
-            "xyz"[c % 3]: Quantity(float(v), float(s), GROUPS[name])
+            "xyz"[c % 3]: Quantity(float(v), float(s), GROUP_UNITS[name])
             for c, v, s in zip(axes.tolist(), values, sigma, strict=True)
             if s < offsets.DETERMINED[name]
         }

@@ -18,7 +18,7 @@ from fieldcal.against.widened import Widened
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
@@ -77,7 +77,7 @@ def _felt(rate: Array, covariance: Array) -> bool:
 
 def shared_axes(one: Widened, two: Widened) -> Iterator[tuple[str, Index]]:
     """Groups of a calibration, with the channels that two sessions both have."""
-    for name in GROUPS:
+    for name in GROUP_UNITS:
         groups = [_group(w, name) for w in (one, two)]
         axes = [_axes(w, g) for w, g in zip((one, two), groups, strict=True) if g]
         if len(axes) == len(groups) and len(both := np.intersect1d(axes[0], axes[1])):
@@ -119,7 +119,7 @@ def between_sets(explanation: Explanation, name: str, axes: Index) -> Array:
     """
     d = explanation.dictionary
     columns = (d.bias if name.endswith("bias") else d.scale) + axes
-    sets = explanation.average.sets
+    sets = explanation.model_average.sets
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     means = np.array([of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
@@ -168,7 +168,10 @@ def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
     if probability < thresholds.NAMED:
         return
     parameters = _pairs(
-        axes[known], (one[known], cov[inner]), (two[known], more[inner]), GROUPS[name]
+        axes[known],
+        (one[known], cov[inner]),
+        (two[known], more[inner]),
+        GROUP_UNITS[name],
     )
     where = tuple(
         _everywhere(

@@ -24,7 +24,7 @@ from fieldcal.against.result import SimulatorPrediction
 from fieldcal.against.side import Side
 from fieldcal.against.widened import Widened
 from fieldcal.core.samples import Array, Index
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import Fitted, whole
@@ -48,7 +48,7 @@ def before(found: Decided) -> SimulatorPrediction:
 def after(real: Side) -> SimulatorPrediction:
     """The recording, each part as the others predict it."""
     explanation = real.explanation
-    ahead = explanation.held_out.residual(explanation.in_question)
+    ahead = explanation.held_out.residual(explanation.rival_sets)
     squares, count = explanation.held_out.squares(explanation.best.set)
     return _prediction(explanation.rows, ahead, squares, count)
 
@@ -56,7 +56,7 @@ def after(real: Side) -> SimulatorPrediction:
 def _prediction(
     rows: Rows, residual: Array, squares: float, count: int
 ) -> SimulatorPrediction:
-    sizes = rms(rows, residual)
+    sizes = rms_over_parts(rows, residual)
     acc, gyr = (_mean(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
     return SimulatorPrediction(acc, gyr, squares / count if count else np.nan)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, number
+from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, json_number
 from fieldcal.effects import catalogue
 
 Direction = Literal["left_out", "added", "resized"]
@@ -91,7 +91,7 @@ class Difference:
         return {
             "id": self.id,
             "direction": self.direction,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "parameters": {n: p.to_json() for n, p in self.parameters.items()},
             "aliases": list(self.aliases),
             "where": [m.to_json() for m in self.where],
@@ -126,7 +126,7 @@ class SimulatorPrediction:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""
-        return {name: number(value) for name, value in asdict(self).items()}
+        return {name: json_number(value) for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,11 +157,11 @@ class Facts:
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""
         return {
-            "rate_hz": number(self.rate_hz),
-            "step_acc": number(self.step_acc),
-            "step_gyr": number(self.step_gyr),
-            "start_s": number(self.start_s),
-            "start_c": number(self.start_c),
+            "rate_hz": json_number(self.rate_hz),
+            "step_acc": json_number(self.step_acc),
+            "step_gyr": json_number(self.step_gyr),
+            "start_s": json_number(self.start_s),
+            "start_c": json_number(self.start_c),
             "noise": _quantities(self.noise),
             "calibration": {n: _quantities(g) for n, g in self.calibration.items()},
             "effects": {n: _quantities(e) for n, e in self.effects.items()},
@@ -198,8 +198,8 @@ class Aligned:
             "delay": self.delay.to_json(),
             "drift": self.drift.to_json(),
             "turn": _quantities(self.turn),
-            "at_s": number(self.at_s),
-            "compared_s": number(self.compared_s),
+            "at_s": json_number(self.at_s),
+            "compared_s": json_number(self.compared_s),
         }
 
 
@@ -238,7 +238,7 @@ class Match:
         """Return the content of against.json."""
         return {
             "verdict": self.verdict,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "differences": [d.to_json() for d in self.differences],
             "alike": list(self.alike),
             "prediction": {

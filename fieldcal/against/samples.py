@@ -13,11 +13,11 @@ from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.side import Side
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.findings.agreement import UNITS
-from fieldcal.diagnosis.findings.found_effects import of_tone
+from fieldcal.diagnosis.findings.found_effects import effect_of_line
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quantity
-from fieldcal.diagnosis.signal.line import tuned
+from fieldcal.diagnosis.signal.line import tune_line
 from fieldcal.diagnosis.signal.moments import moments_of
-from fieldcal.diagnosis.signal.pieces import pieces_of
+from fieldcal.diagnosis.signal.pieces import samples_of_windows
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line
@@ -134,11 +134,11 @@ def _faint(one: FoundEffect, other: Side) -> FoundEffect | None:
     if not isinstance(effect, Line):
         return None
     source, rows = other.explanation.prepared.source, other.explanation.rows
-    pieces = pieces_of(source, rows)
+    pieces = samples_of_windows(source, rows)
     if not pieces.samples:
         return None
     hz = float(one.parameters["hz"].value)
-    found = of_tone(tuned(pieces, effect, moments_of(pieces, hz)), np.nan)
+    found = effect_of_line(tune_line(pieces, effect, moments_of(pieces, hz)), np.nan)
     sizes = {n: q for n, q in found.parameters.items() if n != "hz"}
     clear = any(float(q.value) > FAINT * (q.sigma or 0.0) for q in sizes.values())
     return found if clear and _is_near(one, found, other) else None

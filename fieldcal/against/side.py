@@ -17,12 +17,12 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.diagnosis.verdict import concluded
+from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
+from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
-from fieldcal.windows.noise import short_lag
+from fieldcal.windows.noise import short_lag_noise
 
 PART = 0.1
 """Least noise of a simulator's output, in that of the recording's: it adds a hundredth
@@ -81,24 +81,26 @@ def side(
     noise, unsure = noise_of(block, about)
     if beside is not None:
         heard, quieted = _audible(block, noise, beside.noise)
-    prepared = _of_one_site(prepare(heard, about))
+    prepared = _of_one_site(prepare_recording(heard, about))
     if beside is not None:
         prepared = _from_one_temperature(prepared, beside.explanation.prepared)
     explanation = explain(prepared)
-    found = concluded(heard, explanation)
+    found = make_diagnosis(heard, explanation)
     steps = grids_of(block)
     return Side(
         name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
     )
 
 
-def _of_one_site(prepared: Prepared) -> Prepared:
+def _of_one_site(prepared: PreparedRecording) -> PreparedRecording:
     """A recording where gravity is what it is said to be: both are measured by it."""
     rows = prepared.rows
     return replace(prepared, rows=replace(rows, x=replace(rows.x, gravity_sigma=0.0)))
 
 
-def _from_one_temperature(prepared: Prepared, other: Prepared) -> Prepared:
+def _from_one_temperature(
+    prepared: PreparedRecording, other: PreparedRecording
+) -> PreparedRecording:
     """A recording whose biases are those at the temperature another one started at."""
     warmth, start = prepared.source.warmth, other.source.warmth.start_c
     ahead = warmth.start_c - start
@@ -122,7 +124,7 @@ def noise_of(block: Block, about: Description) -> tuple[Array, Array]:
     for first, last in spans(block, about):
         piece = block[slice(int(first), int(last))].six
         if len(piece) > 1:
-            levels.append(short_lag(piece))
+            levels.append(short_lag_noise(piece))
             counts.append(np.isfinite(piece).sum(axis=0))
     if not levels:
         return np.full(6, np.nan), np.full(6, np.nan)

@@ -15,7 +15,7 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.lines import format_probability, of_verdict
+from fieldcal.diagnosis.wording.lines import format_probability, verdict_probability
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
@@ -89,7 +89,9 @@ def _verdict(diagnosis: Diagnosis) -> RenderableType:
 
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
-    sure = of_verdict(diagnosis.verdict, diagnosis.probability, len(diagnosis.lines))
+    sure = verdict_probability(
+        diagnosis.verdict, diagnosis.probability, len(diagnosis.lines)
+    )
     return head + Text(f"  {sure}")
 
 

@@ -20,8 +20,8 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import ACC
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.found_effects import sizes
-from fieldcal.diagnosis.wording.paragraph import of_the_setup
+from fieldcal.diagnosis.findings.found_effects import random_sizes
+from fieldcal.diagnosis.wording.paragraph import setup_notes
 from fieldcal.effects import catalogue
 from fieldcal.evaluation.not_carried import wrong_angles
 from fieldcal.model import thresholds
@@ -41,10 +41,10 @@ BY_POSITION = ("window", "position", "alpha", "beta", "joints", "force")
 def angles_set(explanation: Explanation) -> float:
     """How well a recording shows that angles are set, deg; 0 if it shows nothing."""
     found = [0.0]
-    for one in explanation.standing:
+    for one in explanation.probable_causes:
         effect = catalogue().get(one.name)
         if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
-            told = sizes(explanation, one).values()
+            told = random_sizes(explanation, one).values()
             found += [q.value for q in told if isinstance(q.value, float)]
     return max(found)
 
@@ -54,7 +54,7 @@ def angles_of_offsets(explanation: Explanation) -> float:
     x, d = explanation.rows.x, explanation.dictionary
     unknown = [
         group.columns
-        for one in explanation.standing
+        for one in explanation.probable_causes
         if one.kind == "unknown" and one.name in BY_POSITION
         for _, group in one.members
     ]
@@ -88,7 +88,7 @@ def with_angles_shown(
     found = fit()
     if shown is None:
         return found, []
-    notes = [*wrong_angles(shown), *of_the_setup(shown)]
+    notes = [*wrong_angles(shown), *setup_notes(shown)]
     stated, angles = float(asked["angle_sigma_deg"]), angles_set(shown)
     if angles > stated:
         asked["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)

@@ -21,11 +21,11 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.calibrated import calibrated
-from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, listed
-from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.signal.chain import found_first
-from fieldcal.diagnosis.wording.paragraph import off_by
+from fieldcal.diagnosis.findings.calibrated import calibration_of_set
+from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, list_positions
+from fieldcal.diagnosis.prepare import PreparedRecording
+from fieldcal.diagnosis.signal.chain import find_in_recorded_samples
+from fieldcal.diagnosis.wording.paragraph import angle_errors_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
@@ -63,7 +63,7 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
     """The session with bytes put right that were decoded wrongly, and what was done."""
     if not session.positions:
         return session, ()
-    found = found_first(BYTES, session.block, session.about)
+    found = find_in_recorded_samples(BYTES, session.block, session.about)
     faults = [fault for fault in found if fault.mended is not None]
     if not faults:
         return session, ()
@@ -85,7 +85,7 @@ def mended(session: Session) -> tuple[Session, tuple[str, ...]]:
 
 def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
     """What a recording shows that a calibration of it does not carry."""
-    out = [s for s in explanation.standing if not _carries(calibration, s)]
+    out = [s for s in explanation.probable_causes if not _carries(calibration, s)]
     if not out:
         return Uncarried({}, {})
     return Uncarried(
@@ -98,7 +98,7 @@ def uncarried(explanation: Explanation, calibration: Calibration) -> Uncarried:
 def wrong_angles(explanation: Explanation) -> list[str]:
     """Sentences about angles that were wrong, in one position or wherever set."""
     out = []
-    for s in explanation.standing:
+    for s in explanation.probable_causes:
         if s.kind == "position":
             cure = (
                 "mend it before the next recording"
@@ -116,9 +116,9 @@ def _wrong_angles(explanation: Explanation, standing: Standing) -> str:
     """Angles that were set wrongly, with positions and size."""
     errors = angle_errors(explanation, standing)
     return " and ".join(
-        f"a wrong angle, as {off_by(angles)} in {listed(positions)}"
+        f"a wrong angle, as {angle_errors_text(angles)} in {list_positions(positions)}"
         if angles
-        else f"a wrong angle in {listed(positions)}"
+        else f"a wrong angle in {list_positions(positions)}"
         for positions, angles in errors.items()
     )
 
@@ -148,7 +148,7 @@ def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float
     kept = tuple(m for m in best.members if m[0].name not in names)
     search = explanation.posterior.search
     less: Set = search.evaluated(kept, search.sizes_of(best, kept))
-    now, before = (calibrated(explanation, one) for one in (best, less))
+    now, before = (calibration_of_set(explanation, one) for one in (best, less))
     return {
         name: float((now[name][0] - before[name][0]) / before[name][1])
         for name in now
@@ -156,7 +156,7 @@ def _moved(explanation: Explanation, out: Sequence[Standing]) -> dict[str, float
     }
 
 
-def misread(prepared: Prepared, calibration: Calibration) -> Calibration:
+def misread(prepared: PreparedRecording, calibration: Calibration) -> Calibration:
     """The calibration, not to be used where session.toml is found to be wrong."""
     sentences = []
     for name, fault in prepared.checked.faults:

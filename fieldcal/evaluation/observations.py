@@ -25,7 +25,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
-from fieldcal.windows.dead_axis import dead_sensors, without_dead
+from fieldcal.windows.dead_axis import dead_sensors, without_dead_axes
 
 ROUNDED = 1e-6
 """Share of a full scale that units and rounding may make of it."""
@@ -150,7 +150,7 @@ def rests(session: Session) -> Rests:
 
 def _living(block: Block) -> Block:
     """The samples without axes that tell nothing."""
-    told = without_dead(block.six)
+    told = without_dead_axes(block.six)
     return replace(block, acc=told[:, :3], gyr=told[:, 3:])
 
 

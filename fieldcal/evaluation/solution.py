@@ -18,8 +18,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.diagnosis.explain import Explanation, explain, origins
-from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.diagnosis.explain import Explanation, explain, times_since_turn
+from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.evaluation.angles_shown import with_angles_shown
 from fieldcal.evaluation.held_on import held_on
 from fieldcal.evaluation.jump import with_jump
@@ -104,15 +104,15 @@ class Laid:
         return rounding_mode(self.session, grain_of(self.session))
 
     @cached_property
-    def examined(self) -> tuple[Prepared | None, str]:
+    def examined(self) -> tuple[PreparedRecording | None, str]:
         """The recording, checked and reduced, or why it cannot be."""
         try:
-            return prepare(self.session.block, self.about), ""
+            return prepare_recording(self.session.block, self.about), ""
         except InputError as error:
             return None, str(error)
 
     @property
-    def prepared(self) -> Prepared | None:
+    def prepared(self) -> PreparedRecording | None:
         """The recording, checked and reduced; None where it cannot be."""
         return self.examined[0]
 
@@ -155,10 +155,10 @@ class Laid:
         likely = () if shown is None else shown.posterior.weights
         return Recorded(
             rows,
-            origins(source, rows),
+            times_since_turn(source, rows),
             source if turns else None,
             tuple(Shown.of(s, p) for s, p in likely),
-            None if shown is None else shown.filters,
+            None if shown is None else shown.filter_rows,
             tuple(self.rounding.toward_zero.tolist()),
         )
 

@@ -10,7 +10,7 @@ from typing import Any
 from fieldcal.acceptance.assessment import assess, limits_path, start_time, unassessed
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.diagnosis.verdict import concluded
+from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.not_carried import mended
 from fieldcal.evaluation.observations import rests
 from fieldcal.evaluation.solution import Laid, solved_as
@@ -71,7 +71,7 @@ class SessionTask:
         explanation = laid.explanation
         diagnosis = None
         if explanation is not None and self.diagnose:
-            diagnosis = concluded(session.block, explanation).to_json()
+            diagnosis = make_diagnosis(session.block, explanation).to_json()
         return replace(
             of_calibration(folder, found, _taken_at(session, found)),
             serial=str(session.about.device.get("serial", "")),

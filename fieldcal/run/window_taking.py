@@ -101,7 +101,7 @@ class WindowTaking:
             if isinstance(moved, SamplesLost):
                 self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
             what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
-            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep(moved)
+            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep_undisturbed(moved)
             if kept:
                 self._recorder.mark("kept", position=hold.index, kept_s=kept, **what)
                 raise Disturbed(moved, kept) from moved
@@ -109,10 +109,10 @@ class WindowTaking:
             raise
         end = float(np.nextafter(average.end, np.inf))
         where: dict[str, object] = {"start_s": average.start, "end_s": end}
-        if pieces.without:
-            where["without_s"] = pieces.without
+        if pieces.gaps:
+            where["without_s"] = pieces.gaps
         self._recorder.mark("window", position=hold.index, **where)
-        self._noise = pieces.noise and pieces.noise.spectrum
+        self._noise = pieces.noise and pieces.noise.without_wander
         self._display.taken(hold, pieces)
         return average
 
@@ -127,14 +127,14 @@ class WindowTaking:
             if self._desk.wish(hold) == "repeat":
                 self._recorder.mark("repeated", position=hold.index)
                 return False
-            full, now = pieces.full(hold.seconds), float(block.t[-1])
+            full, now = pieces.is_full(hold.seconds), float(block.t[-1])
             if not full and now < looked + LOOK:
                 continue
             looked = now
-            if moved := pieces.moved:
+            if moved := pieces.disturbance:
                 raise moved
             self._display.averaging(hold, pieces)
-            early = not self._about.sways and pieces.done(hold.sigma)
+            early = not self._about.sways and pieces.reason_to_stop(hold.sigma)
             if full or early:
                 break
         self._confirm(watch)

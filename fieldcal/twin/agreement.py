@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings.agreement import UNITS
-from fieldcal.diagnosis.result import number
+from fieldcal.diagnosis.result import json_number
 from fieldcal.sim_device.profile import Profile
 from fieldcal.twin.ways import WayDifference
 
@@ -41,10 +41,10 @@ class ReplayRun:
         """Return the object of diagnosis.json."""
         return {
             **_pair(self.rms),
-            "chi2_per_dof": number(self.chi2_per_dof),
+            "chi2_per_dof": json_number(self.chi2_per_dof),
             "lines": [_pair(line) for line in self.lines],
-            "rms_turns_rad": number(self.ways.angle),
-            "rms_turns_acceleration": number(self.ways.force),
+            "rms_turns_rad": json_number(self.ways.angle),
+            "rms_turns_acceleration": json_number(self.ways.force),
         }
 
 
@@ -77,12 +77,12 @@ class Rerun:
         places = [
             {
                 "position": p,
-                "from_s": number(w[0]),
-                "to_s": number(w[1]),
+                "from_s": json_number(w[0]),
+                "to_s": json_number(w[1]),
                 **{
                     n: {
                         **_pair(run.by_position[i]),
-                        "chi2_per_mean": number(run.chi2_by_position[i]),
+                        "chi2_per_mean": json_number(run.chi2_by_position[i]),
                     }
                     for n, run in self.runs.items()
                 },
@@ -136,6 +136,6 @@ class Rerun:
 
 def _pair(values: Array) -> dict[str, float | None]:
     return {
-        "rms_acceleration": number(float(values[0])),
-        "rms_angular_rate": number(float(values[1])),
+        "rms_acceleration": json_number(float(values[0])),
+        "rms_angular_rate": json_number(float(values[1])),
     }

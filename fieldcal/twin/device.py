@@ -22,7 +22,7 @@ from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect
-from fieldcal.diagnosis.signal.line import Tone
+from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import State, Term
@@ -65,7 +65,7 @@ def device_of(explanation: Explanation, found: Diagnosis, known: TwinState) -> P
     start = float(prepared.source.block.t[0])
     effects = [*settled(known.state.terms, start), *of_earth(known.heading)]
     effects += known_random_effects(prepared.source.about)
-    for tone in prepared.tones:
+    for tone in prepared.spectral_lines:
         effects += of_tone(tone, start)
     for one in found.effects:
         effects += of_samples(explanation, one, start)
@@ -147,7 +147,7 @@ def known_random_effects(about: Description) -> Iterator[SimulatedEffect]:
             yield vocabulary.effect(name, given)
 
 
-def of_tone(tone: Tone, start: float) -> Iterator[SimulatedEffect]:
+def of_tone(tone: SpectralLine, start: float) -> Iterator[SimulatedEffect]:
     """A line, one effect for each of its causes, with its phase at the start.
 
     Re(c exp(2 pi i hz t)) = |c| sin(2 pi hz (t - start) + phase)

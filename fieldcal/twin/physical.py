@@ -54,7 +54,7 @@ class TwinState:
 def fitted_device(explanation: Explanation) -> TwinState:
     """The device with all that was found."""
     best, heading, rate = explanation.best, None, np.zeros(3)
-    if explanation.shows_earth:
+    if explanation.shows_earth_rate:
         heading = _heading(best)
         rate = _turned(best.rows.x, np.array([heading]))[0]
     state = _given(explanation, best, rate)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
@@ -183,7 +183,7 @@ def _run(explanation: Explanation, case: _Case) -> ReplayRun:
     off = np.where(rows.used, rows.y - replayed - case.apart, np.nan)
     total = float(case.fitted.squares_of(off).sum())
     return ReplayRun(
-        _triads(rms(rows, off)),
+        _triads(rms_over_parts(rows, off)),
         total / max(case.fitted.dof, 1),
         *_by_position(case.fitted, off),
         _lines(explanation, device, windows, rows),
@@ -196,7 +196,7 @@ def _by_position(fitted: Fitted, off: Array) -> tuple[Array, Array]:
     rows, places, chi2 = fitted.rows, [], []
     for p in np.unique(rows.x.position):
         at: NDArray[np.bool_] = rows.x.position == p
-        places.append(_triads(rms(rows, np.where(at[:, None], off, np.nan))))
+        places.append(_triads(rms_over_parts(rows, np.where(at[:, None], off, np.nan))))
         count = rows.used[at].sum()
         squares = fitted.squares_of(np.where(at[:, None], off, 0.0)).sum()
         chi2.append(float(squares / count) if count else np.nan)
@@ -207,7 +207,7 @@ def _lines(
     explanation: Explanation, device: Profile, windows: Sequence[HeldWindow], rows: Rows
 ) -> Array:
     """What is left of each line, (k, 2)."""
-    tones, t = explanation.prepared.tones, explanation.prepared.source.block.t
+    tones, t = explanation.prepared.spectral_lines, explanation.prepared.source.block.t
     if not tones:
         return np.empty((0, 2))
     inside = schedule.instants(t, rows.span, len(t), [])

@@ -85,7 +85,8 @@ def test_sets_that_may_all_be_right_have_biases_apart() -> None:
 
     sets = [(one(4.0, 1.0), 0.6), (one(0.0, 1.0), 0.2)]
     explanation = cast(Explanation, SimpleNamespace(
-        dictionary=SimpleNamespace(bias=2, scale=8), average=SimpleNamespace(sets=sets)
+        dictionary=SimpleNamespace(bias=2, scale=8),
+        model_average=SimpleNamespace(sets=sets)
     ))  # fmt: skip
     found = offsets.between_sets(explanation, "acc_bias", np.array([0, 1]))
     np.testing.assert_allclose(found, [[3.0, 0.0], [0.0, 0.0]], atol=1e-12)

@@ -234,7 +234,7 @@ def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
     standing = [Standing(n, (), chances.get(n, 0.9999), ()) for n in names]
     so_far = SimpleNamespace(
         enough=False,
-        explanation=SimpleNamespace(standing=standing),
+        explanation=SimpleNamespace(probable_causes=standing),
         found=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
     )
     assert adaptive._named(so_far) == said  # type: ignore[arg-type]

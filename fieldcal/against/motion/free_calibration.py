@@ -16,7 +16,7 @@ from fieldcal.against.motion.following import Following
 from fieldcal.against.offsets import DETERMINED
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import Array, Index
-from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
@@ -59,7 +59,7 @@ def calibration(found: Following, state: Eliminated) -> dict[str, dict[str, Quan
 
 def _groups(found: Following, state: Eliminated) -> Iterator[tuple[str, Group, Index]]:
     """Groups of the calibration, each with which of its columns are determined."""
-    for name in GROUPS:
+    for name in GROUP_UNITS:
         part, _, cause = name.partition("_")
         always = found.dictionary.always
         group = next((g for g in always if g.cause == cause and g.part == part), None)
@@ -87,7 +87,7 @@ def _told(
         "xyz"[int(axes[i]) % 3]: Quantity(
             float(base[axes[i]] + value[i]),
             float(np.sqrt(covariance[i, i])),
-            GROUPS[name],
+            GROUP_UNITS[name],
         )
         for i in known
     }

@@ -16,7 +16,7 @@ from operator import itemgetter
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.signal.pieces import Complex, Pieces
+from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.model import thresholds
 from fieldcal.physics.recording import medians
 
@@ -30,7 +30,7 @@ BESIDE = 40
 """Neighbours that give the floor, to either side."""
 
 CLOSE, FAR = 5, 12
-"""Neighbours that the taper does not reach and that are still close."""
+"""Nearest and furthest neighbours beyond the taper's reach; they give the slope."""
 
 STEEP = 4.0
 """Multiple of the floor above which these neighbours replace it."""
@@ -39,15 +39,15 @@ SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
 BURST, BURSTS = 0.5, 0.01
-"""Sampling periods, less than which no device takes from sample to sample, and part of
-the steps that are as short where stamps are those of arrival."""
+"""Time step, in sampling periods, below which a step cannot be the device's own, and
+part of the steps that are so short where times are those of arrival."""
 
 HUMP = 2.0
 """Times the floor down to which the power about a peak belongs to it."""
 
 FINER = 4
-"""Places on the grid of samples to a sampling period: what is out of place by an eighth
-of a period loses 3 % of its power at most below 0.4 of the rate, by a half a third."""
+"""Grid points per sampling period for samples at uneven times: an error of an eighth of
+a period costs 3 % of the power at most below 0.4 of the rate, one of a half a third."""
 
 NEAR = 2.0
 """Distance between two lines, in cycles of the shortest window."""
@@ -56,15 +56,15 @@ LOOKS = 10
 """Spectra looked at."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
-"""Channels of one phase that are looked at together."""
+"""Channels that are searched together for a line of one phase."""
 
 COHERENT = 1 << 18
-"""Samples up to which windows are put together with one phase."""
+"""Most samples of a recording that is searched for lines of one phase throughout."""
 
 
 GRID = 1 << 20
-"""Periods from the first sample to the last up to which that is done: over longer
-pauses no clock keeps the phase of a line."""
+"""Longest such recording, in sampling periods: over longer pauses no clock keeps the
+phase of a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,26 +76,26 @@ class Spectrum:
     power : (6, m)
     count : periodograms summed in it
     hz : (m,)
-    together : channels in whose sums a line may stand out
+    channel_groups : groups of channels whose summed power is searched
 
     """
 
     power: Array
     count: int
     hz: Array
-    together: tuple[tuple[int, ...], ...]
+    channel_groups: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """Where the power stands out, Hz.
+    """A peak of the power spectrum, Hz.
 
     Attributes
     ----------
-    hz : where it is highest
-    low, high : between which it is above the floor; a line's own are its frequency
-    noise : (6,) standard deviation of a sample of white noise as strong as what is
-        beside it: filters and bearings make noise that is not white
+    hz : frequency of the maximum
+    low, high : range in which the power is above the floor; of a line, its frequency
+    noise : (6,) standard deviation of a sample of white noise with the power beside the
+        peak: filters and bearings make noise that is not white
 
     """
 
@@ -105,19 +105,19 @@ class Peak:
     noise: Array
 
 
-def highest(
-    pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[Peak]
+def highest_peak(
+    pieces: WindowSamples, spectra: Sequence[Spectrum], taken: Sequence[Peak]
 ) -> Peak | None:
     """The most significant peak, None if there is none.
 
-    One that has one phase throughout, if there is any: what trembles is louder, and is
-    no line. Peaks close to one that was taken already are ignored.
+    Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
+    close to those in `taken` are ignored.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low, channels = max(0.05, CYCLES / shortest), spectra[0]
     kept = [s for s in spectra if s.count == 1]
     for some in (kept, [s for s in spectra if s.count > 1]):
-        found = [_highest(s, low, NEAR / shortest, taken) for s in some]
+        found = [_highest_in_spectrum(s, low, NEAR / shortest, taken) for s in some]
         odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
         if peak is not None and odds < np.log(thresholds.LINE_BY_CHANCE):
             # a line in short windows reaches its neighbours
@@ -126,7 +126,7 @@ def highest(
     return None
 
 
-def _highest(
+def _highest_in_spectrum(
     spectrum: Spectrum, low: float, reach: float, taken: Sequence[Peak]
 ) -> tuple[float, Peak] | None:
     """The highest peak of a spectrum, with the ln probability of one by chance."""
@@ -138,34 +138,34 @@ def _highest(
     if free.sum() < 4 * BESIDE:
         return None
     stands = {}
-    for c in sorted({c for some in spectrum.together for c in some}):
+    for c in sorted({c for some in spectrum.channel_groups for c in some}):
         power = spectrum.power[c, band]
-        stands[c] = power / _level(power, count) * count
+        stands[c] = power / _noise_level(power, count) * count
     best: tuple[float, Peak] | None = None
-    for some in spectrum.together:
+    for some in spectrum.channel_groups:
         total = np.sum([stands[c] for c in some], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
-        odds = _beyond(float(total[at]), count * len(some))
+        odds = _log_gamma_tail(float(total[at]), count * len(some))
         odds += np.log(LOOKS * len(total))
         if best is None or odds < best[0]:
             best = odds, _peak_at(hz, total / (count * len(some)), at)
     return best
 
 
-def _level(power: Array, count: int) -> Array:
+def _noise_level(power: Array, count: int) -> Array:
     """Mean power of noise at each frequency, of the sum of some periodograms (m,)."""
     # median of Gamma(W) over its mean, by Wilson and Hilferty
-    return _on_a_slope(power, _floor(power) / (1 - 1 / (9 * count)) ** 3)
+    return _floor_on_slope(power, _median_floor(power) / (1 - 1 / (9 * count)) ** 3)
 
 
 def noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
-    """White noise as strong as the spectrum near a frequency, (6,).
+    """Deviation of white noise with the spectrum's power near a frequency, (6,).
 
-    That of the samples, `white`, for outputs of which nothing is looked at.
+    For channels that the spectrum does not contain it is `white`.
     """
     noise, at = white.copy(), int(np.argmin(np.abs(spectrum.hz - hz)))
-    for c in sorted({c for some in spectrum.together for c in some}):
-        level = _level(spectrum.power[c], spectrum.count)[at]
+    for c in sorted({c for some in spectrum.channel_groups for c in some}):
+        level = _noise_level(spectrum.power[c], spectrum.count)[at]
         noise[c] = np.sqrt(level / spectrum.count)
     return noise
 
@@ -184,15 +184,15 @@ def _peak_at(hz: Array, power: Array, at: int) -> Peak:
     return Peak(float(hz[at]), float(hz[first]), float(hz[last]), np.zeros(6))
 
 
-def spectra_of(pieces: Pieces) -> list[Spectrum]:
-    """Spectra in which a line may stand out.
+def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
+    """Spectra that are searched for lines.
 
-    Channel by channel window by window; and triads with one phase throughout, in
-    the device's axes and, where the angles are known, in the base's. Windows are
-    tapered: what settles at the start of each is no line, though it comes as often.
-    Stamps of arrival keep no phase.
+    The first is summed over windows, channel by channel. The others have one phase
+    throughout, triad by triad, in device axes and, where the angles are known, in base
+    axes; they are left out where times are those of arrival, which keep no phase.
+    Windows are tapered, since a decay at the start of each window is no line.
     """
-    power, count, hz = _power(pieces)
+    power, count, hz = _power_by_window(pieces)
     used = np.flatnonzero(power.any(axis=1)).tolist()
     out = [Spectrum(power, count, hz, tuple((c,) for c in used))]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
@@ -203,36 +203,41 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
     triads = [some for some in TRIADS if set(some) <= set(used)]
-    out += [Spectrum(*_one_phase(pieces, frame), tuple(triads)) for frame in frames]
+    out += [
+        Spectrum(*_coherent_power(pieces, frame), tuple(triads)) for frame in frames
+    ]
     return out
 
 
-def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, int, Array]:
-    """Of the whole recording, with windows turned into a frame, as in `Spectrum`."""
+def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, int, Array]:
+    """Power, count and frequencies of the whole recording, with one phase throughout.
+
+    `frame` (w, 3, 3) rotates each window into the axes in which the phase is kept.
+    """
     turned = []
     for samples, to_frame in zip(pieces.samples, frame, strict=True):
         tapered = (np.hanning(len(samples))[:, None] * samples).T
         turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
     t = np.concatenate(pieces.times)
-    n = _fast(2 * round((t[-1] - t[0]) * pieces.rate) + 2)
-    spectrum = _transformed(np.hstack(turned), t, pieces.rate, n)
-    return _square(spectrum), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
+    n = _next_fast_length(2 * round((t[-1] - t[0]) * pieces.rate) + 2)
+    spectrum = _fourier_sums(np.hstack(turned), t, pieces.rate, n)
+    return _squared_magnitude(spectrum), 1, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
-def _fast(n: int) -> int:
-    """The next length, of factors 2, 3 and 5, that takes no long transform.
+def _next_fast_length(n: int) -> int:
+    """The next length with factors 2, 3 and 5 only, for a fast transform.
 
-    `scipy.fft.next_fast_len` knows more; it takes a fifth of a second to import.
+    `scipy.fft.next_fast_len` knows more lengths, but importing it takes 0.2 s.
 
-    >>> _fast(1000), _fast(1001), _fast(4097)
+    >>> _next_fast_length(1000), _next_fast_length(1001), _next_fast_length(4097)
     (1000, 1024, 4320)
     """
     odd = [int(3**i * 5**j) for i in range(5) for j in range(4)]
     return min(m << (-(-n // m) - 1).bit_length() for m in odd)
 
 
-def _power(pieces: Pieces) -> tuple[Array, int, Array]:
-    """Of all channels, window by window, as in `Spectrum`."""
+def _power_by_window(pieces: WindowSamples) -> tuple[Array, int, Array]:
+    """Power, count and frequencies of all channels, summed over windows."""
     length = min(LONGEST, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
@@ -241,17 +246,17 @@ def _power(pieces: Pieces) -> tuple[Array, int, Array]:
         for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
             tapered = samples[part].T * taper
-            spectrum = _transformed(tapered, t[part], pieces.rate, n)
-            total += _square(spectrum) / (taper @ taper)
+            spectrum = _fourier_sums(tapered, t[part], pieces.rate, n)
+            total += _squared_magnitude(spectrum) / (taper @ taper)
             count += 1
     return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
-def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
-    """Fourier sums of samples (c, m) at the multiples of rate / n up to its half.
+def _fourier_sums(values: Array, t: Array, rate: float, n: int) -> Complex:
+    """Fourier sums of samples (c, m) at the multiples of rate / n up to half the rate.
 
-    At the times that they have: a log's samples come late, or are missing. As if they
-    came evenly where the times are those of arrival.
+    They are taken at the times t (m,) of the samples, which in a log may be uneven. If
+    the times are those of arrival, samples count as evenly spaced.
     """
     at = (t - t[0]) * rate
     even = np.ptp(at - np.arange(len(at))) < 0.5 / FINER
@@ -264,17 +269,17 @@ def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
 
 
 def _in_bursts(t: Array, rate: float) -> bool:
-    """Whether times are those of arrival: many follow faster than a device samples."""
+    """Whether times are those of arrival: many steps are shorter than a device's."""
     return bool(np.mean(np.diff(t) * rate < BURST) > BURSTS)
 
 
-def _square(spectrum: Complex) -> Array:
+def _squared_magnitude(spectrum: Complex) -> Array:
     square: Array = spectrum.real**2 + spectrum.imag**2
     return square
 
 
-def _floor(power: Array) -> Array:
-    """Running median, by stretches."""
+def _median_floor(power: Array) -> Array:
+    """Running median (m,) of the power, interpolated between stretches."""
     parts = max(1, len(power) // (2 * BESIDE))
     each = len(power) // parts
     level = medians(power[: parts * each].reshape(parts, each))
@@ -283,11 +288,11 @@ def _floor(power: Array) -> Array:
     return np.maximum(floor, 1e-300)
 
 
-def _on_a_slope(power: Array, floor: Array) -> Array:
-    """The floor, or what lies close to either side where that is far above it.
+def _floor_on_slope(power: Array, floor: Array) -> Array:
+    """The floor, raised to the power close by where that is far above it.
 
-    What settles or drifts has the more power the lower the frequency; a line stands out
-    of that, too.
+    Drift and settling have more power at lower frequencies. A line must stand out of
+    that slope, too.
     """
     n = len(power)
     # sums up to and including each; beyond the ends there is nothing to add
@@ -303,7 +308,7 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
         )
         sides.append(np.where(count > 0, mean, np.inf))
     below, above = sides
-    # beyond the lowest frequency there is but more of a slope
+    # at either end of the spectrum only one side has neighbours
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
     beside = np.where(np.isfinite(below), beside, above)
     falls = (beside > STEEP * floor) & (below > SLOPE * power)
@@ -311,7 +316,7 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
     return level
 
 
-def _beyond(x: float, count: int) -> float:
+def _log_gamma_tail(x: float, count: int) -> float:
     """Probability (ln) that Gamma(count) exceeds x: e^-x sum_k x^k / k!."""
     k = np.arange(count)
     terms = k * np.log(max(x, 1e-300)) - np.concatenate(

@@ -106,11 +106,13 @@ class Display:
 
     def averaging(self, hold: Hold, window: PiecedWindow) -> None:
         """Show how far a window is."""
-        self._show("averaging", hold, None, window.meter, window.elapsed, window.sigma)
+        self._show(
+            "averaging", hold, None, window.motion_now, window.elapsed, window.sigma
+        )
 
     def taken(self, hold: Hold, window: PiecedWindow) -> None:
         """Show what a window has reached."""
-        self._show("taken", hold, None, window.meter, window.elapsed, window.sigma)
+        self._show("taken", hold, None, window.motion_now, window.elapsed, window.sigma)
 
     def taken_before(self, hold: Hold, average: Average) -> None:
         """Show what was reached when the position was taken before."""

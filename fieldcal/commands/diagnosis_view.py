@@ -21,7 +21,7 @@ from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from fieldcal.twin import Rerun
+    from fieldcal.twin import ReplayResult
 
 STYLES = {
     "consistent": "bold green",
@@ -51,7 +51,7 @@ BRIEF = 5.0
 
 def show(
     diagnosis: Diagnosis,
-    again: Rerun | None = None,
+    again: ReplayResult | None = None,
     out: IO[str] | None = None,
     details: bool = False,
     width: int | None = None,
@@ -303,7 +303,7 @@ def _calibration(diagnosis: Diagnosis) -> object:
     return table
 
 
-def _replays(again: Rerun) -> object:
+def _replays(again: ReplayResult) -> object:
     from rich.table import Table
 
     unit = UNITS[again.triad]

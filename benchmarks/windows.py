@@ -185,7 +185,7 @@ def watched(kind: str, seconds: float, rate: float) -> float:
         block, window = block_of(x, rate), Window()
         for second in range(int(seconds)):
             window.add(block.between(second, second + 1))
-            if window.moved:
+            if window.disturbance:
                 count += 1
                 break
     return count / SEEDS

@@ -263,15 +263,15 @@ def simulator_matches() -> Callable[..., Any]:
     ) -> Any:
         __tracebackhide__ = True
         from fieldcal.against import compare, gate
-        from fieldcal.against.opening import opened
+        from fieldcal.against.opening import open_simulator_output
         from fieldcal.session.folder import Session
 
-        allowed = gate.limits(limits)
+        allowed = gate.parse_limits(limits)
         session = Session.open(recording)
         real = session.block, session.about
-        block, about, _ = opened(Path(simulated), real)
+        block, about, _ = open_simulator_output(Path(simulated), real)
         found = compare(real, (block, about), (str(recording), str(simulated)))
-        beyond = [one.says for one in gate.checks(found, allowed) if not one.ok]
+        beyond = [one.says for one in gate.check_match(found, allowed) if not one.ok]
         if beyond:
             pytest.fail(f"{simulated} does not match {recording}: {'; '.join(beyond)}")
         return found

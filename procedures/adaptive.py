@@ -180,7 +180,7 @@ def _named(so_far: InterimResult) -> str:
         else set()
     )
     own |= COMMON.keys()
-    wrong = [s for s in so_far.explanation.standing if s.name not in own]
+    wrong = [s for s in so_far.explanation.probable_causes if s.name not in own]
     sure = [s for s in wrong if s.probability > thresholds.CERTAIN and not s.aliases]
     return ", ".join(s.name for s in sure) if len(sure) == len(wrong) else ""
 

@@ -19,7 +19,7 @@ from fieldcal.core.samples import Array
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.planning.steps import Add, Hold, Judge
 from fieldcal.run import plan_file
-from fieldcal.run.judging import judged
+from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.session_run import SessionRun
 from fieldcal.run.wait_reason import WaitReason
@@ -107,7 +107,7 @@ def led(bench: Bench, run: Mapping[str, Any], places: Any, seed: int) -> Run:
     """Lead the device through a plan of [run], in places or as it asks."""
     virtual = VirtualDevice(bench.session.profile, seed)
     driver = InProcess(virtual)
-    task = plan_file.task(tables(bench, run, places), "drawn")
+    task = plan_file.task_from_tables(tables(bench, run, places), "drawn")
     bounds = limits.read(task.about.grade)
     hand = Hand(driver, bench.angles_deg, seed)
     with tempfile.TemporaryDirectory() as where:
@@ -115,7 +115,7 @@ def led(bench: Bench, run: Mapping[str, Any], places: Any, seed: int) -> Run:
         with Recorder(folder, task.tables) as recorder:
             one = Timed(task, hand, recorder, lambda: driver, bounds, 1.0, 900.0)
             one.run(driver)
-        end = judged(folder, bounds)
+        end = judge_session(folder, bounds)
     named = _named(bench.session, end)
     found = end.calibration
     if found is None:
@@ -167,7 +167,7 @@ def _named(session: Session, end: InterimResult) -> bool:
         return False
     tilted = {e.id for e in session.profile.effects} & TILTS
     truth = set(session.concealed)
-    standing = end.explanation.standing
+    standing = end.explanation.probable_causes
     every = (
         set().union(*({s.name, *s.aliases} for s in standing)) if standing else set()
     )

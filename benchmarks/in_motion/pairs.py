@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.in_motion.driven import Drive, recorded
 from fieldcal.against import Match
-from fieldcal.against.motion import compared_in_motion
+from fieldcal.against.motion import compare_in_motion
 from fieldcal.against.result import RealAndSimulated
 from fieldcal.core.samples import Array, Block
 from fieldcal.session import description
@@ -132,7 +132,7 @@ def compared(
     one, drive = drawn(number, seed, lag, jitter), Drive(seed + number)
     real = block_of(recorded(drive, one.device, SECONDS, HZ))
     sim = block_of(recorded(drive, {}, SECONDS + 20, HZ))
-    return one, compared_in_motion((real, ABOUT), sim, ("recording", "simulator"))
+    return one, compare_in_motion((real, ABOUT), sim, ("recording", "simulator"))
 
 
 def pulls(one: Drawn, found: Match) -> list[float]:

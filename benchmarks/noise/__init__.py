@@ -30,17 +30,17 @@ from benchmarks.noise.peers import THEIRS, allan_variance, white_freedom
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from benchmarks.noise.rests import rests
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.noise import estimate, reduced
+from fieldcal.noise import estimate_noise, reduce_recording
 from fieldcal.noise.levels import CosineLevels
 from fieldcal.noise.likelihood import (
     Flags,
     NoiseFit,
     Powers,
-    information_of,
-    levels_of,
+    expected_powers,
+    information_matrix,
 )
-from fieldcal.noise.measured import measured
-from fieldcal.noise.reference import most_probable
+from fieldcal.noise.measured import measured_allan_deviation
+from fieldcal.noise.reference import most_probable_sizes
 from fieldcal.noise.spectrum import CosineSpectrum
 
 DT, SHORT, EACH = 0.1, 600, 4000
@@ -74,7 +74,7 @@ def ours(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
     spectrum = spectra(values)
     found, sigma = [], []
     for c in range(values.shape[1]):
-        power, count = spectrum.of(
+        power, count = spectrum.channel_powers(
             c, spectrum.last.values[:, c], np.ones(len(spectrum.last.bin))
         )
         powers = Powers(power, count, np.zeros(len(power), dtype=bool))
@@ -89,11 +89,11 @@ def _most_probable(
 ) -> NoiseFit:
     """Sizes of processes that are known to be there, sought from the true ones."""
     x = 2 * np.log(list(sizes.values()))
-    level, slopes = levels_of(spectrum, tuple(sizes), x)
+    level, slopes = expected_powers(spectrum, tuple(sizes), x)
     start = NoiseFit(
-        tuple(sizes), x, information_of(powers, slopes), level, 0.0, np.zeros(0)
+        tuple(sizes), x, information_matrix(powers, slopes), level, 0.0, np.zeros(0)
     )
-    return most_probable(spectrum, powers, start)
+    return most_probable_sizes(spectrum, powers, start)
 
 
 def beside_the_bound() -> None:
@@ -146,18 +146,18 @@ def halves(block: Block, first: float = FIRST) -> dict[str, Series]:
     """Log scores and whether bands hold, of each estimator, from a time on, s."""
     out: dict[str, Series] = {}
     middle = len(block) // 2
-    model = estimate([reduced([block[:middle]])])
-    second = reduced([block[middle:]])
+    model = estimate_noise([reduce_recording([block[:middle]])])
+    second = reduce_recording([block[middle:]])
     length = max(s.samples * s.dt for s in second.stretches)
     dt = 1 / model.rate_hz
     for name, channel in model.channels.items():
         place = CHANNELS.index(name)
-        seen = measured(second.stretches, place)
+        seen = measured_allan_deviation(second.stretches, place)
         asked = (seen.tau >= first) & (seen.tau <= min(LAST, length / 4))
         if not asked.any():
             continue
         tau, deviation = seen.tau[asked], seen.deviation[asked]
-        said = channel.predicted(tau, length)
+        said = channel.predict_allan(tau, length)
         held = (said.low < deviation) & (deviation < said.high)
         out.setdefault("ours", []).append((said.log_score(deviation), held))
         freedom = white_freedom(tau, length, dt)

@@ -35,7 +35,7 @@ from fieldcal.history.store import History, HistoryRun, family
 from fieldcal.session.folder import Session
 from fieldcal.session.installed import tells_an_offset
 from fieldcal.windows import Average, average
-from fieldcal.windows.dead_axis import broken
+from fieldcal.windows.dead_axis import broken_axis_messages
 
 
 def assess(
@@ -69,7 +69,7 @@ def assess(
             earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
-    dead = broken(session.block.six)
+    dead = broken_axis_messages(session.block.six)
     taken_out = _removed_biases(calibration, session, windows, limits)
     circumstances = Circumstances(
         temperatures=[a.temperature for a in windows.averages],
@@ -109,7 +109,7 @@ def with_faults(
     wrong = [gravity_contradiction(about)] if of_acc else []
     wrong += [
         _undetermined_by_omission(calibration, session, windows, limits),
-        *broken(session.block.six),
+        *broken_axis_messages(session.block.six),
     ]
     wrong += [bias_jump_warning(calibration, limits)]
     wrong += _removed_biases(calibration, session, windows, limits)

@@ -5,7 +5,7 @@ Each is a `side`, diagnosed by the one model; `pairing` asks both for the same c
 `prediction` proves it on positions left out. `comparison` puts it together.
 """
 
-from fieldcal.against.comparison import compare, matched
+from fieldcal.against.comparison import compare, compare_sides
 from fieldcal.against.result import Match
 
-__all__ = ["Match", "compare", "matched"]
+__all__ = ["Match", "compare", "compare_sides"]

@@ -1,4 +1,4 @@
-"""Differences in what explains the windows and turns of both recordings."""
+"""Differences in the causes that explain windows and turns of both recordings."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from fieldcal.against.joint import (
     Relation,
-    apart,
-    as_large,
-    both,
-    likeliest,
-    proportional,
-    weighed,
+    evidence_of_proportional,
+    evidence_of_same,
+    evidence_of_same_size,
+    likeliest_difference,
+    probability_of_differing,
+    relation_probabilities,
 )
-from fieldcal.against.pairing import Pairing
+from fieldcal.against.pairing import CausePairing
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
-from fieldcal.against.side import Side
-from fieldcal.against.widened import Widened, on_all_axes
+from fieldcal.against.side import DiagnosedRecording
+from fieldcal.against.widened import WidenedSet, with_all_parameters
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings import found_effects, mismatches
 from fieldcal.diagnosis.result import Mismatch, Quantity
@@ -37,87 +37,96 @@ DIRECTION: dict[Relation, Direction] = {
 
 
 @dataclass(frozen=True)
-class Decided:
-    """The causes of two sessions, with what each has.
+class DecidedCauses:
+    """The causes of two sessions, and which session has which.
 
     Attributes
     ----------
-    pairing : of the sessions
-    relations : of each cause by its key, with the probability that they differ
+    pairing : both sessions, with the causes of either
+    relations : relation of the sessions by the key of a cause, with the probability
+        that they differ in it
     real, sim : each session with the causes that it has
 
     """
 
-    pairing: Pairing
+    pairing: CausePairing
     relations: dict[str, tuple[Relation, float]]
-    real: Widened
-    sim: Widened
+    real: WidenedSet
+    sim: WidenedSet
 
 
-def decided(pairing: Pairing) -> Decided:
-    """Weigh for each cause who has it."""
+def decide_causes(pairing: CausePairing) -> DecidedCauses:
+    """Decide for each cause whether recording and simulator have it."""
     relations = {key: _relation(pairing, key) for key in pairing.keys}
-    real, sim = pairing.asked
+    real, sim = pairing.widened
     ours, theirs = (
         [k for k, (r, _) in relations.items() if r not in (alone, "neither")]
         for alone in ("simulator", "real")
     )
-    return Decided(pairing, relations, _with(real, ours), _with(sim, theirs))
+    return DecidedCauses(
+        pairing, relations, _with_causes(real, ours), _with_causes(sim, theirs)
+    )
 
 
-def _relation(pairing: Pairing, key: str) -> tuple[Relation, float]:
-    """The likeliest relation as to one cause, and the probability of a difference."""
-    real, sim = pairing.asked
-    one, two = real.told(key), sim.told(key)
+def _relation(pairing: CausePairing, key: str) -> tuple[Relation, float]:
+    """The likeliest relation in one cause, and the probability of a difference."""
+    real, sim = pairing.widened
+    one, two = real.effect_information(key), sim.effect_information(key)
     member = real.member(key) or sim.member(key)
     alike = scaled = None
     if one and two and member:
         if member[0].kind in ("random", "unknown"):
-            alike = as_large(one, two)
+            alike = evidence_of_same_size(one, two)
         else:
-            scaled = proportional(one, two)
+            scaled = evidence_of_proportional(one, two)
     if pairs := pairing.with_shape_of(key):
-        told = [(a.told(key), b.told(key)) for a, b in pairs]
-        alike = max(both(a, b) for a, b in told if a is not None and b is not None)
+        told = [
+            (a.effect_information(key), b.effect_information(key)) for a, b in pairs
+        ]
+        alike = max(
+            evidence_of_same(a, b) for a, b in told if a is not None and b is not None
+        )
     chance = member[0].chance if member is not None else CHANCE
-    found = weighed(one, two, chance, alike, scaled)
-    differ = apart(found)
+    found = relation_probabilities(one, two, chance, alike, scaled)
+    differ = probability_of_differing(found)
     if differ < thresholds.NAMED:
         none: list[Relation] = ["same", "neither"]
         return max(none, key=lambda n: found.get(n, 0.0)), differ
-    return likeliest(found), differ
+    return likeliest_difference(found), differ
 
 
-def _with(there: Widened, keys: Sequence[str]) -> Widened:
-    """A session with some of its causes, and the numbers that it then has."""
+def _with_causes(there: WidenedSet, keys: Sequence[str]) -> WidenedSet:
+    """A session with some of its causes only, and its estimates with these."""
     some = tuple(m for m in there.set.members if m[0].key in keys)
-    kept = tuple(map(on_all_axes, some))
+    kept = tuple(map(with_all_parameters, some))
     found = there.search.evaluated(kept, Search.sizes_of(there.set, some))
-    return replace(there, set=found, told_from=reported(there.search, found))
+    return replace(there, set=found, reported_set=reported(there.search, found))
 
 
-def differences(found: Decided) -> Iterator[Difference]:
-    """What differs, each name and direction once: triads are put together."""
+def differences(found: DecidedCauses) -> Iterator[Difference]:
+    """Differences, one for each name and direction; triads are combined."""
     parts: dict[tuple[str, Direction], list[str]] = {}
     for key, (relation, probability) in found.relations.items():
         if relation in DIRECTION and probability >= thresholds.NAMED:
-            member = _of(found, key)
+            member = _member(found, key)
             parts.setdefault((member[0].name, DIRECTION[relation]), []).append(key)
     for (name, direction), keys in parts.items():
         yield _difference(found, name, direction, keys)
 
 
-def alike(found: Decided) -> tuple[str, ...]:
-    """Names of what both have to the same size."""
+def shared_causes(found: DecidedCauses) -> tuple[str, ...]:
+    """Names of the causes that both have with the same size."""
     names = [
-        _of(found, k)[0].name for k, (r, _) in found.relations.items() if r == "same"
+        _member(found, k)[0].name
+        for k, (r, _) in found.relations.items()
+        if r == "same"
     ]
     return tuple(dict.fromkeys(names))
 
 
-def _of(found: Decided, key: str) -> Member:
+def _member(found: DecidedCauses, key: str) -> Member:
     member = next(
-        (m for one in found.pairing.asked if (m := one.member(key)) is not None), None
+        (m for one in found.pairing.widened if (m := one.member(key)) is not None), None
     )
     if member is None:
         raise KeyError(key)
@@ -125,43 +134,45 @@ def _of(found: Decided, key: str) -> Member:
 
 
 def _difference(
-    found: Decided, name: str, direction: Direction, keys: Sequence[str]
+    found: DecidedCauses, name: str, direction: Direction, keys: Sequence[str]
 ) -> Difference:
-    pairing, (real, sim) = found.pairing, found.pairing.asked
+    pairing, (real, sim) = found.pairing, found.pairing.widened
     source = pairing.sim if direction == "added" else pairing.real
     other = real if direction == "added" else sim
     parameters: dict[str, RealAndSimulated] = {}
     for key in keys:
-        parameters |= _pairs(found.real.member(key), found.sim.member(key), found)
-    told = [other.told(key) for key in keys]
+        parameters |= _parameter_pairs(
+            found.real.member(key), found.sim.member(key), found
+        )
+    told = [other.effect_information(key) for key in keys]
     return Difference(
         id=name,
         direction=direction,
         probability=max(found.relations[k][1] for k in keys),
         parameters=parameters,
         aliases=_aliases(source, pairing.instead.get(name, name)),
-        where=_where(source, pairing.instead.get(name, name)),
+        where=_mismatches_of_cause(source, pairing.instead.get(name, name)),
         shown=any(t is not None and t.shows for t in told),
         explained=name in catalogue(),
     )
 
 
-def _pairs(
-    one: Member | None, two: Member | None, found: Decided
+def _parameter_pairs(
+    one: Member | None, two: Member | None, found: DecidedCauses
 ) -> dict[str, RealAndSimulated]:
-    """Parameters of a cause in both sessions, as far as one determines them.
+    """Parameters of a cause in both sessions, as far as they are determined.
 
-    Of what is in both to another size, one may show too little to tell a size by
-    itself: its numbers, which would be too small, are told with that of the other.
+    If both have the cause, one session may show too little of it to determine its size.
+    Its values, which would be too small, are then estimated with the other's size.
     """
-    real = quantities(found.real, one) if one else {}
-    sim = quantities(found.sim, two) if two else {}
+    real = cause_quantities(found.real, one) if one else {}
+    sim = cause_quantities(found.sim, two) if two else {}
     if one and two:
         ours, theirs = _size_of(found.real, one), _size_of(found.sim, two)
         if ours < theirs:
-            real |= _of_size(found.real, one, theirs)
+            real |= _quantities_at_size(found.real, one, theirs)
         elif theirs < ours:
-            sim |= _of_size(found.sim, two, ours)
+            sim |= _quantities_at_size(found.sim, two, ours)
     return {
         name: RealAndSimulated.of(real.get(name), sim.get(name))
         for name in dict.fromkeys([*real, *sim])
@@ -169,22 +180,27 @@ def _pairs(
     }
 
 
-def _of_size(there: Widened, member: Member, size: float) -> dict[str, Quantity]:
-    """Numbers of a cause with an equation, `size` times as large as is typical."""
-    group, told = member[1], there.told(member[0].key)
+def _quantities_at_size(
+    there: WidenedSet, member: Member, size: float
+) -> dict[str, Quantity]:
+    """Parameters of a cause with an equation, given `size` in units of typical."""
+    group, told = member[1], there.effect_information(member[0].key)
     if told is None or not isinstance(group.effect, Motion | Sensor):
         return {}
     before = size * group.typical
     known = np.linalg.inv(told.inner + np.eye(len(told.pull)) / size**2)
     covariance = known * np.outer(group.typical, group.typical)
-    return _determined(there, group, group.typical * (known @ told.pull), covariance,
-                       before)  # fmt: skip
+    values = group.typical * (known @ told.pull)
+    return _determined_parameters(there, group, values, covariance, before)
 
 
-def _determined(
-    there: Widened, group: Group, values: Array, covariance: Array, before: Array
+def _determined_parameters(
+    there: WidenedSet, group: Group, values: Array, covariance: Array, before: Array
 ) -> dict[str, Quantity]:
-    """Parameters (k,) of an effect that the rows tell more of than sizes `before`."""
+    """Parameters (k,) of an effect that the rows determine.
+
+    That is: their variance is clearly less than that of the prior, `before` (k,).
+    """
     effect, sigma = group.effect, np.sqrt(np.diag(covariance))
     if effect is None:
         return {}
@@ -195,21 +211,25 @@ def _determined(
         if s**2 < thresholds.DETERMINED * b**2
     }
     if there.inference.dictionary.free.all():
-        out = found_effects.whatever_turned(group, values, covariance, before, out)
+        out = found_effects.merge_turned_parameters(
+            group, values, covariance, before, out
+        )
     return out
 
 
-def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
-    """Numbers of a cause, as far as the rows determine them."""
+def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
+    """Parameters of a cause that the rows determine."""
     group = member[1]
     if group.effect is None:
         return {}
     if isinstance(group.effect, Scatter):
         d = there.inference.dictionary
-        return found_effects.sizes_of(there.set, d, group, _size_of(there, member))
+        return found_effects.random_sizes_of_group(
+            there.set, d, group, _size_of(there, member)
+        )
     values, covariance = there.estimate(group.columns)
     before = group.sizes(_size_of(there, member))
-    out = _determined(there, group, values, covariance, before)
+    out = _determined_parameters(there, group, values, covariance, before)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
         unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None
@@ -217,24 +237,24 @@ def quantities(there: Widened, member: Member) -> dict[str, Quantity]:
     return out
 
 
-def _size_of(there: Widened, member: Member) -> float:
+def _size_of(there: WidenedSet, member: Member) -> float:
     at = there.set.members.index(member)
     return float(priors.SIZES[there.set.sizes.members[at]])
 
 
-def _aliases(source: Side, name: str) -> tuple[str, ...]:
-    """Effects that may stand in the place of one, as its own session says."""
+def _aliases(source: DiagnosedRecording, name: str) -> tuple[str, ...]:
+    """Aliases of an effect in its own session."""
     stands = source.explanation.posterior.instead.get(name, {})
     return tuple(n for n in stands if n in catalogue())
 
 
-def _where(source: Side, name: str) -> tuple[Mismatch, ...]:
-    """Where the one that has a cause shows it; positions as they are listed."""
+def _mismatches_of_cause(source: DiagnosedRecording, name: str) -> tuple[Mismatch, ...]:
+    """Mismatches that a cause makes in its session; positions as in session.toml."""
     explanation = source.explanation
-    standing = next((s for s in explanation.standing if s.name == name), None)
+    standing = next((s for s in explanation.probable_causes if s.name == name), None)
     if standing is None:
         return ()
-    lost = found_effects.removed(explanation, standing)
+    lost = found_effects.remove_cause(explanation, standing)
     of = mismatches.of_cause if name in catalogue() else mismatches.of_unknown
     numbered = explanation.prepared.source.about.numbered
     return tuple(

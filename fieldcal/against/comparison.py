@@ -1,4 +1,4 @@
-"""A recording held against a simulator's: what it leaves out, adds, or has too big."""
+"""Compares a recording with a simulator's output, position by position."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.against import causes, offsets, prediction, samples
-from fieldcal.against.facts import facts
-from fieldcal.against.filters import filters
-from fieldcal.against.pairing import Pairing
+from fieldcal.against.facts import recording_facts
+from fieldcal.against.filters import filter_difference
+from fieldcal.against.pairing import CausePairing
 from fieldcal.against.result import Difference, Match, verdict_of
-from fieldcal.against.side import Side, side
-from fieldcal.against.wording import paragraph, undecided
+from fieldcal.against.side import DiagnosedRecording, diagnose_side
+from fieldcal.against.wording import paragraph, possible_difference
 from fieldcal.core.samples import CHANNELS, Block
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
@@ -23,7 +23,7 @@ def compare(
     simulator: tuple[Block, Description],
     names: tuple[str, str] = ("the recording", "the simulator"),
 ) -> Match:
-    """Say what a simulator lacks of a recording, has beyond it, or has otherwise.
+    """Find what a simulator leaves out, adds, or has with another size.
 
     Parameters
     ----------
@@ -36,56 +36,62 @@ def compare(
         If nothing in one of them can be used.
 
     """
-    one = side(names[0], *real)
-    return matched(one, side(names[1], *simulator, one))
+    one = diagnose_side(names[0], *real)
+    return compare_sides(one, diagnose_side(names[1], *simulator, one))
 
 
-def matched(real: Side, sim: Side) -> Match:
-    """Two sides held against each other."""
-    found = causes.decided(Pairing(real, sim))
+def compare_sides(real: DiagnosedRecording, sim: DiagnosedRecording) -> Match:
+    """Compare two diagnosed recordings."""
+    found = causes.decide_causes(CausePairing(real, sim))
     apart = [
         *causes.differences(found),
-        *offsets.differences(found),
-        *offsets.earth(found),
-        *filters(found),
-        *samples.lines_and_faults(real, sim),
-        *samples.noise(real, sim),
+        *offsets.calibration_differences(found),
+        *offsets.earth_rate_difference(found),
+        *filter_difference(found),
+        *samples.line_and_fault_differences(real, sim),
+        *samples.noise_differences(real, sim),
     ]
     apart.sort(key=lambda d: -d.probability)
     differences = tuple(d for d in apart if d.probability >= thresholds.DIFFERS)
     verdict = verdict_of(differences)
-    predicted = prediction.before(found), prediction.after(real)
+    predicted = (
+        prediction.predict_as_simulated(found),
+        prediction.predict_as_explained(real),
+    )
     warnings = (
-        *_of(real), *_of(sim), *_quieted(sim), *_missing(found),
-        *map(undecided, apart[len(differences) :]),
+        *_warnings_of(real), *_warnings_of(sim), *_added_noise(sim),
+        *_missing_outputs(found),
+        *map(possible_difference, apart[len(differences) :]),
     )  # fmt: skip
     return Match(
         verdict,
         _probability(found, differences),
         differences,
-        causes.alike(found),
+        causes.shared_causes(found),
         *predicted,
-        facts(real, found.real),
-        facts(sim, found.sim),
+        recording_facts(real, found.real),
+        recording_facts(sim, found.sim),
         warnings,
         paragraph(verdict, differences, predicted),
     )
 
 
-def _probability(found: causes.Decided, differences: Sequence[Difference]) -> float:
-    """That everything that is said to differ does, or that nothing does."""
+def _probability(
+    found: causes.DecidedCauses, differences: Sequence[Difference]
+) -> float:
+    """Probability that all reported differences exist, or that none does."""
     if differences:
         return float(np.prod([d.probability for d in differences]))
     return float(np.prod([1 - differ for _, differ in found.relations.values()]))
 
 
-def _of(one: Side) -> list[str]:
-    """Warnings of one diagnosis, with whose they are."""
+def _warnings_of(one: DiagnosedRecording) -> list[str]:
+    """Warnings of one diagnosis, each with the name of its recording."""
     return [f"{one.name}: {warning}" for warning in one.diagnosis.warnings]
 
 
-def _missing(found: causes.Decided) -> list[str]:
-    """Outputs that one of the two has not."""
+def _missing_outputs(found: causes.DecidedCauses) -> list[str]:
+    """Warnings about outputs that only one of the two has."""
     ours, theirs = found.real.observed, found.sim.observed
     real, sim = found.pairing.real, found.pairing.sim
     out = []
@@ -99,10 +105,10 @@ def _missing(found: causes.Decided) -> list[str]:
     return out
 
 
-def _quieted(sim: Side) -> list[str]:
-    if not sim.quieted:
+def _added_noise(sim: DiagnosedRecording) -> list[str]:
+    if not sim.noise_added:
         return []
-    channels = ", ".join(CHANNELS[c] for c in sim.quieted)
+    channels = ", ".join(CHANNELS[c] for c in sim.noise_added)
     return [
         f"{sim.name}: {channels} have next to no noise; a tenth of the recording's was"
         " added to compare them"

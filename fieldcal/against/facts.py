@@ -1,4 +1,4 @@
-"""What each of two recordings is made of: rate, steps, noise, calibration, effects."""
+"""Properties of each of two recordings: rate, steps, noise, calibration, effects."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from fieldcal.against import causes, offsets
 from fieldcal.against.result import Facts
-from fieldcal.against.samples import level
-from fieldcal.against.side import Side
-from fieldcal.against.widened import Widened
+from fieldcal.against.samples import noise_level
+from fieldcal.against.side import DiagnosedRecording
+from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import CHANNELS
-from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.rows.thermometer import Thermometer
 
 
-def facts(one: Side, there: Widened) -> Facts:
-    """What a recording is made of, with the causes that it has."""
+def recording_facts(one: DiagnosedRecording, there: WidenedSet) -> Facts:
+    """Properties of a recording, with the causes that it has."""
     steps = [float(np.nan_to_num(one.steps[c : c + 3]).max()) for c in (0, 3)]
     return Facts(
         rate_hz=one.rate_hz,
@@ -25,27 +25,27 @@ def facts(one: Side, there: Widened) -> Facts:
         start_s=float(one.block.t[0]),
         start_c=Thermometer.of(one.block).start_c,
         noise={
-            name: level(one, c)
+            name: noise_level(one, c)
             for c, name in enumerate(CHANNELS)
             if np.isfinite(one.noise[c])
         },
         calibration=_calibration(there),
         effects={
-            cause.name: causes.quantities(there, (cause, group))
+            cause.name: causes.cause_quantities(there, (cause, group))
             for cause, group in there.set.members
             if cause.kind == "effect"
         },
     )
 
 
-def _calibration(there: Widened) -> dict[str, dict[str, Quantity]]:
-    """Groups of the calibration by axis, as far as they are determined."""
+def _calibration(there: WidenedSet) -> dict[str, dict[str, Quantity]]:
+    """Determined values of the calibration, by group and axis."""
     out: dict[str, dict[str, Quantity]] = {}
     for name, axes in offsets.shared_axes(there, there):
-        values, covariance, _ = offsets.calibration(there, name, axes)
+        values, covariance, _ = offsets.calibration_group(there, name, axes)
         sigma = np.sqrt(np.diag(covariance))
         out[name] = {
-            "xyz"[c % 3]: Quantity(float(v), float(s), GROUPS[name])
+            "xyz"[c % 3]: Quantity(float(v), float(s), GROUP_UNITS[name])
             for c, v, s in zip(axes.tolist(), values, sigma, strict=True)
             if s < offsets.DETERMINED[name]
         }

@@ -1,4 +1,4 @@
-"""Filters of the sensors that turns show, in one of two recordings or in both."""
+"""Difference of the sensors' filters, which the turns of two recordings show."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.against.causes import Decided
-from fieldcal.against.joint import differs
+from fieldcal.against.causes import DecidedCauses
+from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings.filters import time_constants
@@ -18,10 +18,10 @@ from fieldcal.model.causes.filtered_turns import FILTERED
 DIRECTIONS: dict[tuple[bool, bool], Direction] = {
     (True, False): "left_out", (False, True): "added", (True, True): "resized",
 }  # fmt: skip
-"""By whether the recording and the simulator have a filter."""
+"""Direction, by whether the recording and the simulator have a filter."""
 
 
-def filters(found: Decided) -> Iterator[Difference]:
+def filter_difference(found: DecidedCauses) -> Iterator[Difference]:
     """The difference of two filters, by the variances of their impulse responses."""
     both = (found.real, found.sim)
     groups = [w.inference.dictionary.filters for w in both]
@@ -31,8 +31,8 @@ def filters(found: Decided) -> Iterator[Difference]:
         w.estimate(g.columns[:2]) for w, g in zip(both, groups, strict=True) if g
     )
     typical = groups[0].typical[:2]
-    probability = differs(one - two, cov + more, typical)
-    told = _told(one, cov), _told(two, more)
+    probability = probability_of_difference(one - two, cov + more, typical)
+    told = _time_constants(one, cov), _time_constants(two, more)
     names = dict.fromkeys([*told[0], *told[1]])
     if probability < thresholds.NAMED or not names:
         return
@@ -41,5 +41,5 @@ def filters(found: Decided) -> Iterator[Difference]:
     yield Difference(FILTERED, direction, probability, parameters)
 
 
-def _told(square: Array, covariance: Array) -> dict[str, Quantity]:
+def _time_constants(square: Array, covariance: Array) -> dict[str, Quantity]:
     return time_constants(square, np.sqrt(np.diag(covariance)))

@@ -1,8 +1,8 @@
-"""Whether a simulator still matches a recording, within limits: for CI.
+"""Checks whether a simulator still matches a recording within limits, for CI.
 
-Whatever differs fails, unless it has a limit and all its parameters differ by less. A
+Every difference fails, unless it has a limit and all its parameters differ by less. A
 limit is a number in the parameter's unit, or a part of the recording's value in per
-cent; `chi2_per_dof` is that of the recording as the simulator predicts it.
+cent. The limit `chi2_per_dof` is for the simulator's prediction of the recording.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fieldcal.against.result import Difference, Match, RealAndSimulated
 from fieldcal.against.sensor_model import CALIBRATION
-from fieldcal.against.wording import SHORT, named
+from fieldcal.against.wording import DIRECTION_WORDS, difference_with_parameters
 from fieldcal.core.errors import InputError
 from fieldcal.core.shown import shown
 from fieldcal.effects import catalogue
@@ -23,21 +23,21 @@ from fieldcal.session.folder import write_whole
 PREDICTION = "chi2_per_dof"
 
 ALWAYS = (*CALIBRATION, "noise")
-"""What every recording is compared in."""
+"""Ids that every recording is checked for."""
 
 IN_MOTION = (*CALIBRATION, "misalignment")
-"""The same where the simulator follows the motion."""
+"""Ids that a recording is checked for where the simulator follows its motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """How far something may differ: in its unit, or as a part of the recording's."""
+    """Largest allowed difference, in its unit or relative to the recording's value."""
 
     size: float
     relative: bool = False
 
     def allows(self, pair: RealAndSimulated) -> bool:
-        """Whether a parameter differs by no more."""
+        """Whether the difference of a parameter is within the limit."""
         off = pair.difference.value
         if isinstance(off, str):
             return False
@@ -49,42 +49,42 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class MatchCheck:
-    """One thing that was compared, whether it is within its limit, and why not."""
+    """One id that was checked, whether it is within its limit, and why not."""
 
     name: str
     ok: bool
     says: str = ""
 
 
-def limits(given: Iterable[str] | Mapping[str, float | str]) -> dict[str, Limit]:
-    """Limits by id, of texts as "acc_bias=0.02" and "noise=10%", or of a mapping.
+def parse_limits(given: Iterable[str] | Mapping[str, float | str]) -> dict[str, Limit]:
+    """Parse limits from texts like "acc_bias=0.02", "noise=10%", or from a mapping.
 
     Raises
     ------
     InputError
-        If something has no limit, or a limit is no number.
+        If an id is unknown, or a limit is no number.
 
     """
     if not isinstance(given, Mapping):
-        given = dict(_parted(text) for text in given)
+        given = dict(_split_limit(text) for text in given)
     known = (*ALWAYS, *IN_MOTION[-1:], PREDICTION, *catalogue())
     for name in given:
         if name not in known:
             raise InputError(
                 f"--limit {name}: nothing is called so; it is {', '.join(known)}"
             )
-    return {name: _limit(name, str(text)) for name, text in given.items()}
+    return {name: _parse_limit(name, str(text)) for name, text in given.items()}
 
 
-def _parted(text: str) -> tuple[str, str]:
+def _split_limit(text: str) -> tuple[str, str]:
     name, is_one, size = text.partition("=")
     if not is_one:
         raise InputError(f"--limit {text}: write it as acc_bias=0.02 or noise=10%")
     return name.strip(), size
 
 
-def _limit(name: str, text: str) -> Limit:
-    """A limit of a text, as 0.02 or 10 %."""
+def _parse_limit(name: str, text: str) -> Limit:
+    """A limit from a text like 0.02 or 10 %."""
     number = text.strip().removesuffix("%")
     relative = number != text.strip()
     try:
@@ -96,8 +96,8 @@ def _limit(name: str, text: str) -> Limit:
     return Limit(size / 100 if relative else size, relative)
 
 
-def checks(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
-    """Everything that was compared, in the order of what every recording has."""
+def check_match(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
+    """Check every id that was compared, the ids of every recording first."""
     every = ALWAYS if found.aligned is None else IN_MOTION
     names = [*every, *found.alike, *(d.id for d in found.differences)]
     out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
@@ -109,9 +109,12 @@ def checks(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
 
 
 def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> MatchCheck:
-    """One id: nothing differs in it, or by no more than is allowed."""
+    """Check one id: it does not differ, or by no more than is allowed."""
     beyond = [d for d in found.differences if d.id == name and not _within(d, allowed)]
-    says = "; ".join(f"{SHORT[d.direction]}: {named(d)}" for d in beyond)
+    says = "; ".join(
+        f"{DIRECTION_WORDS[d.direction]}: {difference_with_parameters(d)}"
+        for d in beyond
+    )
     return MatchCheck(name, not beyond, says)
 
 
@@ -123,7 +126,7 @@ def _within(one: Difference, allowed: Mapping[str, Limit]) -> bool:
 def write_junit(
     path: Path, name: str, found: Match, done: Iterable[MatchCheck]
 ) -> None:
-    """Write checks as JUnit XML, with what is worth following from run to run.
+    """Write checks as JUnit XML, with the differences as properties.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Whether two recordings have an effect alike, and if not, which of them has it.
+"""Whether two recordings have the same effect, and if not, which of them has it.
 
-Of an effect each session says, everything of its own eliminated, M_i and q_i = T b'_i
-((3) of `fieldcal.model.evidence.gram`). What two sessions share adds up, so for one
-effect u = v T z with p(v),
+All other parameters eliminated, a session i gives of an effect its information M_i and
+q_i = T b'_i ((3) of `fieldcal.model.evidence.gram`). If both sessions share the effect,
+these add up. For an effect u = v T z with the prior p(v) of its size, ln Z is
 
     real alone        ln int p(v) exp gain(v; M_r, q_r) dv                          (1)
     simulator alone   ln int p(v) exp gain(v; M_s, q_s) dv                          (2)
@@ -10,22 +10,22 @@ effect u = v T z with p(v),
     another in each   the sum of (1) and (2)                                        (4)
     in neither        0                                                             (5)
 
-In (4) the two may have nothing to do with each other, or the simulator has the same
-but too weak or too strong: u_s = c u_r. u is then known of the one that shows more, and
-the other tells c alone,
+In (4) the two effects may be independent, or the simulator has the same one but too
+weak or too strong: u_s = c u_r. In the second case u is taken from the session that
+shows more of it, and the other determines c alone,
 
     ln int p(v) exp gain(v; d' M_s d, d' q_s) dv,    d along (1 + M_r)^-1 q_r       (7)
 
-Both are as likely. Of what is random, u is another in each anyway, and the same is v:
-then (3) is
+Both cases have the same prior probability. A random effect has another u in each
+session anyway, and only its size v can be the same. For it, (3) is
 
     ln int p(v) exp [gain(v; M_r, q_r) + gain(v; M_s, q_s)] dv                      (6)
 
-Each is weighed by how likely it was before: an effect is in a device by its chance, and
-a simulator has what its device has by `MODELLED`, then as likely of the same size as of
-another. Of what every device has, bias and scale factor, the difference d is the
-effect: of covariance C_r + C_s, and there or not by `DIFFERS`. Source: model evidence
-of pooled and separate regressions; D. MacKay 1992.
+The prior probability that a device has an effect is its chance. A simulator has what
+its device has with the probability `MODELLED`, and then the same size or another one
+with equal probability. Bias and scale factor exist in every device; there the effect is
+the difference d with the covariance C_r + C_s, present with the probability `DIFFERS`.
+Source: model evidence of pooled and separate regressions; D. MacKay 1992.
 """
 
 from __future__ import annotations
@@ -44,41 +44,43 @@ from fieldcal.model.evidence.sizing import DENSITY
 Relation = Literal["real", "simulator", "same", "other", "neither"]
 
 MODELLED = 0.5
-"""Probability that a simulator has what its device has: who compares does not know."""
+"""Prior probability that a simulator has an effect that its device has."""
 
 DIFFERS = 0.05
-"""Probability that a simulator that was made like its device differs in a group of its
-calibration: what is wrong with it is usually one thing."""
+"""Prior probability that a simulator differs from its device in a given group of the
+calibration: usually only one thing is wrong with it."""
 
 
 @dataclass(frozen=True, slots=True)
-class EffectTold:
-    """What one session says of an effect.
+class EffectInformation:
+    """Information of one session about an effect.
 
     Attributes
     ----------
-    inner, pull : (k, k), (k,) M and q in units of what is typical
-    own : largest diagonal element of M before anything was eliminated
-    evidence : of the effect in that session, ln, if it is known better than by (1)
+    inner, pull : (k, k), (k,) M and q in units of the typical sizes
+    largest_diagonal : largest diagonal element of M before any elimination
+    evidence : ln evidence of the effect in that session, if known better than by (1)
 
     """
 
     inner: Array
     pull: Array
-    own: float
+    largest_diagonal: float
     evidence: float | None = None
 
     @property
     def gain(self) -> Array:
-        """Ln of the evidence over sizes v, brought to what it is in all."""
-        return gains(self.inner, self.pull, self.own) + self.shift
+        """Ln evidence at each size v, shifted to agree with `evidence`."""
+        return gains(self.inner, self.pull, self.largest_diagonal) + self.shift
 
     @property
     def shift(self) -> float:
-        """What is to be added to evidence by (1) to have that which is known better."""
+        """Difference of `evidence` and the evidence by (1)."""
         if self.evidence is None:
             return 0.0
-        return self.evidence - _over_sizes(gains(self.inner, self.pull, self.own))
+        return self.evidence - _over_sizes(
+            gains(self.inner, self.pull, self.largest_diagonal)
+        )
 
     @property
     def shows(self) -> bool:
@@ -90,21 +92,21 @@ def _over_sizes(gain: Array) -> float:
     return float(np.logaddexp.reduce(gain + DENSITY))
 
 
-def weighed(
-    real: EffectTold | None,
-    sim: EffectTold | None,
+def relation_probabilities(
+    real: EffectInformation | None,
+    sim: EffectInformation | None,
     chance: float,
     alike: float | None,
     scaled: float | None = None,
 ) -> dict[Relation, float]:
-    """Probability of each relation between two sessions as to one effect.
+    """Probability of each relation between two sessions in one effect.
 
     Parameters
     ----------
-    real, sim : what each says; None where it cannot have it
-    chance : that a device has the effect
-    alike : ln evidence of the same in both (3), if it is not that of `real` and `sim`
-    scaled : that of one of them times a number (7), if it has a course
+    real, sim : information of each; None where it cannot have the effect
+    chance : prior probability that a device has the effect
+    alike : ln evidence of the same effect in both (3), if not to be calculated here
+    scaled : ln evidence of proportional effects (7), if the effect has an equation
 
     """
     one, two = ((None if t is None else t.gain) for t in (real, sim))
@@ -120,21 +122,27 @@ def weighed(
         if scaled is not None:
             other = float(np.logaddexp(other, scaled) - np.log(2))
         score["other"] = half + other
-        score["same"] = half + (both(real, sim) if alike is None else alike)
+        score["same"] = half + (evidence_of_same(real, sim) if alike is None else alike)
     total = np.logaddexp.reduce(np.array(list(score.values())))
     return {name: float(np.exp(s - total)) for name, s in score.items()}
 
 
-def both(real: EffectTold, sim: EffectTold) -> float:
+def evidence_of_same(real: EffectInformation, sim: EffectInformation) -> float:
     """Ln evidence of one and the same effect in both sessions (3)."""
     if real.inner.shape != sim.inner.shape:
         return -np.inf
-    there = gains(real.inner + sim.inner, real.pull + sim.pull, real.own + sim.own)
+    there = gains(
+        real.inner + sim.inner,
+        real.pull + sim.pull,
+        real.largest_diagonal + sim.largest_diagonal,
+    )
     return _over_sizes(there) + real.shift + sim.shift
 
 
-def proportional(real: EffectTold, sim: EffectTold) -> float | None:
-    """Ln evidence of an effect in one, and of some times as much in the other (7)."""
+def evidence_of_proportional(
+    real: EffectInformation, sim: EffectInformation
+) -> float | None:
+    """Ln evidence of an effect in one, and of a multiple of it in the other (7)."""
     if real.inner.shape != sim.inner.shape:
         return None
     known, other = sorted((real, sim), key=lambda t: -_over_sizes(t.gain))
@@ -144,32 +152,37 @@ def proportional(real: EffectTold, sim: EffectTold) -> float | None:
         return None
     along = course / size
     inner, pull = along @ other.inner @ along, along @ other.pull
-    times = gains(np.array([[inner]]), np.array([pull]), other.own)
+    times = gains(np.array([[inner]]), np.array([pull]), other.largest_diagonal)
     return _over_sizes(known.gain) + _over_sizes(times) + other.shift
 
 
-def as_large(real: EffectTold, sim: EffectTold) -> float:
-    """Ln evidence of something random that is as large in both, by its size alone."""
+def evidence_of_same_size(real: EffectInformation, sim: EffectInformation) -> float:
+    """Ln evidence of a random effect of the same size in both (6)."""
     return _over_sizes(real.gain + sim.gain)
 
 
-def differs(difference: Array, covariance: Array, typical: Array) -> float:
-    """Probability that a difference (k,) of covariance (k, k) is none of chance."""
+def probability_of_difference(
+    difference: Array, covariance: Array, typical: Array
+) -> float:
+    """Probability that a difference (k,) with covariance (k, k) is real.
+
+    `typical` (k,) is the typical size of a real difference.
+    """
     information = np.linalg.inv(covariance)
     inner = information * typical * typical[:, None]
-    told = EffectTold(
+    told = EffectInformation(
         inner, typical * (information @ difference), float(np.diag(inner).max())
     )
     odds = np.log(DIFFERS) - np.log1p(-DIFFERS) + _over_sizes(told.gain)
     return float(of_odds(odds))
 
 
-def likeliest(found: Mapping[Relation, float]) -> Relation:
-    """The relation of a difference that is likeliest: neither and same are none."""
+def likeliest_difference(found: Mapping[Relation, float]) -> Relation:
+    """The likeliest relation among those that are a difference."""
     differing: list[Relation] = ["real", "simulator", "other"]
     return max(differing, key=lambda name: found.get(name, 0.0))
 
 
-def apart(found: Mapping[Relation, float]) -> float:
+def probability_of_differing(found: Mapping[Relation, float]) -> float:
     """Probability that the two differ."""
     return 1.0 - found.get("neither", 0.0) - found.get("same", 0.0)

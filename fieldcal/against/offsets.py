@@ -1,8 +1,7 @@
-"""Differences in what every device has: bias, scale factor, and the Earth's rate.
+"""Differences of bias and scale factor, and of the Earth's rate.
 
-Biases wander, and not only from window to window: flicker has as much power in every
-octave, so what they wander by within a session they do again from one to the next. Of a
-bias, that scatter is in the covariance of a difference.
+Biases wander between sessions as much as within one, since flicker has the same power
+in every octave. The covariance of a bias difference includes that scatter.
 """
 
 from __future__ import annotations
@@ -11,14 +10,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.against.causes import Decided, quantities
-from fieldcal.against.joint import differs
+from fieldcal.against.causes import DecidedCauses, cause_quantities
+from fieldcal.against.joint import probability_of_difference
 from fieldcal.against.result import Difference, Direction, RealAndSimulated
-from fieldcal.against.widened import Widened
+from fieldcal.against.widened import WidenedSet
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.calibrated import GROUPS
+from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
@@ -29,17 +28,17 @@ DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0
 """Sigma from which a difference counts as not determined, m/s^2, rad/s, 1."""
 
 
-def differences(found: Decided) -> Iterator[Difference]:
-    """Groups of the calibration in which the two differ."""
+def calibration_differences(found: DecidedCauses) -> Iterator[Difference]:
+    """Differences of the groups of the calibration."""
     for name, axes in shared_axes(found.real, found.sim):
         yield from _difference(found, name, axes)
 
 
-def earth(found: Decided) -> Iterator[Difference]:
-    """The Earth's rate, where one feels it and the other does not.
+def earth_rate_difference(found: DecidedCauses) -> Iterator[Difference]:
+    """Difference of the Earth's rate, where only one of the two shows it.
 
-    In axes of the base: x East, y down, z north, where the fixture points north. That
-    both feel it, and one points elsewhere, is an effect of the catalogue.
+    In base axes: x East, y down, z north, if the fixture points north. If both show it
+    with different headings, an effect of the catalogue covers that.
     """
     first = [w.inference.dictionary.earth for w in (found.real, found.sim)]
     if min(first) < 0:
@@ -49,8 +48,8 @@ def earth(found: Decided) -> Iterator[Difference]:
         for w, at in zip((found.real, found.sim), first, strict=True)
     )
     total, typical = cov + more, np.full(3, EARTH_RATE)
-    probability = differs(one - two, total, typical)
-    felt = [_felt(rate, its) for rate, its in ((one, cov), (two, more))]
+    probability = probability_of_difference(one - two, total, typical)
+    felt = [_feels_rate(rate, its) for rate, its in ((one, cov), (two, more))]
     if probability < thresholds.NAMED or felt[0] == felt[1]:
         return
     direction: Direction = "left_out" if felt[0] else "added"
@@ -61,7 +60,7 @@ def earth(found: Decided) -> Iterator[Difference]:
 def _pairs(
     axes: Index, real: tuple[Array, Array], sim: tuple[Array, Array], unit: str
 ) -> dict[str, RealAndSimulated]:
-    """Values with covariance of both by axis, of some channels."""
+    """Values of both by axis, from values and covariance of some channels."""
     out: dict[str, RealAndSimulated] = {}
     for i, c in enumerate(axes.tolist()):
         one, two = (Quantity(float(value[i]), float(np.sqrt(cov[i, i])), unit)
@@ -70,21 +69,30 @@ def _pairs(
     return out
 
 
-def _felt(rate: Array, covariance: Array) -> bool:
-    """Whether a rate of the base is likelier than none."""
-    return differs(rate, covariance, np.full(3, EARTH_RATE)) > thresholds.NAMED
+def _feels_rate(rate: Array, covariance: Array) -> bool:
+    """Whether a rate of the base is more likely than none."""
+    return (
+        probability_of_difference(rate, covariance, np.full(3, EARTH_RATE))
+        > thresholds.NAMED
+    )
 
 
-def shared_axes(one: Widened, two: Widened) -> Iterator[tuple[str, Index]]:
+def shared_axes(one: WidenedSet, two: WidenedSet) -> Iterator[tuple[str, Index]]:
     """Groups of a calibration, with the channels that two sessions both have."""
-    for name in GROUPS:
+    for name in GROUP_UNITS:
         groups = [_group(w, name) for w in (one, two)]
-        axes = [_axes(w, g) for w, g in zip((one, two), groups, strict=True) if g]
+        axes = [
+            _channels_of_group(w, g)
+            for w, g in zip((one, two), groups, strict=True)
+            if g
+        ]
         if len(axes) == len(groups) and len(both := np.intersect1d(axes[0], axes[1])):
             yield name, both
 
 
-def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, Array]:
+def calibration_group(
+    there: WidenedSet, name: str, axes: Index
+) -> tuple[Array, Array, Array]:
     """A group of one session's calibration.
 
     Parameters
@@ -108,70 +116,76 @@ def calibration(there: Widened, name: str, axes: Index) -> tuple[Array, Array, A
     values, covariance = there.estimate(first + axes)
     typical = group.typical[np.isin(group.columns, first + axes)]
     if name.endswith("bias"):
-        covariance = covariance + np.diag(wander(there, axes) ** 2)
+        covariance = covariance + np.diag(bias_wander(there, axes) ** 2)
     return base[axes] + values, covariance, typical
 
 
-def between_sets(explanation: Explanation, name: str, axes: Index) -> Array:
-    """What a calibration scatters by, as sets that may all be right have it, (k, k).
+def scatter_between_sets(explanation: Explanation, name: str, axes: Index) -> Array:
+    """Covariance of a calibration's scatter over the probable sets, (k, k).
 
-    A cause and its alias leave different biases and scale factors.
+    A cause and its alias lead to different biases and scale factors.
     """
     d = explanation.dictionary
     columns = (d.bias if name.endswith("bias") else d.scale) + axes
-    sets = explanation.average.sets
+    sets = explanation.model_average.sets
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
     means = np.array([of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
     return covariance_of_means(means, weight)
 
 
-def wander(there: Widened, axes: Index) -> Array:
-    """What biases wander by within a session, (k,) of some channels.
+def bias_wander(there: WidenedSet, axes: Index) -> Array:
+    """Standard deviation of biases within a session, (k,) of some channels.
 
-    From window to window, and the mean of a walk by q sqrt(T / 3).
+    It combines the instability from window to window and the rms q sqrt(T / 3) of the
+    mean of a random walk.
     """
     size = np.array(there.set.sizes.instability)[axes]
     square = (priors.SIZES[size] * there.search.unstable[axes]) ** 2
     length = float(np.ptp(there.inference.dictionary.x.t))
     for member in there.set.members:
-        for name, q in quantities(there, member).items():
+        for name, q in cause_quantities(there, member).items():
             if member[0].kind == "random" and name in CHANNELS:
                 square[axes == CHANNELS.index(name)] += float(q.value) ** 2 * length / 3
     out: Array = np.sqrt(square)
     return out
 
 
-def _group(there: Widened, name: str) -> Group | None:
+def _group(there: WidenedSet, name: str) -> Group | None:
     part, _, cause = name.partition("_")
     always = there.inference.dictionary.always
     return next((g for g in always if g.cause == cause and g.part == part), None)
 
 
-def _axes(there: Widened, group: Group) -> Index:
+def _channels_of_group(there: WidenedSet, group: Group) -> Index:
     d = there.inference.dictionary
     return group.columns - (d.bias if group.cause == "bias" else d.scale)
 
 
-def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
+def _difference(found: DecidedCauses, name: str, axes: Index) -> Iterator[Difference]:
     (one, cov, typical), (two, more, _) = (
-        calibration(w, name, axes) for w in (found.real, found.sim)
+        calibration_group(w, name, axes) for w in (found.real, found.sim)
     )
     for side in (found.pairing.real, found.pairing.sim):
-        cov = cov + between_sets(side.explanation, name, axes)
+        cov = cov + scatter_between_sets(side.explanation, name, axes)
     sigma = np.sqrt(np.diag(cov + more))
     known = np.flatnonzero(sigma < DETERMINED[name])
     if not len(known):
         return
     inner = np.ix_(known, known)
-    probability = differs((one - two)[known], (cov + more)[inner], typical[known])
+    probability = probability_of_difference(
+        (one - two)[known], (cov + more)[inner], typical[known]
+    )
     if probability < thresholds.NAMED:
         return
     parameters = _pairs(
-        axes[known], (one[known], cov[inner]), (two[known], more[inner]), GROUPS[name]
+        axes[known],
+        (one[known], cov[inner]),
+        (two[known], more[inner]),
+        GROUP_UNITS[name],
     )
     where = tuple(
-        _everywhere(
+        _mismatch_everywhere(
             found,
             name.endswith("scale"),
             CHANNELS[axes[i]],
@@ -184,10 +198,10 @@ def _difference(found: Decided, name: str, axes: Index) -> Iterator[Difference]:
     yield Difference(name, "resized", probability, parameters, where=where)
 
 
-def _everywhere(
-    found: Decided, scale: bool, channel: str, off: float, sigma: float
+def _mismatch_everywhere(
+    found: DecidedCauses, scale: bool, channel: str, off: float, sigma: float
 ) -> Mismatch:
-    """A difference in all of a recording."""
+    """The mismatch of a difference that applies to the whole recording."""
     explanation = found.pairing.real.explanation
     about, span = explanation.prepared.source.about, explanation.rows.span
     held = explanation.dictionary.held.tolist()

@@ -1,9 +1,8 @@
-"""A simulator's output, opened: a session folder, or any file that import reads.
+"""Opens a simulator's output: a session folder, or any file that import reads.
 
-A file need not say where the device was. Where the recording's windows, at the same
-times from the first sample on, lie in stretches in which the simulated device rests,
-it followed the same schedule; else its rests are the recording's positions, in order,
-if there are as many.
+A file need not state positions. If the recording's windows, counted from the first
+sample, lie within rests of the simulated device, it followed the same schedule.
+Otherwise its rests are the recording's positions in order, if their numbers agree.
 """
 
 from __future__ import annotations
@@ -25,22 +24,22 @@ from fieldcal.session.folder import Session
 Span = tuple[float, float]
 
 STILL_S = 1.0
-"""Shortest rest that counts as one, s."""
+"""Shortest rest, s."""
 
 INSIDE = 0.9
-"""Part of a window that must lie in a rest, for the window to be held there."""
+"""Least part of a window that must lie in a rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatorOutput:
-    """What a simulator wrote.
+    """The output of a simulator.
 
     Attributes
     ----------
     block : its samples
-    about : what session.toml says; None of a file
-    rests : in which the simulated device rests, of a file
-    says : what the user must know
+    about : content of session.toml; None of a file
+    rests : stretches in which the simulated device rests; only of a file
+    says : notices for the user
 
     """
 
@@ -50,10 +49,10 @@ class SimulatorOutput:
     says: tuple[str, ...]
 
 
-def opened(
+def open_simulator_output(
     path: Path, real: tuple[Block, Description]
 ) -> tuple[Block, Description, list[str]]:
-    """Samples and description of a simulator's output, and what the user must know.
+    """Samples and description of a simulator's output, and notices for the user.
 
     Parameters
     ----------
@@ -71,12 +70,12 @@ def opened(
     read = read_output(path)
     if read.about is not None:
         return read.block, read.about, list(read.says)
-    about = _placed(path, read.block, read.rests, *real)
+    about = _description_of_simulated(path, read.block, read.rests, *real)
     return read.block, about, list(read.says)
 
 
 def read_output(path: Path) -> SimulatorOutput:
-    """Read a simulator's output, whatever it shows.
+    """Read a simulator's output, with or without positions.
 
     Raises
     ------
@@ -114,7 +113,7 @@ def _only_stream(recording: Recording) -> str:
     return streams[0].name
 
 
-def _placed(
+def _description_of_simulated(
     path: Path, block: Block, rests: Sequence[Span], real: Block, about: Description
 ) -> Description:
     """The recording's description, with windows where the simulated device rests."""
@@ -128,7 +127,7 @@ def _placed(
     )  # fmt: skip
     later = float(block.t[0] - real.t[0])
     moved = [None if w is None else (w[0] + later, w[1] + later) for w in about.windows]
-    if all(w is None or _inside(w, rests) for w in moved):
+    if all(w is None or _lies_in_rest(w, rests) for w in moved):
         gaps = tuple((start + later, end + later) for start, end in about.without)
         return replace(about, windows=tuple(moved), without=gaps)
     if len(rests) == len(ours) == len(about.windows):
@@ -141,7 +140,7 @@ def _placed(
     )
 
 
-def _inside(window: Span, rests: Sequence[Span]) -> bool:
+def _lies_in_rest(window: Span, rests: Sequence[Span]) -> bool:
     start, end = window
     most = max((min(end, b) - max(start, a) for a, b in rests), default=0.0)
     return most > INSIDE * (end - start)

@@ -1,8 +1,9 @@
-"""The causes that two sessions are both asked for.
+"""Puts the causes of two sessions into both of them, so that they can be compared.
 
-Those of the best set of either. Where one has a cause and the other an alias of it, the
-alias gives way: the same physics under two names would be found in each alone. Of an
-effect of which they show different parameters, both are asked for all.
+These are the causes in the best set of either. Where one session has a cause and the
+other an alias of it, the alias is replaced: otherwise the same physics would be found
+in each session under another name. If the two show different parameters of an effect,
+both get all of its parameters.
 """
 
 from __future__ import annotations
@@ -10,50 +11,52 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fieldcal.against.side import Side
-from fieldcal.against.widened import Widened, widened
+from fieldcal.against.side import DiagnosedRecording
+from fieldcal.against.widened import WidenedSet, widen_set
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.sizing import Member
 
 
-class Pairing:
+class CausePairing:
     """Two sessions with the same causes in both.
 
     Attributes
     ----------
-    real, sim : the sides
+    real, sim : both diagnosed recordings
     keys : of the causes, in order
-    asked : both sessions with all of them
-    instead : name of a cause by that of the alias which gave way to it
+    widened : both sessions with all causes
+    instead : name of the replaced alias, by the name of the cause that replaces it
 
     """
 
-    def __init__(self, real: Side, sim: Side) -> None:
+    def __init__(self, real: DiagnosedRecording, sim: DiagnosedRecording) -> None:
         self.real, self.sim = real, sim
         self.later = sim.start - real.start
         self.instead: dict[str, str] = {}
-        ours = _members(real.explanation)
-        theirs = _members(sim.explanation)
+        ours = _best_members(real.explanation)
+        theirs = _best_members(sim.explanation)
         ours, lent = self._renamed(ours, theirs, real.explanation)
         theirs, borrowed = self._renamed(theirs, [*ours, *lent], sim.explanation)
-        ours, theirs, whole = _as_wide(ours, theirs, real.explanation, sim.explanation)
-        self.ours, self.theirs = ours, theirs
-        for_us = _lacking(ours, [*lent, *theirs, *borrowed, *whole])
-        for_them = _lacking(theirs, [*borrowed, *ours, *lent, *whole])
-        self.asked = (
-            widened(real.explanation, ours, for_us, -self.later),
-            widened(sim.explanation, theirs, for_them, self.later),
+        ours, theirs, whole = _with_all_parameters(
+            ours, theirs, real.explanation, sim.explanation
         )
-        sets = (one.set.members for one in self.asked)
+        self.ours, self.theirs = ours, theirs
+        for_us = _members_lacking(ours, [*lent, *theirs, *borrowed, *whole])
+        for_them = _members_lacking(theirs, [*borrowed, *ours, *lent, *whole])
+        self.widened = (
+            widen_set(real.explanation, ours, for_us, -self.later),
+            widen_set(sim.explanation, theirs, for_them, self.later),
+        )
+        sets = (one.set.members for one in self.widened)
         self.keys = list(dict.fromkeys(c.key for s in sets for c, _ in s))
 
     def _renamed(
         self, own: list[Member], other: Sequence[Member], explanation: Explanation
     ) -> tuple[list[Member], list[Member]]:
-        """Own causes without those in whose place one of the other's may stand.
+        """Replace own causes by their aliases among the other session's causes.
 
-        Back come what is left, and what takes the place.
+        Returns the remaining own causes, and those that replace the others.
         """
         names = {c.name for c, _ in own}
         kept, taken = list(own), list[Member]()
@@ -69,10 +72,10 @@ class Pairing:
                 break
         return kept, taken
 
-    def with_shape_of(self, key: str) -> list[tuple[Widened, Widened]]:
-        """Both sessions with one cause at the shape that it has in either, in turn.
+    def with_shape_of(self, key: str) -> list[tuple[WidenedSet, WidenedSet]]:
+        """Both sessions with one cause at the shape of the one, then of the other.
 
-        Empty where the shape is none, or only one session has the cause by itself.
+        Empty if the cause has no shape, or if only one session found it.
         """
         mine, yours = (
             next((m for m in some if m[0].key == key), None)
@@ -80,28 +83,31 @@ class Pairing:
         )
         if mine is None or yours is None or not mine[1].shape or mine[1].effect is None:
             return []
-        real, sim = self.asked
+        real, sim = self.widened
         others = [m for m in self.theirs if m is not yours]
-        at_ours = widened(self.sim.explanation, others, [mine], self.later)
+        at_ours = widen_set(self.sim.explanation, others, [mine], self.later)
         ours = [m for m in self.ours if m is not mine]
-        at_theirs = widened(self.real.explanation, ours, [yours], -self.later)
+        at_theirs = widen_set(self.real.explanation, ours, [yours], -self.later)
         return [(real, at_ours), (at_theirs, sim)]
 
 
-def _members(explanation: Explanation) -> list[Member]:
+def _best_members(explanation: Explanation) -> list[Member]:
     return list(explanation.best.set.members)
 
 
-def _lacking(own: Sequence[Member], others: Sequence[Member]) -> list[Member]:
-    """Those of others that are not among one's own, each once."""
+def _members_lacking(own: Sequence[Member], others: Sequence[Member]) -> list[Member]:
+    """Members of `others` that are not in `own`, each once."""
     keys = {c.key for c, _ in own}
     return list({c.key: (c, g) for c, g in others if c.key not in keys}.values())
 
 
-def _as_wide(
+def _with_all_parameters(
     ours: list[Member], theirs: list[Member], real: Explanation, sim: Explanation
 ) -> tuple[list[Member], list[Member], list[Member]]:
-    """Causes of which both have other parameters, with all: what is left, and these."""
+    """Split off the causes of which both have different parameters.
+
+    Returns the remaining causes of both, and those causes with all parameters.
+    """
     by_key = {c.key: g for c, g in theirs}
     whole = [
         (c, _all_parameters(c, g))
@@ -114,6 +120,6 @@ def _as_wide(
 
 
 def _all_parameters(cause: Cause, group: Group) -> Group:
-    """The group with all parameters of its cause, its shape as it is."""
+    """The group with all parameters of its cause and an unchanged shape."""
     widest = max(cause.variants, key=lambda v: len(v.params))
     return replace(widest, shape=group.shape, origin=group.origin)

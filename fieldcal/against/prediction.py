@@ -1,14 +1,14 @@
-"""How a simulator predicts a recording, as it is and with what was found.
+"""How a simulator predicts a recording, without and with the causes found.
 
-As it is, its calibration and effects are put in the place of the recording's, with
-their covariance C; nothing of the recording is fitted, but an orientation that nobody
-knows. With y - h - Phi u = r at the simulator's values and G = Phi^T R^-1 Phi,
+Without them, the simulator's calibration and effects, with their covariance C, replace
+those of the recording. Nothing is fitted to the recording but unknown orientations.
+With the residual r = y - h - Phi u at the simulator's values and G = Phi^T R^-1 Phi,
 
     chi^2 = r^T (R + Phi C Phi^T)^-1 r
           = r^T R^-1 r - b^T L (1 + L^T G L)^-1 L^T b,   b = Phi^T R^-1 r, C = L L^T (1)
 
-With what was found, each position is left out and predicted from the others
-(`HeldOut`): so a simulator does that was patched by the others.
+With the causes found, each position is held out and predicted from the others
+(`HeldOut`), as a simulator would that was patched by the others.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.against.causes import Decided
-from fieldcal.against.offsets import shared_axes, wander
+from fieldcal.against.causes import DecidedCauses
+from fieldcal.against.offsets import bias_wander, shared_axes
 from fieldcal.against.result import SimulatorPrediction
-from fieldcal.against.side import Side
-from fieldcal.against.widened import Widened
+from fieldcal.against.side import DiagnosedRecording
+from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import Array, Index
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import Fitted, whole
@@ -32,11 +32,11 @@ from fieldcal.model.system.linear_rows import Linear
 from fieldcal.model.system.linear_system import gram
 
 
-def before(found: Decided) -> SimulatorPrediction:
-    """The recording as the simulator is; outputs that this has not are left aside."""
-    real = found.pairing.asked[0]
+def predict_as_simulated(found: DecidedCauses) -> SimulatorPrediction:
+    """Prediction by the simulator as it is, for the outputs that it has."""
+    real = found.pairing.widened[0]
     rows = found.pairing.real.explanation.rows
-    columns, values, covariance = _as_the_simulator(found)
+    columns, values, covariance = _simulator_values(found)
     linear = [p for p in real.linear if p.channel in found.sim.observed]
     fitted = Fitted(rows, real.inference.dictionary, linear, real.values, real.set)
     state = replace(real.set.state, columns=columns, estimate=values)
@@ -45,10 +45,10 @@ def before(found: Decided) -> SimulatorPrediction:
     return _prediction(rows, residual, squares, sum(len(p.white) for p in linear))
 
 
-def after(real: Side) -> SimulatorPrediction:
-    """The recording, each part as the others predict it."""
+def predict_as_explained(real: DiagnosedRecording) -> SimulatorPrediction:
+    """Prediction of each position from the others, with the causes found."""
     explanation = real.explanation
-    ahead = explanation.held_out.residual(explanation.in_question)
+    ahead = explanation.held_out.residual(explanation.rival_sets)
     squares, count = explanation.held_out.squares(explanation.best.set)
     return _prediction(explanation.rows, ahead, squares, count)
 
@@ -56,7 +56,7 @@ def after(real: Side) -> SimulatorPrediction:
 def _prediction(
     rows: Rows, residual: Array, squares: float, count: int
 ) -> SimulatorPrediction:
-    sizes = rms(rows, residual)
+    sizes = rms_over_parts(rows, residual)
     acc, gyr = (_mean(sizes[part]) for part in (slice(0, 3), slice(3, 6)))
     return SimulatorPrediction(acc, gyr, squares / count if count else np.nan)
 
@@ -66,15 +66,15 @@ def _mean(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
-def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
-    """Columns of the recording's dictionary, with what the simulator has there."""
-    real, sim = found.pairing.asked[0], found.sim
+def _simulator_values(found: DecidedCauses) -> tuple[Index, Array, Array]:
+    """Columns of the recording, with the simulator's values and covariance there."""
+    real, sim = found.pairing.widened[0], found.sim
     columns, base, theirs, wide = [], [], [], list[float]()
     for name, axes in shared_axes(real, sim):
         first = "bias" if name.endswith("bias") else "scale"
         here, there = (getattr(w.inference.dictionary, first) for w in (real, sim))
         nominal = [getattr(w.inference.nominal, first) for w in (real, sim)]
-        spread = wander(sim, axes) if first == "bias" else np.zeros(len(axes))
+        spread = bias_wander(sim, axes) if first == "bias" else np.zeros(len(axes))
         wide += spread.tolist()
         columns += (here + axes).tolist()
         theirs += (there + axes).tolist()
@@ -100,13 +100,13 @@ def _as_the_simulator(found: Decided) -> tuple[Index, Array, Array]:
 
 
 def _squares(
-    real: Widened,
+    real: WidenedSet,
     linear: Sequence[Linear],
     columns: Index,
     values: Array,
     covariance: Array,
 ) -> float:
-    """Squares of what is predicted, windows alone, (1)."""
+    """Chi squared (1) of the predicted windows."""
     d = real.inference.dictionary
     some = np.flatnonzero(real.inference.wanted(real.set.members) | (real.values != 0))
     rows = gram(linear, d, real.values, (), some)
@@ -114,11 +114,15 @@ def _squares(
     weighed = rows.weighed(tau)
     inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)
     left = weighed.square - 2 * values @ pull + values @ inner @ values
-    return unsure_squares(float(left), pull - inner @ values, inner, covariance)
+    return chi2_of_uncertain_prediction(
+        float(left), pull - inner @ values, inner, covariance
+    )
 
 
-def unsure_squares(left: float, b: Array, inner: Array, covariance: Array) -> float:
-    """Chi squared where what predicts has an uncertainty of its own, (1).
+def chi2_of_uncertain_prediction(
+    left: float, b: Array, inner: Array, covariance: Array
+) -> float:
+    """Chi squared (1) of a prediction that has an uncertainty of its own.
 
     Parameters
     ----------

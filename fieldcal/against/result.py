@@ -1,4 +1,4 @@
-"""What a comparison says: the content of against.json."""
+"""The result of a comparison: the content of against.json."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, number
+from fieldcal.diagnosis.result import Mismatch, Quantity, Verdict, json_number
 from fieldcal.effects import catalogue
 
 Direction = Literal["left_out", "added", "resized"]
-"""What the recording has alone, what the simulator has alone, what both have."""
+"""Only the recording has it; only the simulator; both, with different sizes."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealAndSimulated:
-    """One quantity in the recording and in the simulator; None where it is not.
+    """One quantity in recording and simulator; None where it is absent.
 
     `difference` is recording less simulator, with the uncertainty of both.
     """
@@ -27,7 +27,7 @@ class RealAndSimulated:
 
     @classmethod
     def of(cls, real: Quantity | None, simulator: Quantity | None) -> RealAndSimulated:
-        """Numbers with their difference; what is not there is 0 for certain.
+        """Values with their difference; an absent value counts as exactly 0.
 
         Raises
         ------
@@ -54,19 +54,19 @@ class RealAndSimulated:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One thing in which the two differ.
+    """One difference between recording and simulator.
 
     Attributes
     ----------
     id : an effect of the catalogue, a group of the calibration, "noise", or what an
         unexplained mismatch follows
-    direction : who has it
+    direction : which of the two has it
     probability : that they differ in it
     parameters : by name
-    aliases : effects that may stand in its place
-    where : channel, positions, time and what it follows, in the one that has it
+    aliases : other effects that explain it as well
+    where : channel, positions, time and covariate, in the one that has it
     shown : whether the other recording could have shown it
-    explained : whether it is physics that has a name
+    explained : whether it is an effect of the catalogue or a known quantity
 
     """
 
@@ -81,7 +81,7 @@ class Difference:
 
     @property
     def sizes(self) -> dict[str, RealAndSimulated]:
-        """Parameters that are no instant, frequency or time constant."""
+        """Parameters other than instants, frequencies and time constants."""
         effect = catalogue().get(self.id)
         shapes = {shape.name for shape in effect.shapes} if effect else ()
         return {n: p for n, p in self.parameters.items() if n not in shapes}
@@ -91,7 +91,7 @@ class Difference:
         return {
             "id": self.id,
             "direction": self.direction,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "parameters": {n: p.to_json() for n, p in self.parameters.items()},
             "aliases": list(self.aliases),
             "where": [m.to_json() for m in self.where],
@@ -101,7 +101,7 @@ class Difference:
 
 
 def verdict_of(differences: Sequence[Difference]) -> Verdict:
-    """The verdict that differences come to."""
+    """The verdict that follows from the differences."""
     if any(not d.explained for d in differences):
         return "unexplained"
     if any(d.aliases for d in differences):
@@ -126,12 +126,12 @@ class SimulatorPrediction:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""
-        return {name: number(value) for name, value in asdict(self).items()}
+        return {name: json_number(value) for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a recording is made of.
+    """Properties of a recording.
 
     Attributes
     ----------
@@ -157,11 +157,11 @@ class Facts:
     def to_json(self) -> dict[str, Any]:
         """Return the object of against.json."""
         return {
-            "rate_hz": number(self.rate_hz),
-            "step_acc": number(self.step_acc),
-            "step_gyr": number(self.step_gyr),
-            "start_s": number(self.start_s),
-            "start_c": number(self.start_c),
+            "rate_hz": json_number(self.rate_hz),
+            "step_acc": json_number(self.step_acc),
+            "step_gyr": json_number(self.step_gyr),
+            "start_s": json_number(self.start_s),
+            "start_c": json_number(self.start_c),
             "noise": _quantities(self.noise),
             "calibration": {n: _quantities(g) for n, g in self.calibration.items()},
             "effects": {n: _quantities(e) for n, e in self.effects.items()},
@@ -174,15 +174,15 @@ def _quantities(some: Mapping[str, Quantity]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Aligned:
-    """Where two recordings of one motion stand beside each other.
+    """Alignment of two recordings of one motion.
 
     Attributes
     ----------
     delay : by which the recording's clock is ahead of the simulator's, at `at_s`
-    drift : by how much the simulator's clock is the quicker one
-    turn : from the simulator's axes to the recording's, about x, y and z
-    at_s : s of the recording's clock
-    compared_s : of common motion
+    drift : relative rate by which the simulator's clock is faster
+    turn : rotation from the simulator's axes to the recording's, about x, y and z
+    at_s : instant of the delay, s of the recording's clock
+    compared_s : duration of the common motion, s
 
     """
 
@@ -198,27 +198,27 @@ class Aligned:
             "delay": self.delay.to_json(),
             "drift": self.drift.to_json(),
             "turn": _quantities(self.turn),
-            "at_s": number(self.at_s),
-            "compared_s": number(self.compared_s),
+            "at_s": json_number(self.at_s),
+            "compared_s": json_number(self.compared_s),
         }
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A recording held against a simulator's.
+    """Comparison of a recording with a simulator's output.
 
     Attributes
     ----------
     verdict : consistent, left_out, ambiguous or unexplained
     probability : that the verdict is right
-    differences : what differs, the surest first
-    alike : ids of what both have to the same size
-    before, after : how the simulator predicts the recording as it is, and with what was
-        found, each position left out of everything that is known of it
-    real, simulator : what each recording is made of
+    differences : the most probable first
+    alike : ids of what both have with the same size
+    before, after : prediction of the recording by the simulator as it is, and with the
+        differences found; then each position is held out
+    real, simulator : properties of each recording
     warnings : what limits the comparison
-    says : a paragraph for a person
-    aligned : where two recordings of one motion stand; None of positions
+    says : a paragraph for the user
+    aligned : alignment of two recordings of one motion; None if positions are compared
 
     """
 
@@ -238,7 +238,7 @@ class Match:
         """Return the content of against.json."""
         return {
             "verdict": self.verdict,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "differences": [d.to_json() for d in self.differences],
             "alike": list(self.alike),
             "prediction": {

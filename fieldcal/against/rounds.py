@@ -1,10 +1,10 @@
-"""A simulator that is a command: run, compared, patched, and run again.
+"""Runs a simulator that is a command, compares, patches it, and runs it again.
 
     CMD {patch} {out}
 
-is run without a shell, with the patch's file and that of its output in the places of
-these words. At first the patch changes nothing. What a simulator that fails has said
-is told, and nothing is kept of a round that was not finished.
+is run without a shell; the two words are replaced by the paths of the patch and of the
+output. The first patch changes nothing. If the simulator fails, its last lines are
+shown. Nothing is kept of an unfinished round.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from tempfile import TemporaryDirectory
 
 from fieldcal.against import patches
 from fieldcal.against.result import Match
-from fieldcal.against.sensor_model import SensorModel, patched
+from fieldcal.against.sensor_model import SensorModel, patch_model
 from fieldcal.core.errors import InputError
 from fieldcal.core.shown import shown
 
-Compare = Callable[[Path], tuple[Match, list[str]]]
-"""What a file of a simulator differs in, and what the user must know of it."""
+CompareOutput = Callable[[Path], tuple[Match, list[str]]]
+"""Compares a simulator's file; returns the match, and notices for the user."""
 
 PATCH, OUT = "{patch}", "{out}"
 
 SAID = 5
-"""Last lines of a simulator that failed which are shown."""
+"""Last lines of a failed simulator that are shown."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,10 @@ class SimulatorRun:
 
     Attributes
     ----------
-    patch : what it was run with; of the last, with what the format has nothing for
-    match : how its output compares
-    says : what the user must know of the output
+    patch : sensor model of the run; of the last one, with everything that is still to
+        be changed, even if the format cannot hold it
+    match : comparison of its output
+    says : notices for the user
 
     """
 
@@ -49,13 +50,13 @@ class SimulatorRun:
 
 
 def is_command(text: str) -> bool:
-    """Whether what is compared with is a command, and no file."""
+    """Whether the simulator is given as a command and not as a file."""
     return OUT in text
 
 
-def rounds(
+def run_and_patch(
     command: str,
-    compare: Compare,
+    compare: CompareOutput,
     rate_hz: float,
     form: str,
     most: int,
@@ -63,12 +64,12 @@ def rounds(
 ) -> list[SimulatorRun]:
     """Run and patch until nothing differs, or `most` patches were tried.
 
-    Where the format has nothing for what is left, a further patch would be the same.
+    It also ends if the format can hold none of the remaining differences.
 
     Parameters
     ----------
     command : with {out} in it, and {patch}
-    compare : holds the recording against a file that the simulator wrote
+    compare : compares the recording with a file that the simulator wrote
     rate_hz : samples a second of the recording
     form : of the patch, in `patches.formats`
     most : patches
@@ -89,8 +90,8 @@ def rounds(
     done: list[SimulatorRun] = []
     model = SensorModel(rate_hz=rate_hz)
     for number in range(most + 1):
-        found, said = _run(command, compare, form, model)
-        after = patched(found, model)
+        found, said = _run_and_compare(command, compare, form, model)
+        after = patch_model(found, model)
         left = {one.id for one in found.differences}
         last = not left & set(patches.patch_format(form).HOLDS)
         done.append(SimulatorRun(after if last else model, found, tuple(said)))
@@ -101,16 +102,16 @@ def rounds(
     return done
 
 
-def _run(
-    command: str, compare: Compare, form: str, model: SensorModel
+def _run_and_compare(
+    command: str, compare: CompareOutput, form: str, model: SensorModel
 ) -> tuple[Match, list[str]]:
-    """How what the simulator makes with a patch compares, and what is said of it."""
+    """Run the simulator with a patch; returns the comparison and its notices."""
     with TemporaryDirectory() as folder:
         ending = patches.patch_format(form).ENDING
         patch, out = Path(folder) / f"patch{ending}", Path(folder) / "out"
         patches.write(form, model, patch)
         places = {PATCH: str(patch), OUT: str(out)}
-        _call([_placed(word, places) for word in _words(command)], command)
+        _run_command([_with_paths(word, places) for word in _words(command)], command)
         if not out.exists():
             raise InputError(
                 f"{command}: ended well and wrote nothing to {OUT}: let it write its"
@@ -126,13 +127,13 @@ def _words(command: str) -> list[str]:
         raise InputError(f"{command}: is no command: {error}") from None
 
 
-def _placed(word: str, places: dict[str, str]) -> str:
+def _with_paths(word: str, places: dict[str, str]) -> str:
     for name, path in places.items():
         word = word.replace(name, path)
     return word
 
 
-def _call(words: list[str], command: str) -> None:
+def _run_command(words: list[str], command: str) -> None:
     """Run a command to its end."""
     try:
         done = subprocess.run(

@@ -1,10 +1,10 @@
-"""What the sensors of a simulator are to have, in numbers that any format can take.
+"""The sensor model that a simulator should have, independent of any format.
 
     new = present + (recording - simulator)                                         (1)
 
-in what differs, and nothing else: what agrees is left as it is. At first the present
-state is what the simulator showed; once it was patched, what the patch said, so that
-what a simulator has beyond its parameters is made up for as well.
+for everything that differs; the rest is unchanged. The first present values are those
+that the simulator showed. Later they are those of the last patch, so that errors of the
+simulator beyond its parameters are compensated, too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LINEAR = ("cross_coupling", "gyro_cross_coupling", "gyro_scale")
 """Effects that are elements of a matrix beside the scale factors."""
 
 TRIADS = {"acc": LINEAR[:1], "gyr": LINEAR[1:]}
-"""The same by triad."""
+"""The same, by triad."""
 
 INSTANTS = ("at_s", "from_s", "to_s")
 """Parameters that are instants of device time."""
@@ -35,16 +35,17 @@ Values = Mapping[str, float | str]
 
 @dataclass(frozen=True)
 class SensorModel:
-    """Sensors as they are to be: U = bias + matrix f, and effects.
+    """Sensors of a simulator: U = bias + matrix f, and effects.
 
     Attributes
     ----------
-    calibration : (3,) by group, where it is to be changed
-    noise : by channel, standard deviation of a sample, m/s^2 and rad/s, likewise
-    effects : parameters by id; those of what is to be taken out are 0, and instants
-        count from the first sample
-    shown : the same of what is not to be changed, as the simulator shows it: formats
-        need it where one element of a file holds several things
+    calibration : (3,) by group, only where it is to be changed
+    noise : by channel, standard deviation of a sample, m/s^2 and rad/s; only where it
+        is to be changed
+    effects : parameters by id; those of effects to be removed are 0, and instants are
+        counted from the first sample
+    shown : the model that the simulator shows, for all that is not changed; formats
+        need it where one element of a file holds several parameters
     rate_hz : samples a second
     start_c : temperature at which the biases hold, deg C; nan where unknown
 
@@ -59,18 +60,18 @@ class SensorModel:
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """Ids of all that it changes."""
+        """Ids of everything that is to be changed."""
         noise = ("noise",) if self.noise else ()
         return (*self.calibration, *noise, *self.effects)
 
     def group(self, name: str) -> Array:
-        """A group of the calibration; that of a perfect sensor where it is not said."""
+        """A group of the calibration; of a perfect sensor where it is unknown."""
         if name not in self.calibration and self.shown is not None:
             return self.shown.group(name)
         return self.calibration.get(name, np.full(3, NEUTRAL[name]))
 
     def level(self, channel: str) -> float:
-        """Noise of a channel; none where nothing is known of it."""
+        """Noise of a channel; 0 where it is unknown."""
         if channel not in self.noise and self.shown is not None:
             return self.shown.level(channel)
         return self.noise.get(channel, 0.0)
@@ -85,7 +86,7 @@ class SensorModel:
         return out
 
     def number(self, effect: str, name: str) -> float:
-        """A parameter of an effect, 0 where it has none."""
+        """A parameter of an effect; 0 where it is absent."""
         return float(self._values(effect).get(name, 0.0))
 
     def _values(self, effect: str) -> Values:
@@ -94,19 +95,19 @@ class SensorModel:
         return self.effects.get(effect, {})
 
 
-def patched(found: Match, present: SensorModel | None = None) -> SensorModel:
-    """The sensors that make a simulator like the recording (1).
+def patch_model(found: Match, present: SensorModel | None = None) -> SensorModel:
+    """The sensor model with which the simulator matches the recording (1).
 
     Parameters
     ----------
     found : a comparison
-    present : what the simulator was last patched with; nothing at first
+    present : the last patch of the simulator; None at first
 
     """
     out = present or SensorModel()
     out = replace(out, rate_hz=found.real.rate_hz, start_c=found.real.start_c)
     if out.shown is None:
-        out = replace(out, shown=_shown(found.simulator))
+        out = replace(out, shown=_model_of_simulator(found.simulator))
     for one in found.differences:
         if one.id in CALIBRATION:
             out = _with_calibration(out, one)
@@ -117,8 +118,8 @@ def patched(found: Match, present: SensorModel | None = None) -> SensorModel:
     return out
 
 
-def _shown(simulator: Facts) -> SensorModel:
-    """What a simulator shows of itself."""
+def _model_of_simulator(simulator: Facts) -> SensorModel:
+    """The sensor model that a simulator shows."""
     calibration = {
         name: np.array(
             [_number(axes[i]) if i in axes else NEUTRAL[name] for i in "xyz"]
@@ -136,7 +137,7 @@ def _shown(simulator: Facts) -> SensorModel:
 
 
 def _with_calibration(model: SensorModel, one: Difference) -> SensorModel:
-    """A group, axis by axis."""
+    """Change a group of the calibration, axis by axis."""
     known = model.calibration.get(one.id)
     value = np.full(3, NEUTRAL[one.id]) if known is None else known.copy()
     for axis, pair in one.parameters.items():
@@ -147,7 +148,7 @@ def _with_calibration(model: SensorModel, one: Difference) -> SensorModel:
 
 
 def _with_noise(model: SensorModel, one: Difference) -> SensorModel:
-    """Noise: variances add up."""
+    """Change the noise; variances add up."""
     noise = dict(model.noise)
     for channel, pair in one.parameters.items():
         real, sim = (_number(q) for q in (pair.real, pair.simulator))
@@ -158,7 +159,7 @@ def _with_noise(model: SensorModel, one: Difference) -> SensorModel:
 
 
 def _with_effect(model: SensorModel, one: Difference, found: Match) -> SensorModel:
-    """An effect: its shape is the recording's, and what is a word as well."""
+    """Change an effect; its shapes and words are taken from the recording."""
     shapes = {s.name for s in catalogue()[one.id].shapes}
     known = model.effects.get(one.id)
     values: dict[str, float | str] = dict(known or {})
@@ -180,13 +181,13 @@ def _with_effect(model: SensorModel, one: Difference, found: Match) -> SensorMod
 
 
 def _number(quantity: object) -> float:
-    """A quantity's value, 0 where it has none."""
+    """A quantity's value; 0 if it is absent or a text."""
     value = getattr(quantity, "value", 0.0)
     return 0.0 if isinstance(value, str) else float(value)
 
 
-def told(name: str, values: Values, axes: Sequence[str] = ()) -> str:
-    """An effect with its numbers, for the sentence that a format cannot hold it."""
+def effect_with_values(name: str, values: Values, axes: Sequence[str] = ()) -> str:
+    """An effect with its values, for a sentence about what a format cannot hold."""
     some = axes or tuple(values)
     parts = [
         f"{n} = {v}" if isinstance(v := values[n], str) else f"{n} = {v:.4g}"

@@ -1,10 +1,10 @@
-"""One of two recordings that are held against each other: samples, and what is in them.
+"""One of two recordings that are compared, with its diagnosis.
 
-Gravity is shared: what nobody knows of it is in the scale factors of both alike. What a
-session says under [model] is of another simulation than the one it is compared with, so
-it counts for nothing here. Outputs without noise, as simulators have them, are given
-white noise of a part of the other recording's: repeated values are no proof of a fault
-there, and nothing is known better than the other recording can tell.
+Gravity is the same for both, so its uncertainty is left out: it affects the scale
+factors of both alike. The [model] of session.toml belongs to another simulation and is
+ignored. Outputs without noise, as simulators have them, are given white noise of a part
+of the other recording's: repeated values are no fault there, and nothing needs to be
+known better than the other recording can show.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import Prepared, prepare
-from fieldcal.diagnosis.verdict import concluded
+from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
+from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.model.rows.bounds import spans
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
-from fieldcal.windows.noise import short_lag
+from fieldcal.windows.noise import short_lag_noise
 
 PART = 0.1
-"""Least noise of a simulator's output, in that of the recording's: it adds a hundredth
+"""Least noise of a simulator's output, relative to the recording's: it adds a hundredth
 to the variance of a difference."""
 
 SEED = 1
-"""Of the noise that is added, so that the same files give the same answer."""
+"""Seed of the added noise, so that the same files give the same result."""
 
 
 @dataclass(frozen=True)
-class Side:
-    """A recording with what was found in it.
+class DiagnosedRecording:
+    """A recording with its explanation and diagnosis.
 
     Attributes
     ----------
-    name : as the user calls it
-    block : its samples as they came
+    name : name given by the user
+    block : its samples as recorded
     explanation, diagnosis : of the samples
-    noise, unsure : (6,) standard deviation from one sample to the next while at rest,
-        and the uncertainty of its logarithm
+    noise : (6,) standard deviation from one sample to the next at rest
+    noise_uncertainty : (6,) of the logarithm of `noise`
     steps : (6,) step of the grid that outputs lie on, 0 where they lie on none
     rate_hz : samples a second
-    quieted : channels to which noise was added
+    noise_added : channels to which noise was added
 
     """
 
@@ -54,10 +54,10 @@ class Side:
     explanation: Explanation
     diagnosis: Diagnosis
     noise: Array
-    unsure: Array
+    noise_uncertainty: Array
     steps: Array
     rate_hz: float
-    quieted: tuple[int, ...] = ()
+    noise_added: tuple[int, ...] = ()
 
     @property
     def start(self) -> float:
@@ -65,10 +65,13 @@ class Side:
         return float(self.explanation.rows.span[0, 0])
 
 
-def side(
-    name: str, block: Block, about: Description, beside: Side | None = None
-) -> Side:
-    """Diagnose a recording; a simulator's `beside` the recording that it is to be like.
+def diagnose_side(
+    name: str,
+    block: Block,
+    about: Description,
+    beside: DiagnosedRecording | None = None,
+) -> DiagnosedRecording:
+    """Diagnose one of the recordings; a simulator's with the recording as `beside`.
 
     Raises
     ------
@@ -78,28 +81,30 @@ def side(
     """
     about = replace(about, model={})
     heard, quieted = block, tuple[int, ...]()
-    noise, unsure = noise_of(block, about)
+    noise, unsure = sample_noise(block, about)
     if beside is not None:
-        heard, quieted = _audible(block, noise, beside.noise)
-    prepared = _of_one_site(prepare(heard, about))
+        heard, quieted = _with_least_noise(block, noise, beside.noise)
+    prepared = _with_certain_gravity(prepare_recording(heard, about))
     if beside is not None:
         prepared = _from_one_temperature(prepared, beside.explanation.prepared)
     explanation = explain(prepared)
-    found = concluded(heard, explanation)
+    found = make_diagnosis(heard, explanation)
     steps = grids_of(block)
-    return Side(
+    return DiagnosedRecording(
         name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
     )
 
 
-def _of_one_site(prepared: Prepared) -> Prepared:
-    """A recording where gravity is what it is said to be: both are measured by it."""
+def _with_certain_gravity(prepared: PreparedRecording) -> PreparedRecording:
+    """The recording with exactly known gravity, since it is the same for both."""
     rows = prepared.rows
     return replace(prepared, rows=replace(rows, x=replace(rows.x, gravity_sigma=0.0)))
 
 
-def _from_one_temperature(prepared: Prepared, other: Prepared) -> Prepared:
-    """A recording whose biases are those at the temperature another one started at."""
+def _from_one_temperature(
+    prepared: PreparedRecording, other: PreparedRecording
+) -> PreparedRecording:
+    """The recording with biases at the temperature at which the other one starts."""
     warmth, start = prepared.source.warmth, other.source.warmth.start_c
     ahead = warmth.start_c - start
     if not np.isfinite(ahead):
@@ -112,17 +117,17 @@ def _from_one_temperature(prepared: Prepared, other: Prepared) -> Prepared:
     )
 
 
-def noise_of(block: Block, about: Description) -> tuple[Array, Array]:
+def sample_noise(block: Block, about: Description) -> tuple[Array, Array]:
     """Noise from sample to sample in windows, (6,), and its relative uncertainty.
 
-    Differences of white noise tell its deviation to sqrt(3 / (4 n)); where windows
-    disagree by more, to that.
+    From n differences of white noise it is sqrt(3 / (4 n)); where windows disagree by
+    more, it is their scatter.
     """
     levels, counts = [], []
     for first, last in spans(block, about):
         piece = block[slice(int(first), int(last))].six
         if len(piece) > 1:
-            levels.append(short_lag(piece))
+            levels.append(short_lag_noise(piece))
             counts.append(np.isfinite(piece).sum(axis=0))
     if not levels:
         return np.full(6, np.nan), np.full(6, np.nan)
@@ -136,10 +141,13 @@ def noise_of(block: Block, about: Description) -> tuple[Array, Array]:
     return np.sqrt(mean), np.maximum(among, np.sqrt(0.75 / total))
 
 
-def _audible(
+def _with_least_noise(
     block: Block, noise: Array, wanted: Array
 ) -> tuple[Block, tuple[int, ...]]:
-    """A block in which no channel is much quieter than is wanted."""
+    """Add noise to channels that are much quieter than `wanted` (6,).
+
+    Returns the block, and the channels to which noise was added.
+    """
     rng, six = np.random.default_rng(SEED), block.six.copy()
     quiet = np.flatnonzero(np.nan_to_num(noise, nan=np.inf) < PART * wanted)
     for c in quiet:

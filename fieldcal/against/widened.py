@@ -1,8 +1,8 @@
-"""What was found in a session, together with causes that another session has.
+"""The best set of a session, widened by the causes of another session.
 
-The columns of what only the other has are put beside the best set, with the shape that
-they have there, so that both sessions are asked the same questions: what each cause is
-here and how well that is known, everything else of the session eliminated.
+The columns of causes that only the other session has are added to the best set, with
+their shape there. For each cause, both sessions then give its information, with all
+other parameters of the session eliminated.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.against.joint import EffectTold
+from fieldcal.against.joint import EffectInformation
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
@@ -26,16 +26,16 @@ from fieldcal.model.system.linear_rows import Linear
 
 
 @dataclass(frozen=True)
-class Widened:
-    """A set of causes in one session.
+class WidenedSet:
+    """A widened set of causes in one session.
 
     Attributes
     ----------
-    inference : with a dictionary that has their columns
-    search : about the state of the explanation
+    inference : with a dictionary that has the columns of all causes
+    search : linearised about the state of the explanation
     set : the causes
-    told_from : the set as its numbers are taken
-    linear : rows of each channel about that
+    reported_set : the set with the sizes from which estimates are reported
+    linear : linearised rows of each channel
     values : (k,) of the dictionary's columns in the state
 
     """
@@ -43,34 +43,34 @@ class Widened:
     inference: Inference
     search: Search
     set: Set
-    told_from: Set
+    reported_set: Set
     linear: Sequence[Linear]
     values: Array
 
     @property
     def observed(self) -> Index:
-        """Channels that say something."""
+        """Channels that were measured."""
         return self.inference.dictionary.observed
 
     def member(self, key: str) -> Member | None:
-        """A cause by its key, with its variant."""
+        """The member of the set with this key; None without it."""
         return next((m for m in self.set.members if m[0].key == key), None)
 
-    def told(self, key: str) -> EffectTold | None:
-        """What the session says of a cause, all else eliminated; None without it."""
+    def effect_information(self, key: str) -> EffectInformation | None:
+        """Information about a cause, all else eliminated; None without it."""
         if (member := self.member(key)) is None:
             return None
         columns, typical = member[1].columns, member[1].typical
         state = self.set.state
         kept = np.ones(len(state.columns), dtype=bool)
-        kept[_places(state.columns, columns)] = False
+        kept[_column_indices(state.columns, columns)] = False
         less = Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
         inner, pull = less.rest(columns, typical)
         own = np.diag(state.rows.matrix(columns, columns)) * typical**2
-        return EffectTold(inner, pull, float(own.max()), self.evidence(key))
+        return EffectInformation(inner, pull, float(own.max()), self.evidence(key))
 
     def evidence(self, key: str) -> float:
-        """Rise of ln Z with a cause, its chance not counted."""
+        """Rise of ln Z with a cause, without its prior probability."""
         rest = tuple(m for m in self.set.members if m[0].key != key)
         less = self.search.evaluated(rest, Search.sizes_of(self.set, rest))
         found = self.set.score - self.search.chance(self.set.members)
@@ -78,31 +78,31 @@ class Widened:
 
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""
-        state = self.told_from.state
-        at = _places(state.columns, columns)
+        state = self.reported_set.state
+        at = _column_indices(state.columns, columns)
         return state.estimate[at], state.inverse[np.ix_(at, at)]
 
 
-def _places(columns: Index, wanted: Index) -> Index:
-    """Where columns stand in a set; a member's come last."""
+def _column_indices(columns: Index, wanted: Index) -> Index:
+    """Indices of columns in a set; the last one, since a member's come last."""
     found = [int(np.flatnonzero(columns == c)[-1]) for c in wanted]
     return np.array(found, dtype=np.intp)
 
 
-def widened(
+def widen_set(
     explanation: Explanation,
     members: Sequence[Member],
     others: Sequence[Member],
     later: float,
-) -> Widened:
-    """A session's own causes, with those that only another has.
+) -> WidenedSet:
+    """Widen a session's own causes by those that only the other session has.
 
     Parameters
     ----------
     explanation : of this session
     members : its own causes
     others : those of the other session, with their variants there
-    later : what this session's clock is ahead of the other's, s
+    later : time by which this session's clock is ahead of the other's, s
 
     """
     found = explanation.inferred
@@ -113,18 +113,18 @@ def widened(
         if (more := _counterpart(own, cause, group, later)) is not None:
             every.append(more)
     values = np.pad(found.values, (0, own.dictionary.width - len(found.values)))
-    wanted = own.wanted([*every, *map(on_all_axes, every)]) | (values != 0)
+    wanted = own.wanted([*every, *map(with_all_parameters, every)]) | (values != 0)
     linear = own.system.linearised(found.state, wanted)
     search = Search(own.dictionary, own.gram_of(linear, values, wanted))
-    there = search.evaluated(tuple(every), _start(found.best, every))
-    return Widened(own, search, there, reported(search, there), linear, values)
+    there = search.evaluated(tuple(every), _starting_sizes(found.best, every))
+    return WidenedSet(own, search, there, reported(search, there), linear, values)
 
 
-def on_all_axes(member: Member) -> Member:
-    """The same effect with all its parameters.
+def with_all_parameters(member: Member) -> Member:
+    """The member with all parameters of its effect.
 
-    A device has it on every axis. Where positions do not distinguish it from bias and
-    scale factor on some axes, it was found on the others alone.
+    A device has an effect on every axis. If positions do not distinguish it from bias
+    and scale factor on some axes, it was found on the others alone.
     """
     cause, group = member
     same = [*group.siblings(cause.variants), group]
@@ -133,8 +133,8 @@ def on_all_axes(member: Member) -> Member:
     return cause, max(same, key=lambda v: len(v.params))
 
 
-def _start(best: Set, every: Sequence[Member]) -> Sizes:
-    """Sizes to begin with: those of the best set where it has the cause."""
+def _starting_sizes(best: Set, every: Sequence[Member]) -> Sizes:
+    """Initial sizes: those of the best set where it has the cause."""
     known = {m[0].key: s for m, s in zip(best.members, best.sizes.members, strict=True)}
     sizes = tuple(known.get(c.key, EVEN) for c, _ in every)
     return Sizes(best.sizes.calibration, best.sizes.instability, sizes)
@@ -143,7 +143,7 @@ def _start(best: Set, every: Sequence[Member]) -> Sizes:
 def _counterpart(
     own: Inference, cause: Cause, group: Group, later: float
 ) -> Member | None:
-    """The cause here that is what another session calls so; None if it has none."""
+    """The cause of this session that corresponds to one of another; None without it."""
     here = next((c for c in own.dictionary.causes if c.key == cause.key), None)
     if here is None:
         return None

@@ -1,4 +1,4 @@
-"""What a comparison says, in sentences and in lines."""
+"""A comparison in sentences and in rows of a table."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 from fieldcal.model import thresholds
 
-SHOWN = 3.0
+STANDS_OUT = 3.0
 """Standard deviations from which a sentence names a parameter."""
 
-LEADS: Mapping[Direction, str] = {
+DIRECTION_LEADS: Mapping[Direction, str] = {
     "left_out": "The simulator leaves out",
     "added": "The simulator adds",
     "resized": "Both have, but not alike:",
 }
 
-SHORT: Mapping[Direction, str] = {
+DIRECTION_WORDS: Mapping[Direction, str] = {
     "left_out": "left out", "added": "added", "resized": "another size",
 }  # fmt: skip
 
@@ -36,9 +36,9 @@ def paragraph(
     predicted: tuple[SimulatorPrediction, SimulatorPrediction],
     parts: str = "Positions",
 ) -> str:
-    """Say verdict, differences and what they do to the prediction.
+    """Verdict, differences and their effect on the prediction, in sentences.
 
-    `parts` are what was left out of everything to be predicted.
+    `parts` names what was held out: positions or stretches.
     """
     if verdict == "consistent":
         return (
@@ -47,10 +47,10 @@ def paragraph(
             " recordings can show."
         )
     out = []
-    for direction, lead in LEADS.items():
+    for direction, lead in DIRECTION_LEADS.items():
         some = [d for d in differences if d.direction == direction]
         if some:
-            out.append(f"{lead} {'; '.join(map(named, some))}.")
+            out.append(f"{lead} {'; '.join(map(difference_with_parameters, some))}.")
     unseen = [d.id for d in differences if not d.shown]
     if unseen:
         out.append(
@@ -77,53 +77,56 @@ def _predicted(
     )
 
 
-def named(one: Difference) -> str:
-    """A difference with the parameters that stand out."""
+def difference_with_parameters(one: Difference) -> str:
+    """A difference with its significant parameters."""
     told = []
     for name, pair in one.parameters.items():
         off = pair.difference
         if isinstance(off.value, str):
             told.append(f"{name} {off.value}")
-        elif not off.sigma or abs(off.value) > SHOWN * off.sigma:
-            told.append(_said(name, one.direction, pair))
+        elif not off.sigma or abs(off.value) > STANDS_OUT * off.sigma:
+            told.append(_parameter_in_words(name, one.direction, pair))
     name, sizes = one.id.replace("_", " "), f" ({', '.join(told)})" if told else ""
     return f"{name}{sizes}{_or_else(one)}"
 
 
-def undecided(one: Difference) -> str:
-    """What is likelier than not, and not likely enough to be called a difference."""
+def possible_difference(one: Difference) -> str:
+    """Sentence about a difference that is not probable enough to be reported."""
     return (
-        f"{named(one)} may differ, with a probability of {one.probability:.2f}; from"
+        f"{difference_with_parameters(one)} may differ, with a probability of"
+        f" {one.probability:.2f}; from"
         f" {thresholds.DIFFERS} on it counts as a difference. A longer recording would"
         " tell"
     )
 
 
 def _or_else(one: Difference) -> str:
-    """What may stand in its place."""
+    """The aliases of a difference, as part of a sentence."""
     names = " or ".join(alias.replace("_", " ") for alias in one.aliases)
     return f", or {names}" if names else ""
 
 
-def _said(name: str, direction: Direction, pair: RealAndSimulated) -> str:
-    """A parameter in words: what is there alone, or by how much it differs."""
+def _parameter_in_words(name: str, direction: Direction, pair: RealAndSimulated) -> str:
+    """A parameter in words: its value where only one has it, else its difference."""
     alone = pair.simulator if direction == "added" else pair.real
     if direction != "resized" and alone is not None:
         return f"{name} = {with_uncertainty(alone)}"
-    return f"{name} by {signed(pair.difference)}"
+    return f"{name} by {with_sign(pair.difference)}"
 
 
-def signed(quantity: Quantity) -> str:
+def with_sign(quantity: Quantity) -> str:
     """A difference with its sign and uncertainty."""
     text = with_uncertainty(quantity)
     plus = not isinstance(quantity.value, str) and quantity.value >= 0
     return f"+{text}" if plus else text
 
 
-def lines(found: Sequence[Difference]) -> list[tuple[str, str, str, str, str]]:
-    """A row of a table for each; what happened often is one row, with its largest.
+def difference_rows(
+    found: Sequence[Difference],
+) -> list[tuple[str, str, str, str, str]]:
+    """Rows of a table; repeated differences are one row, with the most significant.
 
-    What, who has it, how big in each, the difference, and how sure.
+    Columns: what, direction, size in each, difference, probability.
     """
     alike: dict[tuple[str, str, str], list[Difference]] = {}
     for one in found:
@@ -131,7 +134,7 @@ def lines(found: Sequence[Difference]) -> list[tuple[str, str, str, str, str]]:
         alike.setdefault((one.id, one.direction, part), []).append(one)
     out = []
     for some in alike.values():
-        what, who, size, off = line(max(some, key=_clearest))
+        what, who, size, off = difference_row(max(some, key=_clearest))
         often = f" ({len(some)} times)" if len(some) > 1 else ""
         sure = format_probability(min(one.probability for one in some))
         out.append((what + often, who, size, off, sure))
@@ -139,11 +142,13 @@ def lines(found: Sequence[Difference]) -> list[tuple[str, str, str, str, str]]:
 
 
 def _clearest(one: Difference) -> float:
-    return max((_clear(p.difference) for p in one.parameters.values()), default=0.0)
+    return max(
+        (_significance(p.difference) for p in one.parameters.values()), default=0.0
+    )
 
 
-def line(one: Difference) -> tuple[str, str, str, str]:
-    """What, how big in each, and the difference, for one row of a table."""
+def difference_row(one: Difference) -> tuple[str, str, str, str]:
+    """One row of the table: what, direction, size in each, difference."""
     told = {
         n: p
         for n, p in (one.sizes or one.parameters).items()
@@ -151,25 +156,30 @@ def line(one: Difference) -> tuple[str, str, str, str]:
     }
     what = one.id.replace("_", " ") + _or_else(one)
     if not told:
-        return what, SHORT[one.direction], "", ""
-    name = max(told, key=lambda n: _clear(told[n].difference))
+        return what, DIRECTION_WORDS[one.direction], "", ""
+    name = max(told, key=lambda n: _significance(told[n].difference))
     pair = told[name]
-    more = sum(_clear(p.difference) > SHOWN for p in told.values()) - 1
+    more = sum(_significance(p.difference) > STANDS_OUT for p in told.values()) - 1
     also = f" (+{more})" if more > 0 else ""
-    both = "real " + _shown(pair.real) + ", simulator " + _shown(pair.simulator)
+    both = (
+        "real "
+        + _quantity_or_none(pair.real)
+        + ", simulator "
+        + _quantity_or_none(pair.simulator)
+    )
     return (
         what,
-        SHORT[one.direction],
+        DIRECTION_WORDS[one.direction],
         f"{name}: {both}{also}",
-        format_unit(signed(pair.difference)),
+        format_unit(with_sign(pair.difference)),
     )
 
 
-def _shown(quantity: Quantity | None) -> str:
+def _quantity_or_none(quantity: Quantity | None) -> str:
     return "none" if quantity is None else pretty_quantity(quantity)
 
 
-def _clear(quantity: Quantity) -> float:
+def _significance(quantity: Quantity) -> float:
     if isinstance(quantity.value, str) or not quantity.sigma:
         return 0.0
     return abs(quantity.value) / quantity.sigma

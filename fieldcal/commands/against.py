@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fieldcal.against import Match
-    from fieldcal.against.rounds import Compare, SimulatorRun
+    from fieldcal.against.rounds import CompareOutput, SimulatorRun
     from fieldcal.against.sensor_model import SensorModel
     from fieldcal.session.folder import Session
 
@@ -25,11 +25,11 @@ PLAIN = "json"
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the comparison: 0 if the two agree within the limits, 1 if not."""
-    from fieldcal.against.gate import checks, limits, write_junit
+    from fieldcal.against.gate import check_match, parse_limits, write_junit
     from fieldcal.report.gather import AGAINST
     from fieldcal.session.folder import Session
 
-    allowed = limits(args.limit)
+    allowed = parse_limits(args.limit)
     session = Session.open(args.session)
     found, model, said = _compared(args, session)
     content = found.to_json() | {"against": args.against}
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
     _say(args, found, content)
-    gate = checks(found, allowed)
+    gate = check_match(found, allowed)
     if args.junit:
         write_junit(args.junit, args.session.resolve().name, found, gate)
         written.append(args.junit)
@@ -59,34 +59,36 @@ def _compared(args: argparse.Namespace, session: Session) -> Compared:
     """Compare with a file, or with what a command writes from round to round."""
     import numpy as np
 
-    from fieldcal.against.rounds import is_command, rounds
-    from fieldcal.against.sensor_model import patched
+    from fieldcal.against.rounds import is_command, run_and_patch
+    from fieldcal.against.sensor_model import patch_model
 
     compare = _comparing(args, session)
     if not is_command(args.against):
         found, said = compare(Path(args.against))
-        return found, patched(found) if args.patch else None, said
+        return found, patch_model(found) if args.patch else None, said
     step = float(np.median(np.diff(session.block.t)))
     form = args.patch or PLAIN
-    done = rounds(args.against, compare, 1 / step, form, args.rounds, _tell)
+    done = run_and_patch(args.against, compare, 1 / step, form, args.rounds, _tell)
     last = done[-1]
     return last.match, last.patch, list(last.says)
 
 
-def _comparing(args: argparse.Namespace, session: Session) -> Compare:
+def _comparing(args: argparse.Namespace, session: Session) -> CompareOutput:
     """By positions, or by the motion where there are too few to tell."""
-    from fieldcal.against import matched
+    from fieldcal.against import compare_sides
     from fieldcal.against.motion.held import holds_positions
-    from fieldcal.against.opening import opened
-    from fieldcal.against.side import side
+    from fieldcal.against.opening import open_simulator_output
+    from fieldcal.against.side import diagnose_side
 
     if args.motion or not holds_positions(session.block, session.about):
         return partial(_in_motion, args, session)
-    real = side(str(args.session), session.block, session.about)
+    real = diagnose_side(str(args.session), session.block, session.about)
 
     def by_positions(path: Path) -> tuple[Match, list[str]]:
-        block, about, said = opened(path, (session.block, session.about))
-        return matched(real, side(args.against, block, about, real)), list(said)
+        block, about, said = open_simulator_output(path, (session.block, session.about))
+        return compare_sides(
+            real, diagnose_side(args.against, block, about, real)
+        ), list(said)
 
     return by_positions
 
@@ -95,11 +97,11 @@ def _in_motion(
     args: argparse.Namespace, session: Session, path: Path
 ) -> tuple[Match, list[str]]:
     """Compare with what follows the motion."""
-    from fieldcal.against.motion import compared_in_motion
+    from fieldcal.against.motion import compare_in_motion
     from fieldcal.against.opening import read_output
 
     read = read_output(path)
-    found = compared_in_motion(
+    found = compare_in_motion(
         (session.block, session.about), read.block, (str(args.session), args.against)
     )
     said = list(read.says)

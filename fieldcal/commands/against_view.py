@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import IO
 
-from fieldcal.against.motion.wording import aligned_as
+from fieldcal.against.motion.wording import alignment_sentence
 from fieldcal.against.result import Match
-from fieldcal.against.wording import lines
+from fieldcal.against.wording import difference_rows
 from fieldcal.calibration.wording import format_unit, position_numbers
 from fieldcal.commands.diagnosis_view import STYLES
 from fieldcal.diagnosis.findings.agreement import UNITS
@@ -39,7 +39,7 @@ def show(
         console.print(found.says, markup=False)
     console.print(_prediction(found))
     if found.aligned is not None and found.differences:
-        console.print(aligned_as(found.aligned), markup=False)
+        console.print(alignment_sentence(found.aligned), markup=False)
     if details:
         if found.differences:
             console.print(f"\n{found.says}", markup=False)
@@ -57,7 +57,7 @@ def _lines(found: Match) -> object:
         table.add_column(name, ratio=ratio)
     table.add_column("real − simulator", ratio=4)
     table.add_column("how sure", no_wrap=True)
-    for cells in lines(found.differences):
+    for cells in difference_rows(found.differences):
         table.add_row(*map(Text, cells))
     return table
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fieldcal.diagnosis import Diagnosis
     from fieldcal.diagnosis.explain import Explanation
     from fieldcal.session.folder import Session
-    from fieldcal.twin import Rerun
+    from fieldcal.twin import ReplayResult
 
 HELP = "say what physics the simulation leaves out of a recording"
 
@@ -134,13 +134,13 @@ def run(args: argparse.Namespace) -> int:
 def _diagnosed(args: argparse.Namespace) -> int:
     """Diagnose one session, and write what was found."""
     from fieldcal.diagnosis.explain import explain
-    from fieldcal.diagnosis.prepare import prepare
-    from fieldcal.diagnosis.verdict import concluded
+    from fieldcal.diagnosis.prepare import prepare_recording
+    from fieldcal.diagnosis.verdict import make_diagnosis
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    explanation = explain(prepare(session.block, session.about))
-    found = concluded(session.block, explanation)
+    explanation = explain(prepare_recording(session.block, session.about))
+    found = make_diagnosis(session.block, explanation)
     again = _replayed(args.twin, session, explanation, found) if args.twin else None
     if again is not None:
         found = replace(found, says=f"{found.says} {again.says}")
@@ -169,13 +169,15 @@ def _diagnosed(args: argparse.Namespace) -> int:
 
 def _replayed(
     path: Path, session: Session, explanation: Explanation, found: Diagnosis
-) -> Rerun:
+) -> ReplayResult:
     """Replay the session on its twin, and write the twin's device file."""
-    from fieldcal.diagnosis.findings.quality import raw
+    from fieldcal.diagnosis.findings.quality import fit_recorded_samples
     from fieldcal.session.folder import write_whole
     from fieldcal.sim_device.profile_file import to_toml
-    from fieldcal.twin import rerun
+    from fieldcal.twin import replay_session
 
-    again = rerun(explanation, found, raw(session.block, explanation))
+    again = replay_session(
+        explanation, found, fit_recorded_samples(session.block, explanation)
+    )
     write_whole(path, to_toml(again.profile))
     return again

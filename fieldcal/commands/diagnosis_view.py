@@ -15,13 +15,13 @@ from fieldcal.core.samples import common_unit
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.findings.agreement import UNITS
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.lines import format_probability, of_verdict
+from fieldcal.diagnosis.wording.lines import format_probability, verdict_probability
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from fieldcal.twin import Rerun
+    from fieldcal.twin import ReplayResult
 
 STYLES = {
     "consistent": "bold green",
@@ -51,7 +51,7 @@ BRIEF = 5.0
 
 def show(
     diagnosis: Diagnosis,
-    again: Rerun | None = None,
+    again: ReplayResult | None = None,
     out: IO[str] | None = None,
     details: bool = False,
     width: int | None = None,
@@ -89,7 +89,9 @@ def _verdict(diagnosis: Diagnosis) -> RenderableType:
 
     verdict = diagnosis.verdict.replace("_", " ")
     head = Text(verdict.upper(), style=STYLES[diagnosis.verdict])
-    sure = of_verdict(diagnosis.verdict, diagnosis.probability, len(diagnosis.lines))
+    sure = verdict_probability(
+        diagnosis.verdict, diagnosis.probability, len(diagnosis.lines)
+    )
     return head + Text(f"  {sure}")
 
 
@@ -301,7 +303,7 @@ def _calibration(diagnosis: Diagnosis) -> object:
     return table
 
 
-def _replays(again: Rerun) -> object:
+def _replays(again: ReplayResult) -> object:
     from rich.table import Table
 
     unit = UNITS[again.triad]

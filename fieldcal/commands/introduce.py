@@ -40,20 +40,24 @@ def introduce(args: argparse.Namespace) -> None:
         If the user does not want it.
 
     """
-    from fieldcal.run.introduction import PLAIN, introduced, unit_by_a_turn
+    from fieldcal.run.introduction import (
+        PLAIN_MOUNTING,
+        introduce_device,
+        rate_unit_from_turn,
+    )
 
     found = _the_one()
     url = found.url
     gravity = args.gravity or STANDARD
     with _opened(url) as driver:
-        known = introduced(_samples(driver), gravity)
+        known = introduce_device(_samples(driver), gravity)
         asks = not args.headless and sys.stdin.isatty()
         if asks and OPEN in url and "gx" in url and "gyr_unit" not in url:
             _tell("turn the device by hand by 45° or more, and put it back ...")
-            unit = unit_by_a_turn(driver.blocks(), gravity, TURN)
+            unit = rate_unit_from_turn(driver.blocks(), gravity, TURN)
             url += f"&gyr_unit={unit}" if unit else ""
     line = f'--device "{url}"'
-    if known.up and not args.mounting and known.mounting != PLAIN:
+    if known.up and not args.mounting and known.mounting != PLAIN_MOUNTING:
         args.mounting = ",".join(known.mounting)
         line += f" --mounting={args.mounting}"
     _tell(f"{found.says.partition(';')[0]}; {known.says}")

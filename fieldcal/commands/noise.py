@@ -140,12 +140,12 @@ def result(
         If the sessions are of several devices, or not long enough at rest.
 
     """
-    from fieldcal.noise import estimate, reduced
-    from fieldcal.noise.alignment import alignment
+    from fieldcal.noise import estimate_noise, reduce_recording
+    from fieldcal.noise.alignment import gyrocompass_heading
     from fieldcal.noise.document import NoiseResult
 
     _check_same(sessions)
-    model = estimate([reduced(_at_rest(s)) for s in sessions])
+    model = estimate_noise([reduce_recording(_at_rest(s)) for s in sessions])
     about = sessions[0].about
     grade = about.grade
     serial = str(about.device.get("serial", ""))
@@ -153,7 +153,7 @@ def result(
     gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
     compass = None
     if grade == "navigation" and gyroscopes:
-        compass = alignment(gyroscopes, about.latitude)
+        compass = gyrocompass_heading(gyroscopes, about.latitude)
     device = {k: str(about.device[k]) for k in ("name", "serial") if k in about.device}
     return NoiseResult(
         [str(s.folder) for s in sessions],
@@ -206,7 +206,7 @@ def _recalibrate(
     from fieldcal.calibration import limits as bounds
     from fieldcal.history.place import default_place
     from fieldcal.history.store import History
-    from fieldcal.noise.recalibration import recalibration
+    from fieldcal.noise.recalibration import recalibration_time
 
     runs = History(history or default_place()).runs(serial) if serial else ()
     allowed = bounds.read(grade, limits)
@@ -218,7 +218,7 @@ def _recalibrate(
         variance = channel.averaging.at(30.0)[0] ** 2
         pair = channel.pair
         unseen = pair.walk / pair.left_out if math.isnan(pair.walk_sigma) else 0.0
-        out[name] = recalibration(
+        out[name] = recalibration_time(
             channel.drawn, channel.ramp, limit, variance, steps, unseen
         )
     dates = [str(run.taken_at) for run in runs if run.taken_at]

@@ -7,8 +7,8 @@ from typing import IO, TYPE_CHECKING
 
 from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.noise.document import NoiseResult
-from fieldcal.noise.estimate import ChannelEstimate, Size
-from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
+from fieldcal.noise.estimate import ChannelEstimate, ProcessSize
+from fieldcal.noise.wording import PROCESSES, TRIADS, consequences, value_or_bound
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,7 +53,7 @@ def _scale(channels: list[ChannelEstimate]) -> tuple[float, str]:
     return next((p for p in PREFIXES if largest >= p[0]), PREFIXES[-1])
 
 
-def _cell(size: Size | None, below: Size | None, scale: float) -> str:
+def _cell(size: ProcessSize | None, below: ProcessSize | None, scale: float) -> str:
     if size is not None:
         return " ± ".join(format_with_sigma(size.value / scale, size.sigma / scale))
     return "–" if below is None else f"< {below.value / scale:.2g}"
@@ -159,7 +159,7 @@ def _follows(console: Console, found: NoiseResult) -> None:
         for name, (value, sigma, unit) in found.programs[program].items():
             text = f"{value_or_bound(value, sigma)} {format_unit(unit)}"
             console.print(f"  {name:30} {text}")
-    for text in follows(found):
+    for text in consequences(found):
         _line(console, f"  {text}")
 
 

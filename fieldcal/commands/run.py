@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.run.companions import Companion
     from fieldcal.run.page.server import PageServer
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 EXAMPLE = """\
   fieldcal run adaptive --latitude 50.45 --angles 0.01
@@ -158,7 +158,7 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; a script is told of its end, whatever that is."""
-    from fieldcal.run.operator.script import report
+    from fieldcal.run.operator.script import report_event
 
     code, said = 0, None
     try:
@@ -174,7 +174,7 @@ def run(args: argparse.Namespace) -> int:
         raise
     finally:
         if args.headless:
-            report("end", exit_code=code, error=said)
+            report_event("end", exit_code=code, error=said)
     return code
 
 
@@ -187,7 +187,7 @@ def _carried_out(args: argparse.Namespace) -> int:
 
 
 def _shown_on(
-    page: PageServer | None, args: argparse.Namespace, task: Task, folder: Path
+    page: PageServer | None, args: argparse.Namespace, task: PlanTask, folder: Path
 ) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
@@ -242,7 +242,7 @@ def _names_none(args: argparse.Namespace) -> bool:
 
 def _record(
     args: argparse.Namespace,
-    task: Task,
+    task: PlanTask,
     folder: Path,
     bounds: GradeLimits,
     page: PageServer | None,
@@ -289,7 +289,7 @@ def _record(
         return found, dict(truth) if truth else None, recorder.others
 
 
-def _unsaid(task: Task) -> list[str]:
+def _unsaid(task: PlanTask) -> list[str]:
     """What nobody said of base, site and angles, without which it is NO-GO."""
     from fieldcal import procedures
     from fieldcal.acceptance.angles import unstated_angles_warning
@@ -304,7 +304,11 @@ def _unsaid(task: Task) -> list[str]:
 
 
 def _take_besides(
-    recorder: Any, task: Task, known: int, again: Sequence[int], taken: dict[int, Any]
+    recorder: Any,
+    task: PlanTask,
+    known: int,
+    again: Sequence[int],
+    taken: dict[int, Any],
 ) -> None:
     """Note the positions that a remedy adds, and those that it takes once more."""
     from fieldcal.session.marks import ADDED

@@ -12,13 +12,13 @@ from fieldcal.core.errors import InputError
 if TYPE_CHECKING:
     from fieldcal.drivers.driver import Driver
     from fieldcal.run.movers import Mover
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 VIRTUAL_FORMAT = "witmotion"
 
 
 @contextlib.contextmanager
-def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
+def device(task: PlanTask) -> Iterator[tuple[Callable[[], Driver], Mover]]:
     """Yield what opens the device, and who turns it."""
     from fieldcal.commands.signals import interruptible
     from fieldcal.commands.virtual import address
@@ -48,7 +48,7 @@ def device(task: Task) -> Iterator[tuple[Callable[[], Driver], Mover]]:
         yield lambda: open_driver(url), turns
 
 
-def _virtual(task: Task) -> list[str]:
+def _virtual(task: PlanTask) -> list[str]:
     site = task.about
     options = ["--serial", VIRTUAL_FORMAT]
     options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from fieldcal.run.movers import Mover
     from fieldcal.run.operator.protocol import Operator
     from fieldcal.run.page.server import PageServer
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 
 @contextlib.contextmanager
 def operator_of(
     args: argparse.Namespace,
-    task: Task,
+    task: PlanTask,
     mover: Mover,
     folder: Path,
     page: PageServer | None,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
     from fieldcal.run.operator.protocol import Operator
     from fieldcal.run.page.server import PageServer
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 LOCAL = "local"
 """What stands for this computer's address on the local network."""
@@ -37,13 +37,13 @@ def served(args: argparse.Namespace) -> Iterator[PageServer | None]:
         yield None
         return
     try:
-        from fieldcal.run.page.server import PageServer, this_computer
+        from fieldcal.run.page.server import PageServer, local_address
     except ImportError as error:
         raise InputError(
             "the page needs starlette, uvicorn and segno: pip install 'fieldcal[page]'"
         ) from error
     host, port = address_of(args.page)
-    with PageServer(this_computer() if host == LOCAL else host, port) as server:
+    with PageServer(local_address() if host == LOCAL else host, port) as server:
         _announce(server, args)
         yield server
 
@@ -69,9 +69,9 @@ def address_of(text: str, option: str = "--page") -> tuple[str, int]:
 def _announce(server: PageServer, args: argparse.Namespace) -> None:
     """Show the address, and a code to scan where there is a terminal."""
     if args.headless:
-        from fieldcal.run.operator.script import report
+        from fieldcal.run.operator.script import report_event
 
-        report("page", address=server.address)
+        report_event("page", address=server.address)
         return
     sys.stderr.write(f"page: {server.address}\n")
     if args.plain or not sys.stderr.isatty():
@@ -92,7 +92,7 @@ def _until_scanned(server: PageServer) -> None:
 
     until = monotonic() + SCANNED
     with Keyboard() as keyboard:
-        while keyboard.there and not server.watched and monotonic() < until:
+        while keyboard.has_keys and not server.watched and monotonic() < until:
             if keyboard.pressed() == "confirm":
                 return
             sleep(0.05)
@@ -101,7 +101,7 @@ def _until_scanned(server: PageServer) -> None:
 def watched(
     operator: Operator,
     server: PageServer | None,
-    task: Task,
+    task: PlanTask,
     title: str,
     most: int | None,
 ) -> Operator:
@@ -125,13 +125,13 @@ def told_end(
     if server is None:
         return
     if broken is not None:
-        server.board.ended("STOPPED", [str(broken) or "interrupted"], False)
+        server.board.run_ended("STOPPED", [str(broken) or "interrupted"], False)
         return
     from fieldcal.commands.run_view import is_go
 
     good = all(map(is_go, results))
     said = [s for found in results for s in _reasons(found)]
-    server.board.ended("GO" if good else "NO-GO", said, good)
+    server.board.run_ended("GO" if good else "NO-GO", said, good)
 
 
 def _reasons(found: Calibration) -> list[str]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
     from fieldcal.history.store import History
     from fieldcal.run.companions import Companion
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
     from fieldcal.session.folder import Session
 
 
@@ -100,7 +100,7 @@ def check_heard(others: Sequence[Companion]) -> None:
 
 
 def write_junit(
-    path: Path, task: Task, folder: Path, result: Any, said: str = ""
+    path: Path, task: PlanTask, folder: Path, result: Any, said: str = ""
 ) -> None:
     """Write what happened as JUnit XML; `result` is None where the run broke off."""
     from fieldcal.acceptance.verification import planned_verification
@@ -121,7 +121,7 @@ def write_junit(
 
 
 def broken_off(
-    args: argparse.Namespace, task: Task, folder: Path, error: BaseException
+    args: argparse.Namespace, task: PlanTask, folder: Path, error: BaseException
 ) -> None:
     """Say what is kept, if anything was recorded; another run's folder is let be."""
     from fieldcal.session.marks import MARKS

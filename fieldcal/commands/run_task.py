@@ -12,7 +12,7 @@ from fieldcal.commands.site import given_tables, overlay, site_tables
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 SESSIONS = Path("sessions")
 """Where runs are recorded that name no folder."""
@@ -27,7 +27,7 @@ OFF = "angle"
 """What is in the name of every effect that makes it stand elsewhere."""
 
 
-def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
+def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     """What is to be done, and the folder it is recorded into.
 
     Raises
@@ -49,14 +49,14 @@ def make_task(args: argparse.Namespace) -> tuple[Task, Path]:
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
-    task = plan_file.task(_stood(overlay(tables, _site(args))), name)
+    task = plan_file.task_from_tables(_stood(overlay(tables, _site(args))), name)
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or SESSIONS / f"{stamp}-{task.procedure}"
 
 
-def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
+def _resumed(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     from fieldcal.run import plan_file
-    from fieldcal.run.session_run import resume
+    from fieldcal.run.session_run import open_for_resume
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")
@@ -65,10 +65,12 @@ def _resumed(args: argparse.Namespace) -> tuple[Task, Path]:
             "--resume goes on with the device and place its session.toml names:"
             " leave those options out"
         )
-    session, tables, args.again = resume(_newest(args.resume))
+    session, tables, args.again = open_for_resume(_newest(args.resume))
     tables["run"] = {**tables["run"], **_given(args)}
     tables = overlay(tables, _site(args))
-    return plan_file.task(tables, f"{session.folder}/session.toml"), session.folder
+    return plan_file.task_from_tables(
+        tables, f"{session.folder}/session.toml"
+    ), session.folder
 
 
 def _newest(folder: Path) -> Path:

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fieldcal.run.plan_file import Task
+    from fieldcal.run.plan_file import PlanTask
 
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
 """Device time after which a script gives a position up, s: with and without a mover."""
@@ -22,7 +22,7 @@ def patience(args: argparse.Namespace) -> float:
     return PATIENCE_HEADLESS if args.headless else PATIENCE
 
 
-def give_up(args: argparse.Namespace, task: Task) -> float | None:
+def give_up(args: argparse.Namespace, task: PlanTask) -> float | None:
     """How long a position is waited for; for a person, for ever."""
     given = task.run.get("give_up_s")
     unturned = task.mover["kind"] == "nothing"
@@ -37,4 +37,4 @@ def asks(args: argparse.Namespace) -> bool:
     """Whether somebody is there who can be asked for more, and can leave it out."""
     from fieldcal.run.operator.keyboard import Keyboard
 
-    return not args.headless and Keyboard().there
+    return not args.headless and Keyboard().has_keys

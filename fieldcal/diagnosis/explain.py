@@ -1,4 +1,8 @@
-"""The explanation of a recording: the best set of causes, and the simulation."""
+"""The explanation of a recording: its best set of causes, and all that is compared.
+
+`explain` searches for the set of causes with the highest evidence. The `Explanation`
+holds the fit of that set, the fit of the calibration alone, and the probabilities.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +16,8 @@ from fieldcal.calibration.names import TILTS
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
-from fieldcal.diagnosis.factory_left import as_good_as_shown, left_by_factory
-from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.factory_left import enlarge_to_shown_grade, factory_error_groups
+from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model import thresholds
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.sinking import NAME as SINKING
@@ -41,27 +45,28 @@ from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turn, Turning
 from fieldcal.session.description import Description
 
-RESUMED = 2
-"""Times that a search goes on with what it looked at only as another name."""
+MOST_RESUMPTIONS = 2
+"""Most times that a search is resumed from an alias that proved better."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What was found.
+    """The best set of causes of a recording, with fits and probabilities.
 
     Attributes
     ----------
-    prepared : the rows it was found in
-    inferred : set, state and search
-    best, base : with what was found, and bias and scale factor alone
-    posterior : probabilities
+    prepared : the recording, with its rows
+    inferred : the best set, the state it was linearised about, and the search
+    best : fit of the best set
+    calibration_only : fit of bias and scale factor alone
+    posterior : probabilities of all causes
 
     """
 
-    prepared: Prepared
+    prepared: PreparedRecording
     inferred: Inferred
     best: Fitted
-    base: Fitted
+    calibration_only: Fitted
     posterior: Posterior
 
     @property
@@ -71,34 +76,34 @@ class Explanation:
 
     @property
     def dictionary(self) -> Dictionary:
-        """What rows were laid to."""
+        """Columns of all causes, and the rows they belong to."""
         return self.best.dictionary
 
     @property
     def state(self) -> State:
-        """Where what was found stands."""
+        """State that the best set was linearised about."""
         return self.inferred.state
 
     @cached_property
-    def in_question(self) -> list[Set]:
-        """Sets that may turn out the best where a position is left out."""
+    def rival_sets(self) -> list[Set]:
+        """Sets that may become the best when a position is held out."""
         visited = list(self.inferred.search.visited.values())
         return in_question(self.best.set, visited)
 
     @cached_property
     def held_out(self) -> HeldOut:
-        """The rows without each of their parts."""
-        return HeldOut(self.best, self.in_question)
+        """Predictions of each position from the others."""
+        return HeldOut(self.best, self.rival_sets)
 
     @cached_property
-    def average(self) -> ModelAverage:
-        """Numbers over all sets that count."""
+    def model_average(self) -> ModelAverage:
+        """Values averaged over all sets with a noticeable weight."""
         around = elsewhere(self.inferred)
         return ModelAverage(self.posterior, around or [self.best.set])
 
     @cached_property
-    def filters(self) -> tuple[Array, Array] | None:
-        """What the way between windows says of filters, as rows; None without it."""
+    def filter_rows(self) -> tuple[Array, Array] | None:
+        """Rows of the turns that determine filters; None without a filter cause."""
         group = self.dictionary.filters
         if group is None:
             return None
@@ -106,7 +111,7 @@ class Explanation:
 
     @cached_property
     def turns(self) -> list[Turn]:
-        """The turns as what was found follows them."""
+        """The turns, integrated with the best set."""
         return self.inferred.inference.turns_by(self.state)
 
     @cached_property
@@ -115,13 +120,13 @@ class Explanation:
         return turns_held_out(self.best, self.inferred.turned)
 
     @cached_property
-    def standing(self) -> tuple[Standing, ...]:
-        """Causes that are likelier there than not."""
+    def probable_causes(self) -> tuple[Standing, ...]:
+        """Causes with a probability above one half."""
         return tuple(self.posterior.standing())
 
     @cached_property
-    def lost_ways(self) -> tuple[tuple[int, int], ...]:
-        """Windows between which the gyroscopes did not follow, likelier than not."""
+    def untracked_turns(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of windows whose turn the gyroscopes probably did not measure."""
         share: dict[tuple[int, ...], float] = {}
         for some, p in self.posterior.weights:
             for cause, group in some.members:
@@ -131,23 +136,23 @@ class Explanation:
                      if p >= thresholds.NAMED)  # fmt: skip
 
     @property
-    def sinks(self) -> bool:
-        """Whether the base turned while it was used, likelier than not."""
+    def base_sinks(self) -> bool:
+        """Whether the base probably turned during the session."""
         return self.posterior.probability([SINKING]) >= thresholds.NAMED
 
     @property
     def undecided(self) -> bool:
-        """Whether something is there, likelier than not, and no cause likely enough."""
-        return not self.standing and self.posterior.nothing < thresholds.NAMED
+        """Whether an effect is probably present, but no single cause is likely."""
+        return not self.probable_causes and self.posterior.nothing < thresholds.NAMED
 
     @cached_property
-    def earth(self) -> float:
-        """By how much the Earth's rate of the model raises ln Z; 0 without it."""
+    def earth_rate_evidence(self) -> float:
+        """Rise of ln Z by the Earth's rate of the model; 0 if the model has none."""
         groups = [g for g in self.dictionary.always if g.cause == "earth"]
-        return self.raised([c for g in groups for c in g.columns])
+        return self.evidence_gain([c for g in groups for c in g.columns])
 
-    def raised(self, columns: Sequence[int]) -> float:
-        """By how much some columns raise ln Z."""
+    def evidence_gain(self, columns: Sequence[int]) -> float:
+        """Rise of ln Z by some columns of the best set."""
         if not columns:
             return 0.0
         found = self.best.set.state
@@ -156,36 +161,41 @@ class Explanation:
         return found.score - less.score
 
     @property
-    def shows_earth(self) -> bool:
-        """Whether the rows show the Earth's rate at all."""
-        return self.earth > thresholds.SHOWS_EARTH
+    def shows_earth_rate(self) -> bool:
+        """Whether the rows as a whole show the Earth's rate."""
+        return self.earth_rate_evidence > thresholds.SHOWS_EARTH
 
     @property
-    def sees_earth(self) -> bool:
-        """Whether tactical gyroscopes see the Earth's rate in a single window."""
+    def each_window_shows_earth_rate(self) -> bool:
+        """Whether the Earth's rate exceeds the noise of a single window's mean."""
         rows, d = self.rows, self.dictionary
-        if not self.shows_earth:
+        if not self.shows_earth_rate:
             return False
         samples = rows.length.sum() / len(d.held) * rate_of(self.prepared.source.block)
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > thresholds.SEES_EARTH)
 
 
-def explain(prepared: Prepared, before: Explanation | None = None) -> Explanation:
-    """Find what explains a recording, beginning with what explained a part of it."""
-    inference = inference_of(prepared.source, prepared.rows, prepared)
-    found = inference.run(None if before is None else _begun(before))
-    posterior = _posterior(found)
-    for _ in range(RESUMED):
+def explain(
+    prepared: PreparedRecording, before: Explanation | None = None
+) -> Explanation:
+    """Find the best set of causes of a recording.
+
+    The search begins with `before`, the explanation of a part of it, if that is given.
+    """
+    inference = build_inference(prepared.source, prepared.rows, prepared)
+    found = inference.run(None if before is None else _starting_causes(before))
+    posterior = _calculate_posterior(found)
+    for _ in range(MOST_RESUMPTIONS):
         better, now = found.search.highest, found.best
-        # the same causes between the points of their grids are as good
+        # the same causes, with shapes between the grid points, are no improvement
         if better.score <= now.score + (
             OWN_SIGMA if better.keys == now.keys else SETTLED
         ):
             break
-        # what may stand in the place of a cause does so better than the cause itself
+        # an alias explains the rows better than the cause that it was an alias of
         found = found.inference.resumed(better, found)
-        posterior = _posterior(found)
+        posterior = _calculate_posterior(found)
     inference = found.inference
     windows = inference.system.linearised(found.state)
     best = Fitted(
@@ -195,24 +205,25 @@ def explain(prepared: Prepared, before: Explanation | None = None) -> Explanatio
         found.values,
         reported(found.search, found.best),
     )
-    as_good_as_shown(inference.dictionary, best.set, prepared.source.about)
+    enlarge_to_shown_grade(inference.dictionary, best.set, prepared.source.about)
     return Explanation(
-        prepared, found, best, base_of(inference, prepared.rows), posterior
+        prepared, found, best, fit_calibration_only(inference, prepared.rows), posterior
     )
 
 
-def _posterior(found: Inferred) -> Posterior:
-    """Probabilities of what was found, and of what may stand in its place."""
+def _calculate_posterior(found: Inferred) -> Posterior:
+    """Probabilities of the causes found, and of their aliases."""
     return Posterior(
         found.search, found.best, lambda there: found.inference.beside(found, there)
     )
 
 
-def _begun(before: Explanation) -> tuple[Member, ...]:
-    """What explained a part of a recording, and the tilt that every base has.
+def _starting_causes(before: Explanation) -> tuple[Member, ...]:
+    """Causes to begin with: those of a part of the recording, and the base tilt.
 
-    Two positions do not show it. Then something else did instead, which more positions
-    contradict, and it would be searched for from nothing.
+    Two positions do not show the tilt, so that another cause takes its place. Further
+    positions contradict that cause; with the tilt in the set, the search need not begin
+    from nothing.
     """
     members = before.best.set.members
     if {cause.name for cause, _ in members} & set(TILTS):
@@ -221,32 +232,36 @@ def _begun(before: Explanation) -> tuple[Member, ...]:
     return (*members, *((cause, cause.variants[0]) for cause in tilts))
 
 
-def inference_of(source: RowSource, rows: Rows, prepared: Prepared) -> Inference:
-    """The inference of some rows, ready to run."""
+def build_inference(
+    source: RowSource, rows: Rows, prepared: PreparedRecording
+) -> Inference:
+    """Set up the inference of some rows: causes, turns and nominal state."""
     about = source.about
-    swayed = any(t.effect.kind == "motion" for t in prepared.tones)
+    swayed = any(t.effect.kind == "motion" for t in prepared.spectral_lines)
     turned = bool(about.positions) and not swayed  # a base that rocks turns it as well
     held = np.unique(rows.x.position)
     common = np.array([rows.common[rows.x.position == p][0] for p in held])
-    nominal = nominal_of(about, int(rows.x.position.max()) + 1, prepared)
+    nominal = nominal_state(about, int(rows.x.position.max()) + 1, prepared)
     unit = np.abs(nominal.scale)
     dictionary = Dictionary(
-        rows.x, rows.used, origins(source, rows), common, unit, turned,
+        rows.x, rows.used, times_since_turn(source, rows), common, unit, turned,
         Wander.of(rows, unit), rows.alike,
     )  # fmt: skip
-    dictionary.unfitted = tuple(left_by_factory(dictionary, about, prepared))
+    dictionary.unfitted = tuple(factory_error_groups(dictionary, about, prepared))
     dictionary.tried_at(change_points(rows).tolist())
     dictionary.expected_within(interruptions(source.block, about))
     grain = grain_of(source.block, spans(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
-    # what sways is taken out of windows and closures; on the way it shakes
+    # swaying is removed from windows and closures, but not from samples within turns
     rough |= "sway" in prepared.checked.ids
     turning = Turning(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(WindowSystem(rows, dictionary), nominal, turns)
 
 
-def nominal_of(about: Description, places: int, prepared: Prepared) -> State:
+def nominal_state(
+    about: Description, places: int, prepared: PreparedRecording
+) -> State:
     """The state that a simulation starts from."""
     nominal = about.nominal
     return State(
@@ -258,12 +273,12 @@ def nominal_of(about: Description, places: int, prepared: Prepared) -> State:
     )
 
 
-def origins(source: RowSource, rows: Rows) -> Array:
-    """Time since the turn, (o, n) s, from each instant that it may count from.
+def times_since_turn(source: RowSource, rows: Rows) -> Array:
+    """Time since the turn, (o, n) s, for each possible origin of that time.
 
-    That is the end of the motion, as each window shows it or a fixed time before each:
-    where it is hard to see, what is usual is the better guess. And before the first
-    window the device may have been turned, or not.
+    The origin is the end of the motion, either as each window shows it, or a fixed time
+    before each window: the usual time is the better guess where the end is hard to see.
+    Each is given with and without a turn before the first window.
     """
     x, arrived = rows.x, source.arrived
     if not source.about.positions:
@@ -280,8 +295,8 @@ def origins(source: RowSource, rows: Rows) -> Array:
     return np.array([x.t - at[x.position] for at in instants])
 
 
-def base_of(whole: Inference, rows: Rows) -> Fitted:
-    """Bias and scale factor alone, refitted to the windows."""
+def fit_calibration_only(whole: Inference, rows: Rows) -> Fitted:
+    """Fit bias and scale factor alone to the windows."""
     d = whole.dictionary.plain()
     inference = Inference(WindowSystem(rows, d), whole.nominal)
     start: Array = np.zeros(d.width)

@@ -1,7 +1,8 @@
-"""What the factory left in a device of errors that no explanation has.
+"""Errors left by the factory calibration that the best set does not contain.
 
-Numbers are less certain for them. They are as large as the stated grade has them, and
-where biases and scale factors show a coarser one, as the rows show.
+They are not fitted, but they widen every uncertainty. Their typical sizes are those of
+the stated grade. Where biases and scale factors show a coarser grade, sizes are means
+over both grades, weighted by their probability.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.core.factory import WARMING, FactoryErrors
 from fieldcal.core.samples import CHANNELS
-from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
@@ -25,12 +26,12 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 
 
-def left_by_factory(
-    dictionary: Dictionary, about: Description, prepared: Prepared
+def factory_error_groups(
+    dictionary: Dictionary, about: Description, prepared: PreparedRecording
 ) -> Iterator[Group]:
-    """What the factory left, but for what the simulation has already.
+    """Columns of the factory errors that the simulation does not have already.
 
-    A warm-up is none of it: the search looks for it as for all that time changes.
+    The warm-up is not among them: the search has a cause for it.
     """
     known = {term.effect.id for term in prepared.known} | {*WARMING}
     turned = not dictionary.x.oriented.any()
@@ -39,8 +40,10 @@ def left_by_factory(
             yield one
 
 
-def as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> None:
-    """Let what the factory left be as large as biases and scale factors make likely."""
+def enlarge_to_shown_grade(
+    dictionary: Dictionary, best: Set, about: Description
+) -> None:
+    """Enlarge the factory errors to the grade that bias and scale factor show."""
     state, nominal = best.state, about.nominal
     sigma = np.sqrt(np.diag(state.inverse))
     names: list[str] = []
@@ -57,19 +60,21 @@ def as_good_as_shown(dictionary: Dictionary, best: Set, about: Description) -> N
     if not shows.because:
         return
     stated, coarser = (factory_errors(about, grade) for grade in (None, shows.grade))
-    larger = _resized(dictionary, stated, coarser)
+    larger = _groups_with_sizes(dictionary, stated, coarser)
     beside = with_groups(best, larger)
     sizes = {}
     for kind, p in chances_of_coarser(beside, larger, coarser, stated).items():
         each = getattr(stated, kind), getattr(coarser, kind)
         sizes[kind] = float(np.sqrt(np.average(np.square(each), weights=(1 - p, p))))
-    dictionary.unfitted = _resized(dictionary, stated, replace(coarser, **sizes))
+    dictionary.unfitted = _groups_with_sizes(
+        dictionary, stated, replace(coarser, **sizes)
+    )
 
 
-def _resized(
+def _groups_with_sizes(
     dictionary: Dictionary, before: FactoryErrors, now: FactoryErrors
 ) -> tuple[Group, ...]:
-    """What the factory left, of other sizes."""
+    """The groups of the factory errors, with their sizes changed."""
     was, sizes = (factory_sizes(dictionary.x, left) for left in (before, now))
     return tuple(
         replace(g, typical=g.typical * sizes[g.part] / was[g.part])

@@ -1,4 +1,4 @@
-"""From a recording to rows that hypotheses can be fitted to."""
+"""Prepares a recording for the diagnosis: checks, removal of lines, reduction."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Block
-from fieldcal.diagnosis.signal.chain import Checked, check, checked_again
-from fieldcal.diagnosis.signal.line import Remains, Tone
-from fieldcal.diagnosis.signal.spectrum import tones, without
+from fieldcal.diagnosis.signal.chain import (
+    CheckedRecording,
+    check_chain,
+    recheck_without_lines,
+)
+from fieldcal.diagnosis.signal.line import LineRemainder, SpectralLine
+from fieldcal.diagnosis.signal.spectrum import find_lines, subtract_lines
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
@@ -30,30 +34,30 @@ from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
 
 SHORTEST = 20
-"""Samples of a window from which it can be used."""
+"""Fewest samples of a window that is used."""
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """A recording, checked, cleaned of lines and reduced.
+class PreparedRecording:
+    """A recording, checked, cleaned of lines and reduced to rows.
 
     Attributes
     ----------
-    checked : what the checks of the chain found
-    source : samples and what rows are made of
+    checked : result of the checks of the signal chain
+    source : samples and description, from which the rows were made
     rows : of the windows
     known : effects that the simulation has already
-    tones : lines found, and taken out of the samples
-    remains : what is left of each
+    spectral_lines : lines that were found and subtracted from the samples
+    line_remainders : mean squares at the frequency of each line
 
     """
 
-    checked: Checked
+    checked: CheckedRecording
     source: RowSource
     rows: Rows
     known: tuple[Term, ...]
-    tones: tuple[Tone, ...]
-    remains: tuple[Remains, ...]
+    spectral_lines: tuple[SpectralLine, ...]
+    line_remainders: tuple[LineRemainder, ...]
 
     @property
     def navigation(self) -> bool:
@@ -61,7 +65,7 @@ class Prepared:
         return self.source.about.grade == "navigation"
 
 
-def prepare(block: Block, about: Description) -> Prepared:
+def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     """Check, clean and reduce a recording.
 
     Raises
@@ -77,36 +81,42 @@ def prepare(block: Block, about: Description) -> Prepared:
     about = about.in_time()
     about.refuse_overlap()
     known = known_terms(about.model)
-    checked = check(block, about)
-    about = about.with_angles_times(checked.angles)
+    checked = check_chain(block, about)
+    about = about.with_angles_times(checked.angle_factor)
     sways = swaying(masked(checked.block, checked.usable), about)
     if sways is not None:
         checked = _without_sway(checked, sways, about)
     rest = arrivals(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
     source = RowSource(
-        checked.block, about, checked.usable, rest, warmth, checked.pace,
+        checked.block, about, checked.usable, rest, warmth, checked.clock_pace,
         *(() if sways is None else (sways.left, sways.white, sways.gravity)),
     )  # fmt: skip
     rows = rows_of(source)
     _refuse_turning(rows, about)
-    lines = tones(source, rows)
+    lines = find_lines(source, rows)
     found = tuple(tone for tone, _ in lines)
     left = tuple(remains for _, remains in lines)
     if found:
-        source = replace(source, block=without(source.block, source, rows, found))
+        source = replace(
+            source, block=subtract_lines(source.block, source, rows, found)
+        )
         rows = _with_vibration(rows_of(source), rows)
-        checked = checked_again(checked, source.block, about)
+        checked = recheck_without_lines(checked, source.block, about)
     if not rows.used.any():
         raise InputError(
             "nothing in the windows can be used: every output is missing, stuck or"
             " clipped there; record them again"
         )
-    return Prepared(checked, source, _warming(rows, warmth), known, found, left)
+    return PreparedRecording(
+        checked, source, _without_constant_temperature(rows, warmth), known, found, left
+    )
 
 
-def _without_sway(checked: Checked, sways: Swaying, about: Description) -> Checked:
-    """The samples as on a base at rest, and that it sways."""
+def _without_sway(
+    checked: CheckedRecording, sways: Swaying, about: Description
+) -> CheckedRecording:
+    """Subtract the swaying of the base; the effect "sway" is added to the faults."""
     size, spread = np.rad2deg(sways.amplitude), np.rad2deg(sways.spread[0])
     fault = Fault(
         channel="gx",
@@ -124,21 +134,21 @@ def _without_sway(checked: Checked, sways: Swaying, about: Description) -> Check
     )
     block = _where(checked.block, sways.block)
     checked = replace(checked, block=block, faults=(*checked.faults, ("sway", fault)))
-    return checked_again(checked, block, about)
+    return recheck_without_lines(checked, block, about)
 
 
 def _where(block: Block, mended: Block) -> Block:
-    """Samples as mended, and as they were where those may not be used."""
+    """The mended samples; the original ones where the mended ones are nan."""
     acc = np.where(np.isfinite(mended.acc), mended.acc, block.acc)
     return replace(
         block, acc=acc, gyr=np.where(np.isfinite(mended.gyr), mended.gyr, block.gyr)
     )
 
 
-def _prepared_means(block: Block, about: Description) -> Prepared:
-    """Means alone: one row each, and no turns between."""
+def _prepared_means(block: Block, about: Description) -> PreparedRecording:
+    """Prepare a session that has means only: one row each, and no turns."""
     about.refuse_overlap()
-    checked = check(block, about)
+    checked = check_chain(block, about)
     warmth = Thermometer.of(block)
     rest = np.full(len(about.positions), -np.inf)
     source = RowSource(block, about, checked.usable, rest, warmth)
@@ -148,20 +158,25 @@ def _prepared_means(block: Block, about: Description) -> Prepared:
             "session.toml says of no position how well its means are known: write"
             " sigma = [ax, ay, az, gx, gy, gz] below each [[position]], m/s^2 and rad/s"
         )
-    return Prepared(
-        checked, source, _warming(rows, warmth), known_terms(about.model), (), ()
+    return PreparedRecording(
+        checked,
+        source,
+        _without_constant_temperature(rows, warmth),
+        known_terms(about.model),
+        (),
+        (),
     )
 
 
 def _with_vibration(calm: Rows, shaken: Rows) -> Rows:
-    """Rows without lines, but with the vibration that these were part of."""
+    """Rows without lines, with the variance of the vibration before subtraction."""
     if len(calm.x) != len(shaken.x):
         return calm
     return replace(calm, x=replace(calm.x, variance=shaken.x.variance))
 
 
-def _warming(rows: Rows, warmth: Thermometer) -> Rows:
-    """Rows without a temperature that did not change."""
+def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
+    """Rows with the temperature set to unknown if it did not change."""
     if warmth.changes:
         return rows
     unknown = np.full(len(rows.x), np.nan)
@@ -182,10 +197,10 @@ def _refuse_empty(block: Block, about: Description) -> None:
 
 
 def _refuse_turning(rows: Rows, about: Description) -> None:
-    """A recording without positions is one window: the device must have been held.
+    """Refuse a recording without positions in which the device is turned.
 
-    Where there are gyroscopes they must tell of the turn as well: an output that leaps
-    turns nothing.
+    Without positions the whole recording is one window. The turn must show in the
+    gyroscopes as well, if there are any: a step of one output is no turn.
     """
     if about.positions or not rows.used[:, :3].all(axis=1).any():
         return
@@ -223,16 +238,16 @@ def known_terms(model: Mapping[str, Mapping[str, Any]]) -> tuple[Term, ...]:
             )
         if isinstance(effect, Chain | Line | Scatter):
             continue
-        values = np.array([_value(name, table, p.name) for p in effect.params])
+        values = np.array([_number(name, table, p.name) for p in effect.params])
         missing = [s.name for s in effect.shapes if s.name not in table]
         if missing:
             raise InputError(f"[model.{name}] needs {missing[0]} as well")
-        shape = {s.name: _value(name, table, s.name) for s in effect.shapes}
+        shape = {s.name: _number(name, table, s.name) for s in effect.shapes}
         out.append(Term(effect, values, shape))
     return tuple(out)
 
 
-def _value(name: str, table: Mapping[str, Any], key: str) -> float:
+def _number(name: str, table: Mapping[str, Any], key: str) -> float:
     value = table.get(key, 0.0)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"[model.{name}] {key} = {value!r} is not a number; mend it")

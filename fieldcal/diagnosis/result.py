@@ -20,7 +20,7 @@ Kind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A value with its standard uncertainty and unit; text where it is no number."""
+    """A value with its standard uncertainty and unit; or a text."""
 
     value: float | str
     sigma: float | None
@@ -31,27 +31,27 @@ class Quantity:
         if isinstance(self.value, str):
             return {"value": self.value}
         return {
-            "value": number(self.value),
-            "sigma": number(self.sigma),
+            "value": json_number(self.value),
+            "sigma": json_number(self.sigma),
             "unit": self.unit,
         }
 
 
 @dataclass(frozen=True, slots=True)
 class Mismatch:
-    """Where simulation and recording part.
+    """Where simulation and recording differ.
 
     Attributes
     ----------
     channel : name in `samples.CHANNELS`, or "t"
-    kind : what it depends on
+    kind : what the difference depends on
     positions : of session.toml, counted from 0
     from_s, to_s : stretch of device time
-    covariate : what it follows
+    covariate : what the difference follows
     rms : size of the residual there, in the channel's unit
     sigma : its significance, standard deviations
     correlation : with the covariate, nan where there is none
-    share : part of its variance that a smooth function of the covariate takes
+    share : part of its variance that a smooth function of the covariate explains
 
     """
 
@@ -72,21 +72,21 @@ class Mismatch:
             "channel": self.channel,
             "kind": self.kind,
             "positions": list(self.positions),
-            "from_s": number(self.from_s),
-            "to_s": number(self.to_s),
+            "from_s": json_number(self.from_s),
+            "to_s": json_number(self.to_s),
             "covariate": self.covariate,
-            "rms": number(self.rms),
-            "sigma": number(self.sigma),
+            "rms": json_number(self.rms),
+            "sigma": json_number(self.sigma),
         }
         if np.isfinite(self.share):
-            out["correlation"] = number(self.correlation)
-            out["share"] = number(self.share)
+            out["correlation"] = json_number(self.correlation)
+            out["share"] = json_number(self.share)
         return out
 
 
 @dataclass(frozen=True, slots=True)
 class FoundEffect:
-    """An effect that is there.
+    """An effect of the catalogue that the recording shows.
 
     Attributes
     ----------
@@ -111,10 +111,10 @@ class FoundEffect:
         """Return the object of diagnosis.json."""
         return {
             "id": self.id,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "parameters": {n: q.to_json() for n, q in self.parameters.items()},
             "aliases": list(self.aliases),
-            "evidence": {n: number(v) for n, v in self.evidence.items()},
+            "evidence": {n: json_number(v) for n, v in self.evidence.items()},
             "moves": {n: q.to_json() for n, q in self.moves.items()},
         }
 
@@ -125,7 +125,7 @@ class EffectLine:
 
     Attributes
     ----------
-    what : its id, and how often it is there
+    what : its id, and how often it was found
     size : its clearest parameter with its sigma and unit
     sure : its probability
     does : what it does to the calibration
@@ -144,13 +144,13 @@ class EffectLine:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How well a model does.
+    """How well a model agrees with the recording.
 
     Attributes
     ----------
     rms : of the residual, in `Diagnosis.unit`
     chi2_per_dof : of the whitened residual
-    held_out_rms : of what was predicted from a fit that had not seen it
+    held_out_rms : residual of rows predicted by a fit that did not include them
     by_channel : held-out rms of each channel, m/s^2 and rad/s
 
     """
@@ -163,10 +163,12 @@ class Quality:
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
         return {
-            "rms": number(self.rms),
-            "chi2_per_dof": number(self.chi2_per_dof),
-            "held_out_rms": number(self.held_out_rms),
-            "held_out_by_channel": {n: number(v) for n, v in self.by_channel.items()},
+            "rms": json_number(self.rms),
+            "chi2_per_dof": json_number(self.chi2_per_dof),
+            "held_out_rms": json_number(self.held_out_rms),
+            "held_out_by_channel": {
+                n: json_number(v) for n, v in self.by_channel.items()
+            },
         }
 
 
@@ -185,10 +187,10 @@ class CalibrationGroup:
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
         return {
-            "value": [number(v) for v in self.value],
-            "sigma": [number(s) for s in self.sigma],
+            "value": [json_number(v) for v in self.value],
+            "sigma": [json_number(s) for s in self.sigma],
             "change_sigmas": [
-                number(c / s) if s > 0 else None
+                json_number(c / s) if s > 0 else None
                 for c, s in zip(self.change, self.sigma, strict=True)
             ],
             "unit": self.unit,
@@ -202,12 +204,12 @@ class Candidate:
     Attributes
     ----------
     id : of the effect
-    delta_chi2 : by how much the squares fall with it alone
+    delta_chi2 : decrease of chi squared with it alone
     delta_bic : the same less ln(rows) for every parameter
-    held_out_gain : part of the held-out rms that goes with it, where it was chosen
-    probability : that it is there
+    held_out_gain : part of the held-out rms that it removes
+    probability : that the recording has it
     chosen : whether it is among the effects found
-    why : why it lost, in words; empty if it did not
+    why : why it was rejected, in words; empty if it was chosen
 
     """
 
@@ -223,10 +225,10 @@ class Candidate:
         """Return the object of diagnosis.json."""
         return {
             "id": self.id,
-            "delta_chi2": number(self.delta_chi2),
-            "delta_bic": number(self.delta_bic),
-            "held_out_gain": number(self.held_out_gain),
-            "probability": number(self.probability),
+            "delta_chi2": json_number(self.delta_chi2),
+            "delta_bic": json_number(self.delta_bic),
+            "held_out_gain": json_number(self.held_out_gain),
+            "probability": json_number(self.probability),
             "chosen": self.chosen,
             "why": self.why,
         }
@@ -264,7 +266,7 @@ class Curve:
             "covariate": self.covariate,
             "unit": self.unit,
             "position": [int(p) for p in self.position],
-            **{n: [number(v) for v in getattr(self, n)] for n in columns},
+            **{n: [json_number(v) for v in getattr(self, n)] for n in columns},
         }
 
 
@@ -276,15 +278,15 @@ class Diagnosis:
     ----------
     verdict : consistent, left_out, ambiguous or unexplained
     probability : that the verdict is right
-    mismatch : where the two part
+    mismatch : where simulation and recording differ
     effects : what is left out
-    unit : of the rms values: of the triad that parts most
+    unit : of the rms values: that of the triad that differs most
     before, after : the simulation without and with the effects
     calibration : with the effects; groups that the recording determines
     warnings : what limits the diagnosis
     says : a paragraph for a person
-    candidates : what was tried on the windows, and why it lost
-    curves : residuals over what they follow, before and after
+    candidates : effects that were tried on the windows, and why they were rejected
+    curves : residuals over their covariate, before and after
     next : what to do in the field now
     lines : the effects, one line each
 
@@ -309,7 +311,7 @@ class Diagnosis:
         """Return the content of diagnosis.json."""
         return {
             "verdict": self.verdict,
-            "probability": number(self.probability),
+            "probability": json_number(self.probability),
             "mismatch": [m.to_json() for m in self.mismatch],
             "effects": [e.to_json() for e in self.effects],
             "fit": {
@@ -327,7 +329,7 @@ class Diagnosis:
         }
 
 
-def number(value: float | None) -> float | None:
+def json_number(value: float | None) -> float | None:
     """A JSON number, or null where there is none."""
     if value is None or not np.isfinite(value):
         return None

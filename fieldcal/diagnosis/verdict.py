@@ -1,4 +1,4 @@
-"""From what was found to a diagnosis."""
+"""Makes the diagnosis of a recording: verdict, effects, numbers and sentences."""
 
 from __future__ import annotations
 
@@ -13,21 +13,28 @@ from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.samples import CHANNELS, GYR, Block
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.findings import found_effects, mismatches
-from fieldcal.diagnosis.findings.agreement import UNITS, Agreement
-from fieldcal.diagnosis.findings.calibrated import calibrated, with_effects
-from fieldcal.diagnosis.findings.candidates import candidates
-from fieldcal.diagnosis.findings.curves import curves
-from fieldcal.diagnosis.findings.filters import of_filters
-from fieldcal.diagnosis.findings.found_effects import Removed
-from fieldcal.diagnosis.findings.quality import (
-    OF_TURNS,
-    after,
-    before,
-    in_turns,
-    parted,
+from fieldcal.diagnosis.findings.agreement import UNITS, ModelResiduals
+from fieldcal.diagnosis.findings.calibrated import (
+    calibration_groups,
+    calibration_of_set,
 )
-from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed, unknown
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.findings.candidates import tried_candidates
+from fieldcal.diagnosis.findings.curves import residual_curves
+from fieldcal.diagnosis.findings.filters import found_filters
+from fieldcal.diagnosis.findings.found_effects import CauseRemoval
+from fieldcal.diagnosis.findings.quality import (
+    TURN_UNIT,
+    explained_residuals,
+    most_different_triad,
+    simulation_residuals,
+    turn_quality,
+)
+from fieldcal.diagnosis.findings.unknown_mismatch import (
+    UnknownMismatch,
+    list_positions,
+    unknown_mismatches,
+)
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.result import (
     Diagnosis,
     FoundEffect,
@@ -36,7 +43,7 @@ from fieldcal.diagnosis.result import (
     Verdict,
 )
 from fieldcal.diagnosis.wording.advice import advice
-from fieldcal.diagnosis.wording.lines import by_impact, lines
+from fieldcal.diagnosis.wording.lines import by_impact, effect_lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
@@ -59,30 +66,35 @@ def diagnose(block: Block, about: Description) -> Diagnosis:
         If nothing in the recording can be used.
 
     """
-    return concluded(block, explain(prepare(block, about)))
+    return make_diagnosis(block, explain(prepare_recording(block, about)))
 
 
-def concluded(block: Block, explanation: Explanation) -> Diagnosis:
-    """What follows from an explanation of the samples of a block."""
-    standing = explanation.standing
-    lost = {s.name: found_effects.removed(explanation, s) for s in standing}
-    first, then = before(block, explanation), after(explanation)
+def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
+    """Make the diagnosis from an explanation of the samples of a block."""
+    standing = explanation.probable_causes
+    lost = {s.name: found_effects.remove_cause(explanation, s) for s in standing}
+    first, then = (
+        simulation_residuals(block, explanation),
+        explained_residuals(explanation),
+    )
     effects = _effects(explanation, lost, then)
     strange = _without_effect(explanation, lost)
-    odd = _impossible(explanation)
+    odd = _impossible_facts(explanation)
     verdict = _verdict(explanation, effects, strange, odd)
-    # so far positions were counted as they were held, from here on as they are listed
+    # positions are counted as held up to here, and as listed in session.toml from here
     numbered = explanation.prepared.source.about.numbered
 
     def counted(one: Mismatch) -> Mismatch:
         return replace(one, positions=tuple(sorted(numbered(one.positions))))
 
-    mismatch = tuple(counted(m) for m in _mismatch(block, explanation, lost, strange))
+    mismatch = tuple(
+        counted(m) for m in _all_mismatches(block, explanation, lost, strange)
+    )
     strange = [replace(u, mismatch=counted(u.mismatch)) for u in strange]
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
         verdict, effects, mismatch, strange, quality, explanation,
-        notes(explanation, _open(explanation)), odd,
+        notes(explanation, _undetermined(explanation)), odd,
     )  # fmt: skip
     return Diagnosis(
         verdict=verdict,
@@ -92,79 +104,93 @@ def concluded(block: Block, explanation: Explanation) -> Diagnosis:
         unit=quality[2],
         before=quality[0],
         after=quality[1],
-        calibration=with_effects(explanation),
+        calibration=calibration_groups(explanation),
         warnings=(*odd, *_warnings(explanation)),
         says=words,
-        candidates=candidates(explanation, effects),
-        curves=tuple(curves(explanation, mismatch, first, then)),
+        candidates=tried_candidates(explanation, effects),
+        curves=tuple(residual_curves(explanation, mismatch, first, then)),
         next=tuple(advice(explanation, by_impact(effects), strange, mismatch, odd)),
-        lines=lines(by_impact(effects)),
+        lines=effect_lines(by_impact(effects)),
     )
 
 
 def _quality(
     explanation: Explanation,
-    lost: Mapping[str, Removed],
-    first: Agreement,
-    then: Agreement,
+    lost: Mapping[str, CauseRemoval],
+    first: ModelResiduals,
+    then: ModelResiduals,
 ) -> tuple[Quality, Quality, str]:
-    """Before, after and the unit: of the windows, or of the turns if only they part."""
+    """Quality before and after, and its unit.
+
+    Of the windows, or of the turns if all causes show in the turns alone.
+    """
     prepared = explanation.prepared
-    of_samples = prepared.tones or prepared.checked.ids
-    if lost and not of_samples and all(map(found_effects.in_turns, lost.values())):
+    of_samples = prepared.spectral_lines or prepared.checked.ids
+    if (
+        lost
+        and not of_samples
+        and all(map(found_effects.shows_mainly_in_turns, lost.values()))
+    ):
         if explanation.inferred.turned:
-            return *in_turns(explanation), OF_TURNS
-    triad = parted(first, then)
+            return *turn_quality(explanation), TURN_UNIT
+    triad = most_different_triad(first, then)
     return first.quality(triad), then.quality(triad), UNITS[triad]
 
 
 def _effects(
-    explanation: Explanation, lost: Mapping[str, Removed], then: Agreement
+    explanation: Explanation, lost: Mapping[str, CauseRemoval], then: ModelResiduals
 ) -> list[FoundEffect]:
     prepared = explanation.prepared
-    found = list(found_effects.of_samples(prepared.checked.faults))
-    for tone, left in zip(prepared.tones, prepared.remains, strict=True):
-        found.append(found_effects.of_tone(tone, left.gain(tone.clear)))
-    for one in explanation.standing:
+    found = list(found_effects.effects_of_faults(prepared.checked.faults))
+    for tone, left in zip(
+        prepared.spectral_lines, prepared.line_remainders, strict=True
+    ):
+        found.append(found_effects.effect_of_line(tone, left.gain(tone.clear_channels)))
+    for one in explanation.probable_causes:
         if one.name in catalogue():
-            found.append(found_effects.of_rows(explanation, one, lost[one.name], then))
-    found += of_filters(explanation)
-    if explanation.sees_earth:
-        evidence = {"delta_chi2": 2 * explanation.earth}
+            found.append(
+                found_effects.effect_of_cause(explanation, one, lost[one.name], then)
+            )
+    found += found_filters(explanation)
+    if explanation.each_window_shows_earth_rate:
+        evidence = {"delta_chi2": 2 * explanation.earth_rate_evidence}
         found.append(FoundEffect("earth_rate", {}, evidence=evidence))
     return found
 
 
 def _without_effect(
-    explanation: Explanation, lost: Mapping[str, Removed]
-) -> list[Unknown]:
-    """Mismatches of causes that are no effects."""
+    explanation: Explanation, lost: Mapping[str, CauseRemoval]
+) -> list[UnknownMismatch]:
+    """Mismatches of causes that are not effects of the catalogue."""
     out = []
-    for one in explanation.standing:
+    for one in explanation.probable_causes:
         if one.name not in catalogue():
             places = list(mismatches.of_unknown(explanation, one, lost[one.name]))
-            out += unknown(explanation, one, places)
+            out += unknown_mismatches(explanation, one, places)
     return out
 
 
 def _verdict(
     explanation: Explanation,
     effects: Sequence[FoundEffect],
-    strange: Sequence[Unknown],
+    strange: Sequence[UnknownMismatch],
     odd: Sequence[str],
 ) -> Verdict:
     if strange or odd:
         return "unexplained"
-    if any(_is_open(explanation, one) for one in explanation.standing):
+    if any(_is_open(explanation, one) for one in explanation.probable_causes):
         return "ambiguous"
     if effects:
         return "left_out"
     return "ambiguous" if explanation.undecided else "consistent"
 
 
-def _impossible(explanation: Explanation) -> list[str]:
-    """Values that no sensor has, and turns that lead elsewhere: some fact is wrong."""
-    found = calibrated(explanation, explanation.best.set)
+def _impossible_facts(explanation: Explanation) -> list[str]:
+    """Sentences about values that no sensor has, and turns that end elsewhere.
+
+    Either means that the description of the recording is wrong.
+    """
+    found = calibration_of_set(explanation, explanation.best.set)
     nominal = explanation.prepared.source.about.nominal
     values = implausible_values(
         tuple(found),
@@ -176,7 +202,10 @@ def _impossible(explanation: Explanation) -> list[str]:
 
 
 def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
-    """Turns that lead elsewhere, without those in which samples were found wrong."""
+    """Turns whose end contradicts the next position, as pairs of position names.
+
+    Turns during which faults of samples were found are left out.
+    """
     source, faults = explanation.prepared.source, explanation.prepared.checked.faults
     t, windows = source.block.t, spans(source.block, source.about)
     wrong = [f for _, f in faults if {f.channel, *f.channels} & {"t", *CHANNELS[GYR]}]
@@ -185,12 +214,12 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
         leaves, arrives = t[windows[p, 1] - 1], t[windows[q, 0]]
         if not any(f.from_s <= arrives and f.to_s >= leaves for f in wrong):
             before, behind = source.about.numbered((p, q))
-            out.append((listed([before]), listed([behind])))
+            out.append((list_positions([before]), list_positions([behind])))
     return out
 
 
 def _is_open(explanation: Explanation, one: Standing) -> bool:
-    """Whether something else may as well be there in the place of a cause."""
+    """Whether an alias, or bias and scale factor, may explain what a cause does."""
     if one.name in catalogue() and catalogue()[one.name].like_calibration:
         return True
     others = explanation.posterior.probability(one.aliases, one.triads)
@@ -198,16 +227,17 @@ def _is_open(explanation: Explanation, one: Standing) -> bool:
 
 
 def _probability(explanation: Explanation, verdict: Verdict) -> float:
-    """Probability that the verdict is right: all reported causes are there, or none.
+    """Probability that the verdict is right.
 
-    Where none can be named, that there is one.
+    That is: all reported causes are present; or none is; or, where none can be named,
+    at least one is.
     """
     posterior = explanation.posterior
     if verdict == "consistent":
         return posterior.nothing
     if verdict == "ambiguous" and explanation.undecided:
         return 1 - posterior.nothing
-    wanted = [{one.name, *one.aliases} for one in explanation.standing]
+    wanted = [{one.name, *one.aliases} for one in explanation.probable_causes]
     return sum(
         w
         for s, w in posterior.weights
@@ -215,31 +245,31 @@ def _probability(explanation: Explanation, verdict: Verdict) -> float:
     )
 
 
-def _mismatch(
+def _all_mismatches(
     block: Block,
     explanation: Explanation,
-    lost: Mapping[str, Removed],
-    strange: Sequence[Unknown],
+    lost: Mapping[str, CauseRemoval],
+    strange: Sequence[UnknownMismatch],
 ) -> list[Mismatch]:
     prepared = explanation.prepared
     windows = spans(block, prepared.source.about)
     out = list(mismatches.of_faults(block.t, windows, prepared.checked.faults))
     out += mismatches.of_tones(explanation)
-    for one in explanation.standing:
+    for one in explanation.probable_causes:
         if one.name in catalogue():
             out += mismatches.of_cause(explanation, one, lost[one.name])
     out += [u.mismatch for u in strange]
     return sorted(out, key=lambda m: -m.sigma)
 
 
-def _open(explanation: Explanation) -> list[str]:
-    """Parameters of what is there that the rows leave open."""
+def _undetermined(explanation: Explanation) -> list[str]:
+    """Full names of parameters of the causes found that the rows do not determine."""
     out = []
-    for one in explanation.standing:
+    for one in explanation.probable_causes:
         effect = catalogue().get(one.name)
         if effect is None:
             continue
-        told = found_effects.parameters(explanation, one)
+        told = found_effects.parameter_estimates(explanation, one)
         for _, group in one.members:
             names = [effect.params[j].name for j in group.params]
             out += [f"{one.name}.{n}" for n in names if n not in told]
@@ -248,7 +278,7 @@ def _open(explanation: Explanation) -> list[str]:
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
     out = list(explanation.prepared.checked.unused)
-    numbers = calibrated(explanation, explanation.best.set)
+    numbers = calibration_of_set(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
         if explanation.rows.used[:, first : first + 3].any():
             spare = _degrees_of_freedom(explanation, first)
@@ -269,7 +299,7 @@ def _warnings(explanation: Explanation) -> tuple[str, ...]:
 
 
 def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
-    """Means of windows less parameters, for one triad."""
+    """Number of window means less number of parameters, for one triad."""
     rows, found = explanation.rows, explanation.best.set.state
     part = slice(first, first + 3)
     held = [

@@ -19,7 +19,7 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
-from fieldcal.windows.noise import short_lag
+from fieldcal.windows.noise import short_lag_noise
 
 RATIO = 1.8
 """Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""
@@ -90,7 +90,7 @@ def _everywhere(recording: CheckedSamples, triad: slice, worst: int) -> bool:
     """Whether an axis of a triad is the noisier one in most windows."""
     found = []
     for first, last in recording.windows:
-        noise = short_lag(recording.six(first, last)[:, triad])
+        noise = short_lag_noise(recording.six(first, last)[:, triad])
         noise = np.maximum(noise, recording.steps[triad])
         if last - first > FEWEST and np.isfinite(noise).all():
             axis, ratio = louder(noise)

@@ -11,8 +11,8 @@ which longer averaging does not mend; `fieldcal.windows.rounding` has the whole 
 Source: B. Widrow, I. Kollar, Quantization Noise, chapter 4.
 
 >>> import numpy as np
->>> sampled = np.hypot(0.3, rounding.least(np.array([1.0])))
->>> np.sqrt(2 * rounding.of_mean(np.array([1.0]), sampled)).round(4)
+>>> sampled = np.hypot(0.3, rounding.least_deviation(np.array([1.0])))
+>>> np.sqrt(2 * rounding.variance_of_mean(np.array([1.0]), sampled)).round(4)
 array([0.0539])
 """
 

@@ -20,8 +20,8 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import ACC
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.found_effects import sizes
-from fieldcal.diagnosis.wording.paragraph import of_the_setup
+from fieldcal.diagnosis.findings.found_effects import random_sizes
+from fieldcal.diagnosis.wording.paragraph import setup_notes
 from fieldcal.effects import catalogue
 from fieldcal.evaluation.omitted_effects import wrong_angle_sentences
 from fieldcal.model import thresholds
@@ -41,10 +41,10 @@ BY_POSITION = ("window", "position", "alpha", "beta", "joints", "force")
 def shown_angle_setting(explanation: Explanation) -> float:
     """Scatter of set angles found in a recording, deg; 0 if none is found."""
     found = [0.0]
-    for one in explanation.standing:
+    for one in explanation.probable_causes:
         effect = catalogue().get(one.name)
         if isinstance(effect, Scatter) and {p.unit for p in effect.params} == {"deg"}:
-            told = sizes(explanation, one).values()
+            told = random_sizes(explanation, one).values()
             found += [q.value for q in told if isinstance(q.value, float)]
     return max(found)
 
@@ -54,7 +54,7 @@ def angle_equivalent_of_offsets(explanation: Explanation) -> float:
     x, d = explanation.rows.x, explanation.dictionary
     unknown = [
         group.columns
-        for one in explanation.standing
+        for one in explanation.probable_causes
         if one.kind == "unknown" and one.name in BY_POSITION
         for _, group in one.members
     ]
@@ -89,7 +89,7 @@ def with_shown_angle_setting(
     found = fit()
     if shown is None:
         return found, []
-    notes = [*wrong_angle_sentences(shown), *of_the_setup(shown)]
+    notes = [*wrong_angle_sentences(shown), *setup_notes(shown)]
     stated, angles = float(options["angle_sigma_deg"]), shown_angle_setting(shown)
     if angles > stated:
         options["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)

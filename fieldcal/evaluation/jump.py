@@ -7,7 +7,7 @@ from dataclasses import replace
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.found_effects import parameters
+from fieldcal.diagnosis.findings.found_effects import parameter_estimates
 
 JUMP = "bias_step"
 
@@ -27,9 +27,9 @@ def with_jump(calibration: Calibration, shown: Explanation) -> Calibration:
     `jump` has the time `at_s`, and under `bias`, by full name, change and standard
     uncertainty, m/s^2 and rad/s, as far as the recording determines them.
     """
-    for standing in shown.standing:
+    for standing in shown.probable_causes:
         if standing.name == JUMP:
-            told = parameters(shown, standing)
+            told = parameter_estimates(shown, standing)
             bias = {
                 NAMES[channel]: [quantity.value, quantity.sigma]
                 for channel, quantity in told.items()

@@ -29,7 +29,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
-from fieldcal.windows.dead_axis import dead_sensors, without_dead
+from fieldcal.windows.dead_axis import dead_sensors, without_dead_axes
 
 ROUNDED = 1e-6
 """Tolerance of a full scale for rounding and conversion of units, as a share of it."""
@@ -158,7 +158,7 @@ def usable_windows(session: Session) -> UsableWindows:
 
 def _without_dead_axes(block: Block) -> Block:
     """The samples with dead axes set to nan."""
-    told = without_dead(block.six)
+    told = without_dead_axes(block.six)
     return replace(block, acc=told[:, :3], gyr=told[:, 3:])
 
 

@@ -21,11 +21,11 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.calibrated import calibrated
-from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, listed
-from fieldcal.diagnosis.prepare import Prepared
-from fieldcal.diagnosis.signal.chain import found_first
-from fieldcal.diagnosis.wording.paragraph import off_by
+from fieldcal.diagnosis.findings.calibrated import calibration_of_set
+from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, list_positions
+from fieldcal.diagnosis.prepare import PreparedRecording
+from fieldcal.diagnosis.signal.chain import find_in_recorded_samples
+from fieldcal.diagnosis.wording.paragraph import angle_errors_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
@@ -65,7 +65,7 @@ def with_repaired_bytes(session: Session) -> tuple[Session, tuple[str, ...]]:
     """The session with wrongly decoded bytes corrected, and sentences about them."""
     if not session.positions:
         return session, ()
-    found = found_first(BYTES, session.block, session.about)
+    found = find_in_recorded_samples(BYTES, session.block, session.about)
     faults = [fault for fault in found if fault.mended is not None]
     if not faults:
         return session, ()
@@ -89,7 +89,7 @@ def omitted_effects(
     explanation: Explanation, calibration: Calibration
 ) -> OmittedEffects:
     """Effects that a recording shows and its calibration does not contain."""
-    out = [s for s in explanation.standing if not _is_included(calibration, s)]
+    out = [s for s in explanation.probable_causes if not _is_included(calibration, s)]
     if not out:
         return OmittedEffects({}, {})
     return OmittedEffects(
@@ -106,7 +106,7 @@ def omitted_effects(
 def wrong_angle_sentences(explanation: Explanation) -> list[str]:
     """Sentences about wrong angles, in one position or wherever they are set."""
     out = []
-    for s in explanation.standing:
+    for s in explanation.probable_causes:
         if s.kind == "position":
             cure = (
                 "mend it before the next recording"
@@ -124,9 +124,9 @@ def _describe_wrong_angles(explanation: Explanation, standing: Standing) -> str:
     """Wrong angles in words, with their positions and sizes."""
     errors = angle_errors(explanation, standing)
     return " and ".join(
-        f"a wrong angle, as {off_by(angles)} in {listed(positions)}"
+        f"a wrong angle, as {angle_errors_text(angles)} in {list_positions(positions)}"
         if angles
-        else f"a wrong angle in {listed(positions)}"
+        else f"a wrong angle in {list_positions(positions)}"
         for positions, angles in errors.items()
     )
 
@@ -158,7 +158,7 @@ def _shift_sigmas(
     kept = tuple(m for m in best.members if m[0].name not in names)
     search = explanation.posterior.search
     less: Set = search.evaluated(kept, search.sizes_of(best, kept))
-    now, before = (calibrated(explanation, one) for one in (best, less))
+    now, before = (calibration_of_set(explanation, one) for one in (best, less))
     return {
         name: float((now[name][0] - before[name][0]) / before[name][1])
         for name in now
@@ -167,7 +167,7 @@ def _shift_sigmas(
 
 
 def with_description_faults(
-    prepared: Prepared, calibration: Calibration
+    prepared: PreparedRecording, calibration: Calibration
 ) -> Calibration:
     """The calibration, marked as bad if session.toml is found to be wrong."""
     sentences = []

@@ -18,8 +18,8 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.grade_shown import GradeShown
 from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.diagnosis.explain import Explanation, explain, origins
-from fieldcal.diagnosis.prepare import Prepared, prepare
+from fieldcal.diagnosis.explain import Explanation, explain, times_since_turn
+from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.evaluation.angles_shown import with_shown_angle_setting
 from fieldcal.evaluation.jump import with_jump
 from fieldcal.evaluation.levelled import with_tilt_shown
@@ -104,15 +104,15 @@ class PreparedSession:
         return rounding_mode(self.session, reported_grain(self.session))
 
     @cached_property
-    def examination(self) -> tuple[Prepared | None, str]:
+    def examination(self) -> tuple[PreparedRecording | None, str]:
         """The checked and reduced recording, or None and the reason."""
         try:
-            return prepare(self.session.block, self.about), ""
+            return prepare_recording(self.session.block, self.about), ""
         except InputError as error:
             return None, str(error)
 
     @property
-    def reduced_recording(self) -> Prepared | None:
+    def reduced_recording(self) -> PreparedRecording | None:
         """The checked and reduced recording; None if it cannot be examined."""
         return self.examination[0]
 
@@ -155,10 +155,10 @@ class PreparedSession:
         likely = () if shown is None else shown.posterior.weights
         return RecordedRows(
             rows,
-            origins(source, rows),
+            times_since_turn(source, rows),
             source if turns else None,
             tuple(WeightedExplanation.of(s, p) for s, p in likely),
-            None if shown is None else shown.filters,
+            None if shown is None else shown.filter_rows,
             tuple(self.rounding.cut_sigma.tolist()),
         )
 

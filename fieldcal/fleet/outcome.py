@@ -10,7 +10,7 @@ from typing import Any
 from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.diagnosis.verdict import concluded
+from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.solution import PreparedSession, solve_prepared
@@ -71,7 +71,7 @@ class SessionTask:
         explanation = prepared.explanation
         diagnosis = None
         if explanation is not None and self.diagnose:
-            diagnosis = concluded(session.block, explanation).to_json()
+            diagnosis = make_diagnosis(session.block, explanation).to_json()
         return replace(
             of_calibration(folder, found, _taken_at(session, found)),
             serial=str(session.about.device.get("serial", "")),

@@ -1,16 +1,28 @@
-"""Random processes of a device at rest: how large, how sure, and what follows.
+"""Random processes of a device at rest: their sizes, and predictions from them.
 
-Here live the processes (`processes`), what a recording is reduced to in one pass
-(`levels`, `disturbed`), their estimation (`cosine`, `likelihood`, `reference`, `terms`,
-`covariates`, `estimate`), and what the answer says of other recordings (`prediction`,
-`filters`, `recalibration`, `alignment`, `averaging`). No effect of the catalogue, no
-position and no calibration is known here. To add a process: its Allan variance and
-covariance in `processes`, the variance of its cosine coefficients in `cosine`.
+`processes` has the Allan variances. `levels` and `disturbed` reduce a recording in one
+pass. `cosine`, `likelihood`, `reference`, `terms`, `covariates` and `estimate` estimate
+the processes. `prediction`, `filters`, `recalibration`, `alignment` and `averaging`
+draw conclusions. The package knows no effects, positions or calibrations. A new process
+needs its Allan variance and covariance in `processes`, and the variance of its cosine
+coefficients in `cosine`.
 """
 
 from __future__ import annotations
 
-from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, Size, estimate
-from fieldcal.noise.reduction import Reduction, reduced
+from fieldcal.noise.estimate import (
+    ChannelEstimate,
+    NoiseModel,
+    ProcessSize,
+    estimate_noise,
+)
+from fieldcal.noise.reduction import Reduction, reduce_recording
 
-__all__ = ["ChannelEstimate", "NoiseModel", "Reduction", "Size", "estimate", "reduced"]
+__all__ = [
+    "ChannelEstimate",
+    "NoiseModel",
+    "Reduction",
+    "ProcessSize",
+    "estimate_noise",
+    "reduce_recording",
+]

@@ -1,10 +1,10 @@
-"""Gyrocompassing: how well, and how soon, gyroscopes at rest find north.
+"""Gyrocompassing: heading error of gyroscopes at rest against averaging time.
 
     sigma_heading(T) = sigma_gyro(T) / (Omega cos(latitude))                       (1)
 
 with the error of a mean over T of the gyroscope that points east (the worst axis). It
-has a least where flicker and walk win over white noise. Source: Titterton and Weston,
-2nd edition, section 10.4. Units: rad, s.
+is least where flicker and random walk begin to exceed white noise. Source: D. Titterton
+and J. Weston, 2nd edition, section 10.4. Units: rad, s.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.noise.averaging import Averaging
+from fieldcal.noise.averaging import AveragingError
 
 NO_NORTH = np.pi / 3**0.5
 """Standard deviation of a heading of which nothing is known, rad."""
@@ -28,8 +28,7 @@ class GyrocompassHeading:
     Attributes
     ----------
     seconds : (t,) s at rest
-    sigma, low, high : (t,) standard deviation of the heading, rad, and what 68 of 100
-        draws have
+    sigma, low, high : (t,) standard deviation of the heading, rad; its 68 % interval
 
     """
 
@@ -40,18 +39,18 @@ class GyrocompassHeading:
 
     @property
     def best(self) -> tuple[float, float, float]:
-        """Seconds at rest after which it gets no better; sigma there, and its ±."""
+        """Time at rest with the least sigma, s; that sigma, and its uncertainty."""
         i = int(np.argmin(self.sigma))
         spread = (self.high[i] - self.low[i]) / 2
         return float(self.seconds[i]), float(self.sigma[i]), float(spread)
 
 
-def alignment(
-    gyroscopes: list[Averaging], latitude: float
+def gyrocompass_heading(
+    gyroscopes: list[AveragingError], latitude: float
 ) -> GyrocompassHeading | None:
-    """Heading from gyroscopes at rest at a latitude, rad, (1); None if they find none.
+    """Heading error of gyroscopes at a latitude, rad, (1); None if they find no north.
 
-    Near a pole nothing of the Earth's rate is level, and north is not found at all.
+    Near a pole the Earth's rate has no level component, and north cannot be found.
     """
     turn = EARTH_RATE * float(np.cos(latitude))
     sigma, low, high = (

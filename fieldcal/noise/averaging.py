@@ -1,12 +1,12 @@
 """How long to average: the error of a mean against its length.
 
-The error of a mean over T, as the next mean would show it, is the Allan deviation
-sigma(T) of the channel's processes. It falls as N / sqrt(T) while noise is white, and
-no longer once flicker, walk or a ramp have as much of it,
+The error of a mean over T, as seen against the next mean, is the Allan deviation
+sigma(T) of the channel's processes. It falls as N / sqrt(T) while noise is white, until
+flicker, random walk or a ramp contribute as much,
 
     sigma^2(T) = 2 N^2 / T                                                         (1)
 
-Its least is what any averaging reaches.
+Its minimum is the best that averaging can reach.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.prediction import Draw
+from fieldcal.noise.prediction import SizeDraw
 from fieldcal.noise.processes import allan_variance
 
 PER_DECADE = 8
 EDGE = 0.01
-"""A recording of 30 s has a sample less, and tells of a mean over 30 s."""
+"""Relative tolerance: a recording of 30 s is one sample shorter than 30 s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Averaging:
+class AveragingError:
     """The error of a mean of one channel.
 
     Attributes
     ----------
     seconds : (t,) lengths of means, s
-    sigma, low, high : (t,) error of such a mean, and what 68 of 100 draws have
-    best : length with the least error, s: middle, low and high; inf where it is longer
-        than the recording tells
-    white_until : length from which noise is no longer mostly white, s, likewise
+    sigma, low, high : (t,) error of such a mean, and its 68 % interval
+    best : length with the least error, s: middle, low and high; inf if it is longer
+        than the recording
+    white_until : length up to which noise is mostly white, s: middle, low and high
 
     """
 
@@ -55,14 +55,14 @@ class Averaging:
         return middle, (high - low) / 2
 
 
-def averaging(
-    drawn: tuple[Draw, ...], ramp: float, dt: float, longest: float
-) -> Averaging:
-    """The error of means up to the length of what was recorded.
+def averaging_error(
+    drawn: tuple[SizeDraw, ...], ramp: float, dt: float, longest: float
+) -> AveragingError:
+    """Error of means, up to the length of the recording.
 
     Parameters
     ----------
-    drawn : sizes of the processes as they may be
+    drawn : draws of the sizes of the processes
     ramp : units per s
     dt, longest : s between samples, and of the longest stretch
 
@@ -78,11 +78,13 @@ def averaging(
     mixed = each > 2 * white[:, None] / seconds  # (1)
     until = np.where(mixed.any(axis=1), seconds[np.argmax(mixed, axis=1)], np.inf)
     low, middle, high = np.sqrt(np.quantile(each, [0.16, 0.5, 0.84], axis=0))
-    return Averaging(seconds, middle, low, high, _three(best), _three(until))
+    return AveragingError(
+        seconds, middle, low, high, _middle_low_high(best), _middle_low_high(until)
+    )
 
 
-def _three(values: Array) -> tuple[float, float, float]:
-    """Middle, low and high of draws of which some may be infinite."""
+def _middle_low_high(values: Array) -> tuple[float, float, float]:
+    """Middle, low and high of draws, some of which may be infinite."""
     ordered = np.sort(values)
     at = [ordered[int(q * (len(ordered) - 1))] for q in (0.5, 0.16, 0.84)]
     return float(at[0]), float(at[1]), float(at[2])

@@ -58,11 +58,11 @@ def markov(n: int, m: int, dt: float, time: float) -> Array:
     a = dt / time
     # of neighbouring means; further ones have exp(-m a) of it each
     next_one = (np.expm1(-m * a) / (m * np.expm1(-a))) ** 2 * np.exp(-a)
-    variance: Array = next_one * _further(n, m * a) + _of_a_mean(m, a)
+    variance: Array = next_one * _lag_sum(n, m * a) + _variance_of_mean(m, a)
     return variance
 
 
-def _of_a_mean(m: int, a: float) -> float:
+def _variance_of_mean(m: int, a: float) -> float:
     """Variance of a mean over m samples of exp(-a |h|)."""
     if m * a < 1e-3:  # the sum below would cancel
         return 1 - a * (m * m - 1) / (3 * m) + a * a * (m * m - 1) / 12
@@ -72,15 +72,15 @@ def _of_a_mean(m: int, a: float) -> float:
 
 
 @lru_cache(maxsize=4)
-def _turns(n: int) -> tuple[NDArray[np.complexfloating], Array]:
-    """exp(iw) of (6), and (-1)^k: a table of many times asks for the same."""
+def _phase_factors(n: int) -> tuple[NDArray[np.complexfloating], Array]:
+    """Factors exp(iw) of (6), and (-1)^k; cached for tables of many times."""
     k = np.arange(1, n)
     return np.exp(1j * np.pi * k / n), np.where(k % 2, -1.0, 1.0)
 
 
-def _further(n: int, x: float) -> Array:
+def _lag_sum(n: int, x: float) -> Array:
     """(A_k - 1) / b of (6) for b = exp(-x)."""
-    turn, sign = _turns(n)
+    turn, sign = _phase_factors(n)
     last = np.exp(-x * (n - 1)) * sign
     rest = 1 - np.exp(-x) * turn
     g = turn / rest - turn * (1 - np.exp(-x) * last) / (n * rest**2)

@@ -1,13 +1,13 @@
-"""What of a channel follows temperature, and its ramp.
+"""Regression of a channel on temperature and time (its ramp).
 
     c_k = sum_i beta_i z_ik + noise of variance S_k                                (1)
     beta = (Z' W Z)^-1 Z' W c,    W = diag(1 / S)                                  (2)
     E (c_k - z_k beta)^2 = S_k (1 - h_k),    h_k = z_k (Z' W Z)^-1 z_k' / S_k      (3)
 
-Coefficients c of the last levels, z those of the thermometer and of the time. S comes
-from a fit of what is left, in turn. A covariate is taken where the gain of held-out
-coefficients, chi^2 / 2 - 1, is more than its standard error, chi. The thermometer's own
-noise would make (2) too small: of each bin only the part of z above that noise counts.
+c are the coefficients of the last levels, z those of the thermometer and of the time. S
+comes from a fit of the residual, in turn. A covariate is accepted if the gain of
+held-out coefficients, chi^2 / 2 - 1, exceeds its standard error, chi. The thermometer's
+own noise would bias (2) low, so only the part of z above that noise is used.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import Powers, likelihood
+from fieldcal.noise.likelihood import Powers, whittle_likelihood
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import rich
+from fieldcal.noise.terms import fit_untimed_terms
 
 ROUNDS = 3
 """Fits of beta and S in turn."""
 
 NOISY = 2.0
-"""A thermometer's bins count as noise up to so many times its quickest ones."""
+"""Bins of a thermometer count as noise up to this multiple of its fastest ones."""
 
 
 @dataclass(frozen=True, slots=True)
-class TakenOut:
-    """What covariates leave of a channel.
+class CovariateFit:
+    """A channel after regression on its covariates.
 
     Attributes
     ----------
-    powers : of what is left, (b, folds)
-    found : value and standard error of each covariate that is taken, by name: "R",
-        channel units per s, and "temperature", per degree
+    powers : of the residual, (b, folds)
+    found : value and standard error of each accepted covariate, by name: "R", channel
+        units per s, and "temperature", per degree
 
     """
 
@@ -44,10 +44,10 @@ class TakenOut:
     found: dict[str, tuple[float, float]]
 
 
-def explained(
+def fit_covariates(
     spectrum: CosineSpectrum, channel: int, covariates: dict[str, Array]
-) -> TakenOut:
-    """Take out of a channel what follows its covariates.
+) -> CovariateFit:
+    """Subtract from a channel what follows its covariates.
 
     Parameters
     ----------
@@ -56,11 +56,12 @@ def explained(
     covariates : coefficients (k,) of each, by name
 
     """
-    best = _fitted(spectrum, channel, {})
+    best = _regress(spectrum, channel, {})
     left = dict(covariates)
     while left:
         tried = [
-            _fitted(spectrum, channel, {**best.used, name: left[name]}) for name in left
+            _regress(spectrum, channel, {**best.used, name: left[name]})
+            for name in left
         ]
         one = max(tried, key=lambda f: f.log_likelihood)
         gained = 2 * (one.log_likelihood - best.log_likelihood)
@@ -68,7 +69,9 @@ def explained(
             break
         best = one
         left = {n: z for n, z in left.items() if n not in best.used}
-    return TakenOut(_powers(spectrum, channel, best.rest, best.weight), best.found)
+    return CovariateFit(
+        _powers_of_rest(spectrum, channel, best.rest, best.weight), best.found
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,7 @@ class _Regression:
     log_likelihood: float
 
 
-def _fitted(
+def _regress(
     spectrum: CosineSpectrum, channel: int, used: dict[str, Array]
 ) -> _Regression:
     values = spectrum.last.values[:, channel]
@@ -90,30 +93,32 @@ def _fitted(
     beta: Array = np.zeros(len(used))
     covariance: Array = np.zeros((len(used), len(used)))
     for _ in range(ROUNDS if used else 1):
-        powers = _powers(spectrum, channel, rest, one)
-        level = rich(spectrum, powers).level
+        powers = _powers_of_rest(spectrum, channel, rest, one)
+        level = fit_untimed_terms(spectrum, powers).level
         each = level[spectrum.last.bin]
         white = z / each[:, None]
         covariance = np.linalg.pinv(z.T @ white)
         beta = covariance @ (white.T @ values)  # (2)
         rest = values - z @ beta
         h = np.sum((white @ covariance) * z, axis=1)  # (3)
-    powers = _powers(spectrum, channel, rest, one)
-    total = likelihood(level, powers.power.sum(axis=1), powers.count.sum(axis=1))
+    powers = _powers_of_rest(spectrum, channel, rest, one)
+    total = whittle_likelihood(
+        level, powers.power.sum(axis=1), powers.count.sum(axis=1)
+    )
     sigma = np.sqrt(np.diag(covariance))
     found = {n: (float(b), float(s)) for n, b, s in zip(used, beta, sigma, strict=True)}
     return _Regression(used, rest, np.clip(1 - h, 1e-9, 1), found, total)
 
 
-def _powers(
+def _powers_of_rest(
     spectrum: CosineSpectrum, channel: int, rest: Array, weight: Array
 ) -> Powers:
-    power, count = spectrum.of(channel, rest, weight)
+    power, count = spectrum.channel_powers(channel, rest, weight)
     return Powers(power, count, np.zeros(len(power), dtype=bool))
 
 
-def thermometer(spectrum: CosineSpectrum, values: Array) -> Array | None:
-    """Coefficients of a temperature above its own noise; None where it is all noise.
+def thermometer_covariate(spectrum: CosineSpectrum, values: Array) -> Array | None:
+    """Coefficients of a temperature above its own noise; None if it is all noise.
 
     Parameters
     ----------

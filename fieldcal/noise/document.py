@@ -10,19 +10,24 @@ from typing import Any
 import numpy as np
 
 from fieldcal.noise.alignment import GyrocompassHeading
-from fieldcal.noise.averaging import Averaging
-from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, Size
-from fieldcal.noise.filters import FilterNoise, kalibr, of_program, ros
+from fieldcal.noise.averaging import AveragingError
+from fieldcal.noise.estimate import ChannelEstimate, NoiseModel, ProcessSize
+from fieldcal.noise.filters import (
+    FilterNoise,
+    kalibr_parameters,
+    program_parameters,
+    ros_covariances,
+)
 from fieldcal.noise.recalibration import CHANCES, Recalibration
 
 FORMAT = 1
 WINDOWS = (10.0, 30.0, 60.0, 300.0)
-"""Averaging times whose error is told, s; 30 to 60 s is what the papers take."""
+"""Averaging times whose error is stated, s; the papers use 30 to 60 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseResult:
-    """What is told of a device.
+    """The noise of a device, with its consequences.
 
     Attributes
     ----------
@@ -30,7 +35,7 @@ class NoiseResult:
     device : name, serial number and grade, as far as they are known
     model : the processes
     recalibrate : when each channel's bias leaves its limit
-    since : date from which that counts, ISO 8601
+    since : start of that time, ISO 8601
     alignment : gyrocompassing; None unless the gyroscopes are of navigation grade
 
     """
@@ -44,20 +49,20 @@ class NoiseResult:
 
     @property
     def programs(self) -> dict[str, FilterNoise]:
-        """What other programs are told."""
+        """Noise parameters for other programs."""
         channels = self.model.channels
         pairs = {name: c.pair for name, c in channels.items()}
         white = {n: (c.processes["N"].value, c.processes["N"].sigma)
                  for n, c in channels.items()}  # fmt: skip
         return {
-            "kalibr": kalibr(pairs),
-            "ros": ros(white, self.model.rate_hz),
-            "ardupilot": of_program("ardupilot", pairs),
-            "px4": of_program("px4", pairs),
+            "kalibr": kalibr_parameters(pairs),
+            "ros": ros_covariances(white, self.model.rate_hz),
+            "ardupilot": program_parameters("ardupilot", pairs),
+            "px4": program_parameters("px4", pairs),
         }
 
     def to_json(self) -> dict[str, Any]:
-        """As noise.json has it."""
+        """Return the content of noise.json."""
         model = self.model
         out: dict[str, Any] = {
             "format": FORMAT,
@@ -71,7 +76,7 @@ class NoiseResult:
             "channels": {n: _channel(c, model) for n, c in model.channels.items()},
             "for": {
                 name: {
-                    key: {"value": value, "sigma": _known(sigma), "unit": unit}
+                    key: {"value": value, "sigma": _finite_or_none(sigma), "unit": unit}
                     for key, (value, sigma, unit) in program.items()
                 }
                 for name, program in self.programs.items()
@@ -93,7 +98,7 @@ class NoiseResult:
 
 def _channel(channel: ChannelEstimate, model: NoiseModel) -> dict[str, Any]:
     seen = channel.measured
-    said = channel.predicted(seen.tau, model.longest)
+    said = channel.predict_allan(seen.tau, model.longest)
     out: dict[str, Any] = {
         "unit": channel.unit,
         "processes": {n: _size(s) for n, s in channel.processes.items()},
@@ -106,7 +111,7 @@ def _channel(channel: ChannelEstimate, model: NoiseModel) -> dict[str, Any]:
             "left_out": channel.pair.left_out,
         },
         "dispersion": channel.dispersion,
-        "filtered_above_hz": _known(channel.filtered_hz),
+        "filtered_above_hz": _finite_or_none(channel.filtered_hz),
         "allan": {
             "tau_s": seen.tau.tolist(),
             "deviation": seen.deviation.tolist(),
@@ -122,23 +127,26 @@ def _channel(channel: ChannelEstimate, model: NoiseModel) -> dict[str, Any]:
     return out
 
 
-def _size(size: Size) -> dict[str, Any]:
-    out = {"value": size.value, "sigma": _known(size.sigma), "unit": size.unit}
+def _size(size: ProcessSize) -> dict[str, Any]:
+    out = {"value": size.value, "sigma": _finite_or_none(size.sigma), "unit": size.unit}
     if not math.isnan(size.time):
-        out |= {"time_s": _known(size.time), "time_sigma_s": _known(size.time_sigma)}
+        out |= {
+            "time_s": _finite_or_none(size.time),
+            "time_sigma_s": _finite_or_none(size.time_sigma),
+        }
     return out
 
 
-def _averaging(found: Averaging) -> dict[str, Any]:
+def _averaging(found: AveragingError) -> dict[str, Any]:
     last = float(found.seconds[-1])
     windows = [w for w in WINDOWS if w <= last]
     return {
         "seconds": windows,
         "sigma": [found.at(w)[0] for w in windows],
         "spread": [found.at(w)[1] for w in windows],
-        "best_s": _known(found.best[0]),
+        "best_s": _finite_or_none(found.best[0]),
         "best_sigma": float(np.min(found.sigma)),
-        "white_until_s": _known(found.white_until[0]),
+        "white_until_s": _finite_or_none(found.white_until[0]),
     }
 
 
@@ -146,12 +154,12 @@ def _times(found: Recalibration) -> dict[str, Any]:
     return {
         "limit": found.limit,
         "chance": list(CHANCES),
-        "after_s": [_known(s) for s in found.seconds],
+        "after_s": [_finite_or_none(s) for s in found.seconds],
         "from_history": found.from_history,
-        "unseen_walk": found.unseen,
+        "unseen_walk": found.by_unseen_walk,
         "by_ramp": found.by_ramp,
     }
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None

@@ -1,7 +1,7 @@
 """The noise of a device from recordings at rest: each channel's processes with their ±.
 
-    from fieldcal.noise import estimate, reduced
-    found = estimate([reduced([block])])
+    from fieldcal.noise import estimate_noise, reduce_recording
+    found = estimate_noise([reduce_recording([block])])
     found.channels["gx"].processes["N"]        # value, sigma, unit
 
 Units: accelerometers m/s^2, gyroscopes rad/s; N per sqrt(Hz), B as the channel, K times
@@ -17,38 +17,43 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, UNITS, Array
-from fieldcal.noise.averaging import Averaging, averaging
-from fieldcal.noise.covariates import explained, thermometer
-from fieldcal.noise.filters import TwoNumbers, two_numbers
+from fieldcal.noise.averaging import AveragingError, averaging_error
+from fieldcal.noise.covariates import fit_covariates, thermometer_covariate
+from fieldcal.noise.filters import FilterNoisePair, fit_filter_noise
 from fieldcal.noise.likelihood import NoiseFit
-from fieldcal.noise.measured import MeasuredAllan, measured
-from fieldcal.noise.prediction import DeviationBand, Draw, draws, predict
-from fieldcal.noise.processes import OF_UNIT
+from fieldcal.noise.measured import MeasuredAllan, measured_allan_deviation
+from fieldcal.noise.prediction import (
+    DeviationBand,
+    SizeDraw,
+    draw_sizes,
+    predict_allan_deviation,
+)
+from fieldcal.noise.processes import PROCESS_UNITS
 from fieldcal.noise.reduction import CHANNELS as NOISY
 from fieldcal.noise.reduction import Reduction
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import FILTERED_HZ, choose
+from fieldcal.noise.terms import FILTERED_HZ, choose_processes
 
 SHORTEST = 30.0
 """Shortest stretch from which noise is estimated, s."""
 
 FEWEST = 5
-"""Draws with a process from which a limit for it is stated."""
+"""Fewest draws with a process from which a limit for it is stated."""
 
 QUICK = 1 / (2 * np.pi * FILTERED_HZ)
-"""Correlation time below which noise is white to a mean over a second, s."""
+"""Correlation time below which noise acts as white on means over a second, s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
-    """How large a process is.
+class ProcessSize:
+    """Size of a process.
 
     Attributes
     ----------
     value, sigma : in `unit`
     unit : of both
-    time, time_sigma : correlation time, s; nan where it has none, inf where it is
-        longer than can be told
+    time, time_sigma : correlation time, s; nan if it has none, inf if it is longer than
+        the recording can show
 
     """
 
@@ -67,40 +72,40 @@ class ChannelEstimate:
     ----------
     name, unit : of the channel
     processes : by symbol: N, Q, B, K, R, and G1, G2 of Gauss-Markov processes
-    limits : of processes that were not found: what they do not exceed, 95 of 100
-    temperature : change per degree that was taken out, with its standard error
-    drawn : sizes as they may be, for predictions
-    measured : Allan deviation
-    pair : what filters with white noise and walk are told
+    limits : upper limits (95 %) of processes that were not found
+    temperature : change per degree that was subtracted, with its standard error
+    drawn : draws of the sizes, for predictions
+    measured : measured Allan deviation
+    pair : white noise and random walk for filters that have only these
     averaging : error of a mean against its length
-    dispersion : as in `Chosen`
+    dispersion : as in `ChosenProcesses`
     filtered_hz : above this frequency the outputs are filtered; inf where they are not
 
     """
 
     name: str
     unit: str
-    processes: dict[str, Size]
-    limits: dict[str, Size]
+    processes: dict[str, ProcessSize]
+    limits: dict[str, ProcessSize]
     temperature: tuple[float, float] | None
-    drawn: tuple[Draw, ...]
+    drawn: tuple[SizeDraw, ...]
     measured: MeasuredAllan
-    pair: TwoNumbers
-    averaging: Averaging
+    pair: FilterNoisePair
+    averaging: AveragingError
     dispersion: float
     filtered_hz: float
     dt: float
 
     @property
     def ramp(self) -> float:
-        """Ramp that was found, units per s."""
+        """Estimated ramp, units per s; 0 if none was found."""
         return self.processes["R"].value if "R" in self.processes else 0.0
 
-    def predicted(self, tau: Array, length: float) -> DeviationBand:
-        """Allan deviation (t,) that a recording of a length, s, will have."""
+    def predict_allan(self, tau: Array, length: float) -> DeviationBand:
+        """Allan deviation (t,) that another recording of `length` s will have."""
         found = self.processes.get("R")
         ramp = (found.value, found.sigma) if found else (0.0, 0.0)
-        return predict(list(self.drawn), tau, length, self.dt, ramp)
+        return predict_allan_deviation(list(self.drawn), tau, length, self.dt, ramp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +131,7 @@ class NoiseModel:
     bridged: float
 
 
-def estimate(recordings: Sequence[Reduction]) -> NoiseModel:
+def estimate_noise(recordings: Sequence[Reduction]) -> NoiseModel:
     """Estimate the noise of a device from its recordings at rest.
 
     Raises
@@ -144,11 +149,11 @@ def estimate(recordings: Sequence[Reduction]) -> NoiseModel:
         )
     kept = [s for s in every if s.samples * s.dt >= min(SHORTEST, longest / 4)]
     spectrum = CosineSpectrum(kept, NOISY)
-    warm = all(r.warm for r in recordings)
+    warm = all(r.has_temperature for r in recordings)
     channels = {
-        name: _channel(spectrum, i, warm)
+        name: _estimate_channel(spectrum, i, warm)
         for i, name in enumerate(CHANNELS)
-        if all(r.known[i] for r in recordings) and spectrum.moves(i)
+        if all(r.known[i] for r in recordings) and spectrum.ever_changes(i)
     }
     if not channels:
         raise InputError(f"none of {', '.join(CHANNELS)} was measured, or ever changes")
@@ -163,41 +168,45 @@ def estimate(recordings: Sequence[Reduction]) -> NoiseModel:
     )
 
 
-def _channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEstimate:
+def _estimate_channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEstimate:
     covariates = {"R": spectrum.last.time}
     if warm:
-        warmth = thermometer(spectrum, spectrum.last.values[:, NOISY])
+        warmth = thermometer_covariate(spectrum, spectrum.last.values[:, NOISY])
         if warmth is not None:
             covariates["temperature"] = warmth
-    left = explained(spectrum, i, covariates)
-    chosen = choose(spectrum, left.powers)
-    drawn = tuple(draws(spectrum, chosen))
-    processes = _sizes(chosen.best, UNITS[i])
+    left = fit_covariates(spectrum, i, covariates)
+    chosen = choose_processes(spectrum, left.powers)
+    drawn = tuple(draw_sizes(spectrum, chosen))
+    processes = _process_sizes(chosen.best, UNITS[i])
     if "R" in left.found:
         value, sigma = left.found["R"]
-        processes["R"] = Size(value, sigma, OF_UNIT["R"].format(UNITS[i]))
+        processes["R"] = ProcessSize(value, sigma, PROCESS_UNITS["R"].format(UNITS[i]))
     free = spectrum.frequency[chosen.powers.free]
     return ChannelEstimate(
         CHANNELS[i],
         UNITS[i],
         processes,
-        _limits(drawn, processes, UNITS[i]),
+        _upper_limits(drawn, processes, UNITS[i]),
         left.found.get("temperature"),
         drawn,
-        measured(spectrum.stretches, i, left.found.get("temperature", (0.0,))[0]),
-        two_numbers(spectrum, chosen, drawn),
-        averaging(drawn, left.found.get("R", (0.0,))[0], spectrum.dt, spectrum.seconds),
+        measured_allan_deviation(
+            spectrum.stretches, i, left.found.get("temperature", (0.0,))[0]
+        ),
+        fit_filter_noise(spectrum, chosen, drawn),
+        averaging_error(
+            drawn, left.found.get("R", (0.0,))[0], spectrum.dt, spectrum.seconds
+        ),
         chosen.dispersion,
         float(free.min()) if len(free) else np.inf,
         spectrum.dt,
     )
 
 
-def _sizes(best: NoiseFit, unit: str) -> dict[str, Size]:
+def _process_sizes(best: NoiseFit, unit: str) -> dict[str, ProcessSize]:
     """Values of the processes with their uncertainty."""
     sigma = np.sqrt(np.diag(best.covariance))
     times = dict(zip(best.timed, range(len(best.terms), len(best.x)), strict=True))
-    out: dict[str, Size] = {}
+    out: dict[str, ProcessSize] = {}
     for i, term in enumerate(best.terms):
         value = float(np.exp(best.x[i] / 2))
         time = time_sigma = np.nan
@@ -209,18 +218,20 @@ def _sizes(best: NoiseFit, unit: str) -> dict[str, Size]:
         name = "B" if term == "BT" else term
         if term == "G":
             name = f"G{1 + sum(key.startswith('G') for key in out)}"
-        said = OF_UNIT[name[0]].format(unit)
-        out[name] = Size(value, value * float(sigma[i]) / 2, said, time, time_sigma)
-    out["N"] = _white(best, out["N"])
+        said = PROCESS_UNITS[name[0]].format(unit)
+        out[name] = ProcessSize(
+            value, value * float(sigma[i]) / 2, said, time, time_sigma
+        )
+    out["N"] = _white_noise_size(best, out["N"])
     order = ("N", "Q", "B", "K", "G1", "G2")
     return {name: out[name] for name in order if name in out}
 
 
-def _white(best: NoiseFit, alone: Size) -> Size:
-    """White noise as means over a second obey it, N^2 + 2 s^2 T of what is quicker.
+def _white_noise_size(best: NoiseFit, alone: ProcessSize) -> ProcessSize:
+    """White noise of means over a second: N^2, plus 2 s^2 T of faster processes.
 
-    A device that filters its outputs has noise with a correlation time of some samples;
-    to a mean over a second it is white.
+    The noise of filtered outputs has a correlation time of some samples. For means over
+    a second it acts as white noise.
     """
     weights = np.zeros(len(best.x))
     weights[best.terms.index("N")] = np.exp(best.x[best.terms.index("N")])
@@ -234,10 +245,10 @@ def _white(best: NoiseFit, alone: Size) -> Size:
     return replace(alone, value=value, sigma=value * sigma / 2)
 
 
-def _limits(
-    drawn: tuple[Draw, ...], found: dict[str, Size], unit: str
-) -> dict[str, Size]:
-    """What processes that were not found do not exceed, 95 of 100."""
+def _upper_limits(
+    drawn: tuple[SizeDraw, ...], found: dict[str, ProcessSize], unit: str
+) -> dict[str, ProcessSize]:
+    """Upper limits (95 %) of processes that were not found."""
     out = {}
     for name, terms in (("B", ("B", "BT")), ("K", ("K",)), ("Q", ("Q",))):
         if name in found:
@@ -249,5 +260,5 @@ def _limits(
         ]
         if len(sizes) >= FEWEST:
             high = float(np.sqrt(np.quantile(sizes, 0.95)))
-            out[name] = Size(high, np.nan, OF_UNIT[name].format(unit))
+            out[name] = ProcessSize(high, np.nan, PROCESS_UNITS[name].format(unit))
     return out

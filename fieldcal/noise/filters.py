@@ -1,13 +1,14 @@
-"""What filters of others are told: white noise and walk alone, of each triad.
+"""Noise parameters for the filters of other programs: white noise and random walk.
 
-A filter has two numbers for a sensor, N and K, and processes may be more. The two are
-fitted to the recording by themselves, and what they leave out is measured,
+A filter has two parameters for a sensor, N and K, while a device may have more
+processes. Both are fitted to the recording without the other processes, and the factor
+by which they are too small is
 
     f^2 = max over tau of sigma^2(tau) / (N^2 / tau + K^2 tau / 3), 1 at least     (1)
 
 with sigma the Allan deviation of all processes, tau from 1 s to a fourth of the
-recording; both numbers are multiplied by f, no more. Of a triad the noisiest axis
-counts. In a filter with the step h, where noise is held for a step,
+recording. Both parameters are multiplied by f. The noisiest axis of a triad is used. In
+a filter with the step h, where noise is held for a step,
 
     white  N / sqrt(h),    bias  K / sqrt(h)   per second                          (2)
 
@@ -25,15 +26,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import fit, likelihood
-from fieldcal.noise.prediction import Draw
+from fieldcal.noise.likelihood import fit_processes, whittle_likelihood
+from fieldcal.noise.prediction import SizeDraw
 from fieldcal.noise.processes import allan_variance
-from fieldcal.noise.reference import most_probable
+from fieldcal.noise.reference import most_probable_sizes
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import Chosen
+from fieldcal.noise.terms import ChosenProcesses
 
 STEP_S = {"ardupilot": 0.012, "px4": 0.01}
-NAMES = {
+PROGRAM_PARAMETERS = {
     "ardupilot": (
         *("EK3_ACC_P_NSE", "EK3_ABIAS_P_NSE"),
         *("EK3_GYRO_P_NSE", "EK3_GBIAS_P_NSE"),
@@ -55,15 +56,15 @@ FilterNoise = dict[str, tuple[float, float, str]]
 
 
 @dataclass(frozen=True, slots=True)
-class TwoNumbers:
-    """White noise and walk that stand for all processes of a channel.
+class FilterNoisePair:
+    """White noise and random walk that replace all processes of a channel.
 
     Attributes
     ----------
     white, white_sigma : N, times `left_out`
-    walk, walk_sigma : K, times `left_out`; where no walk is seen, the one that is not
-        exceeded in 95 of 100, with nan
-    left_out : f of (1)
+    walk, walk_sigma : K, times `left_out`; if no walk is seen, its upper limit (95 %)
+        with the sigma nan
+    left_out : factor f of (1)
 
     """
 
@@ -74,94 +75,102 @@ class TwoNumbers:
     left_out: float
 
 
-def two_numbers(
-    spectrum: CosineSpectrum, chosen: Chosen, drawn: tuple[Draw, ...]
-) -> TwoNumbers:
-    """Fit white noise and walk to a channel, and measure what they leave out."""
+def fit_filter_noise(
+    spectrum: CosineSpectrum, chosen: ChosenProcesses, drawn: tuple[SizeDraw, ...]
+) -> FilterNoisePair:
+    """Fit white noise and random walk to a channel, enlarged by the factor (1)."""
     tau = np.geomspace(1.0, max(spectrum.seconds / 4, 2.0), 24)
     whole = np.mean(
         [allan_variance(d.terms, d.x, tau, spectrum.dt) for d in drawn], axis=0
     )
     white = float(np.median([np.exp(d.x[d.terms.index("N")]) for d in drawn]))
     start = np.log([white, whole[-1] / tau[-1]])
-    pair = fit(spectrum, chosen.powers, ("N", "K"), start)
+    pair = fit_processes(spectrum, chosen.powers, ("N", "K"), start)
     if pair is None:
-        one = fit(spectrum, chosen.powers, ("N",), start[:1])
+        one = fit_processes(spectrum, chosen.powers, ("N",), start[:1])
         if one is None:
             raise AssertionError("white noise is in every bin")
         size = float(np.exp(one.x[0]))
-        factor = _left_out(whole, size / tau)
+        factor = _left_out_factor(whole, size / tau)
         error = float(np.sqrt(one.covariance[0, 0])) / 2
         n = float(np.sqrt(size)) * factor
-        walk = factor * _not_exceeded(spectrum, chosen, size)
-        return TwoNumbers(n, n * error, walk, np.nan, factor)
-    pair = most_probable(spectrum, chosen.powers, pair)
+        walk = factor * _walk_limit(spectrum, chosen, size)
+        return FilterNoisePair(n, n * error, walk, np.nan, factor)
+    pair = most_probable_sizes(spectrum, chosen.powers, pair)
     sizes, spread = np.exp(pair.x), np.sqrt(np.diag(pair.covariance)) / 2
-    factor = _left_out(whole, sizes[0] / tau + sizes[1] * tau / 3)
+    factor = _left_out_factor(whole, sizes[0] / tau + sizes[1] * tau / 3)
     n, k = (np.sqrt(sizes) * factor).tolist()
-    return TwoNumbers(n, n * float(spread[0]), k, k * float(spread[1]), factor)
+    return FilterNoisePair(n, n * float(spread[0]), k, k * float(spread[1]), factor)
 
 
-def _left_out(whole: Array, pair: Array) -> float:
+def _left_out_factor(whole: Array, pair: Array) -> float:
     return float(np.sqrt(max(1.0, np.max(whole / pair))))  # (1)
 
 
-def _not_exceeded(spectrum: CosineSpectrum, chosen: Chosen, white: float) -> float:
-    """K that is not exceeded in 95 of 100, beside white noise of variance N^2.
+def _walk_limit(
+    spectrum: CosineSpectrum, chosen: ChosenProcesses, white: float
+) -> float:
+    """Upper limit (95 %) of K beside white noise of variance N^2.
 
-    The largest whose likelihood is above that of none by no less than a one-sided
-    normal deviation of 1.64 allows.
+    It is the largest K whose likelihood is within a one-sided normal deviation of 1.64
+    of the greatest likelihood.
     """
     used = ~chosen.powers.free
     power = chosen.powers.power[used].sum(axis=1)
     count = chosen.powers.count[used].sum(axis=1)
-    walk, flat = (spectrum.fixed[p][used] for p in ("K", "N"))
-    # from a walk that adds nothing to one that is a thousand times the noise
+    walk, flat = (spectrum.fixed_columns[p][used] for p in ("K", "N"))
+    # from a negligible walk to one of a thousand times the noise
     sizes = white * np.geomspace(1e-4, 1e4, 400) / float((walk / flat).max())
-    each = [likelihood(white * flat + k * walk, power, count) for k in sizes]
+    each = [whittle_likelihood(white * flat + k * walk, power, count) for k in sizes]
     likely = np.flatnonzero(np.array(each) >= max(each) - ONE_SIDED**2 / 2)
     return float(np.sqrt(sizes[likely[-1]]))
 
 
-def worst(pairs: Mapping[str, TwoNumbers], triad: str) -> TwoNumbers | None:
-    """The largest of each number among the axes of a triad; None without any."""
+def noisiest_axes(
+    pairs: Mapping[str, FilterNoisePair], triad: str
+) -> FilterNoisePair | None:
+    """The largest of each parameter among the axes of a triad; None without axes."""
     some = [pair for name, pair in pairs.items() if name[0] == triad]
     if not some:
         return None
     loud = max(some, key=lambda p: p.white)
     slow = max(some, key=lambda p: p.walk)
-    return TwoNumbers(loud.white, loud.white_sigma, slow.walk, slow.walk_sigma,
-                      max(loud.left_out, slow.left_out))  # fmt: skip
+    return FilterNoisePair(loud.white, loud.white_sigma, slow.walk, slow.walk_sigma,
+                           max(loud.left_out, slow.left_out))  # fmt: skip
 
 
-def of_program(program: str, pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
+def program_parameters(
+    program: str, pairs: Mapping[str, FilterNoisePair]
+) -> FilterNoise:
     """Parameters of ArduPilot or PX4, (2)."""
     root = STEP_S[program] ** 0.5
     out: FilterNoise = {}
     for i, triad in enumerate("ag"):
-        if (both := worst(pairs, triad)) is None:
+        if (both := noisiest_axes(pairs, triad)) is None:
             continue
-        white, bias = NAMES[program][2 * i : 2 * i + 2]
+        white, bias = PROGRAM_PARAMETERS[program][2 * i : 2 * i + 2]
         out[white] = both.white / root, both.white_sigma / root, UNITS[2 * i]
         out[bias] = both.walk / root, both.walk_sigma / root, UNITS[2 * i + 1]
     return out
 
 
-def kalibr(pairs: Mapping[str, TwoNumbers]) -> FilterNoise:
-    """Kalibr's four numbers."""
+def kalibr_parameters(pairs: Mapping[str, FilterNoisePair]) -> FilterNoise:
+    """Kalibr's four noise parameters."""
     out: FilterNoise = {}
     for triad, name, unit in (
         ("a", "accelerometer", "m/s^2"),
         ("g", "gyroscope", "rad/s"),
     ):
-        if both := worst(pairs, triad):
+        if both := noisiest_axes(pairs, triad):
             density, walk = both.white, both.walk
             out[f"{name}_noise_density"] = density, both.white_sigma, f"{unit}/sqrt(Hz)"
             out[f"{name}_random_walk"] = walk, both.walk_sigma, f"{unit}*sqrt(Hz)"
     return out
 
 
-def ros(white: Mapping[str, tuple[float, float]], rate_hz: float) -> FilterNoise:
+def ros_covariances(
+    white: Mapping[str, tuple[float, float]], rate_hz: float
+) -> FilterNoise:
     """Variances of single samples for the diagonals of sensor_msgs/Imu.
 
     Parameters

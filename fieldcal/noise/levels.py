@@ -1,11 +1,11 @@
 """A recording reduced in one pass: powers of cosine coefficients, level by level.
 
-Level 0 are the samples; each further level are means over eight of the one below. What
-a level's frequencies can tell is taken there and nowhere else: of stretches of 1024
-means the coefficients k = 64 ... 511 (of samples up to 1023), which are three octaves
-up to half of the means' own highest frequency. The first level that has 16384 means or
-fewer is kept whole; its coefficients go down to one half wave in the recording. Memory
-grows with the logarithm of the length.
+Level 0 are the samples; each further level consists of means over eight values of the
+level below. Each frequency is evaluated in one level only: of stretches of 1024 means
+the coefficients k = 64 ... 511 (of samples up to 1023), three octaves up to half of the
+highest frequency of the means. The first level that has 16384 means or fewer is kept
+whole; its coefficients go down to one half wave in the recording. Memory grows with the
+logarithm of the length.
 
 The powers are summed in bins of an eighth of an octave, and in ten folds, so that some
 can be held out: stretches in turn, or coefficients of the whole in turn.
@@ -24,14 +24,14 @@ SEGMENT = 1024
 FACTOR = 8
 KEPT = 16 * SEGMENT
 LOWEST, HIGHEST = SEGMENT // 16, SEGMENT // 2
-"""Coefficients of a stretch that a level between the samples and the last one has."""
+"""Range of coefficients that a level between the samples and the last one uses."""
 
 FOLDS = 10
 PER_OCTAVE = 8
 """Bins."""
 
 LAGS = (1, 2, 4)
-"""Lengths of means whose differences each level below the last is asked for."""
+"""Lengths of means whose differences are summed in each level below the last."""
 
 
 class LevelSums(NamedTuple):
@@ -53,8 +53,8 @@ class LevelSums(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Reduced:
-    """What one stretch of even samples is reduced to.
+class ReducedStretch:
+    """Result of the reduction of one stretch of evenly spaced samples.
 
     Attributes
     ----------
@@ -81,10 +81,10 @@ class Reduced:
     lags: Index
 
 
-def bins(first: int, end: int) -> Index:
+def octave_bins(first: int, end: int) -> Index:
     """First coefficients of bins of an eighth of an octave, and the end.
 
-    >>> bins(1, 6)
+    >>> octave_bins(1, 6)
     array([1, 2, 3, 4, 5, 6])
     """
     octaves = np.log2(end / first)
@@ -93,7 +93,7 @@ def bins(first: int, end: int) -> Index:
 
 
 class CosineLevels:
-    """Takes samples as they come; `reduced` at the end.
+    """Reduces samples as they come; `reduced` returns the result.
 
     Parameters
     ----------
@@ -120,11 +120,11 @@ class CosineLevels:
             rows = self._levels[number].add(rows)
             number += 1
 
-    def reduced(self) -> Reduced:
+    def reduced(self) -> ReducedStretch:
         """Sums of all levels below the first that is kept whole."""
         last = next(i for i, level in enumerate(self._levels) if level.whole)
         below = self._levels[:last]
-        return Reduced(
+        return ReducedStretch(
             self._dt,
             self._levels[0].count,
             tuple(level.sums() for level in below),
@@ -148,7 +148,7 @@ class _Level:
         self.kept: list[Array] = []
         self.squares = np.zeros((len(LAGS), noisy))
         self.number = np.zeros(len(LAGS))
-        self._edges = bins(LOWEST, HIGHEST if level else SEGMENT)
+        self._edges = octave_bins(LOWEST, HIGHEST if level else SEGMENT)
         self._power = np.zeros((len(self._edges) - 1, FOLDS, noisy))
         self._segments = np.zeros(FOLDS)
         self._done = 0
@@ -209,13 +209,13 @@ class _Level:
         new = len(rows)
         for i, lag in enumerate(LAGS):
             first = max(0, len(some) - new - 2 * lag + 1)
-            steps = neighbours(some[first:], lag)
+            steps = neighbour_differences(some[first:], lag)
             self.squares[i] += np.einsum("nc,nc->c", steps, steps)
             self.number[i] += len(steps)
         self._tail = some[-(2 * LAGS[-1] - 1) :].copy()
 
 
-def neighbours(rows: Array, lag: int) -> Array:
+def neighbour_differences(rows: Array, lag: int) -> Array:
     """Differences of neighbouring means over `lag` rows, overlapping, (n', c)."""
     if len(rows) < 2 * lag:
         return np.empty((0, rows.shape[1]))

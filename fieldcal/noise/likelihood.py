@@ -25,25 +25,25 @@ from fieldcal.noise.spectrum import CosineSpectrum
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
-TIMED = ("G", "BT")
+TIMED_TERMS = ("G", "BT")
 """Terms that have a correlation time: Gauss-Markov, and flicker up to one."""
 
 MOST_STEPS = 60
 LONGEST_STEP = 1.5
 CLOSE = 1e-4
 NOTHING = 0.05
-"""Information about the log of a variance below which its process is not there: what is
-known of it then spans a factor of eighty."""
+"""Least information about the log of a variance for its process to be kept: below it,
+the uncertainty of the variance spans a factor of eighty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Powers:
-    """What is to be explained of one channel.
+    """Powers of one channel, to which processes are fitted.
 
     Attributes
     ----------
-    power, count : (b, folds) sums of squares, and of how many
-    free : (b,) bins that are described by their own level
+    power, count : (b, folds) sums of squares, and their numbers
+    free : (b,) bins that are left out of the fit and have a level of their own
 
     """
 
@@ -52,7 +52,7 @@ class Powers:
     free: Flags
 
     def scaled(self, dispersion: float) -> Powers:
-        """With coefficients that tell as much less as they scatter more."""
+        """Powers with the information reduced by a dispersion."""
         return replace(
             self, power=self.power / dispersion, count=self.count / dispersion
         )
@@ -82,16 +82,16 @@ class NoiseFit:
 
     @property
     def covariance(self) -> Array:
-        """Of x."""
+        """Covariance of x."""
         return np.linalg.pinv(self.information, hermitian=True)
 
     @property
     def timed(self) -> list[int]:
-        """Places in `terms` of those with a correlation time."""
-        return [i for i, term in enumerate(self.terms) if term in TIMED]
+        """Indices of the terms with a correlation time."""
+        return [i for i, term in enumerate(self.terms) if term in TIMED_TERMS]
 
 
-def levels_of(
+def expected_powers(
     spectrum: CosineSpectrum, terms: tuple[str, ...], x: Array
 ) -> tuple[Array, Array]:
     """Expected powers (b,) and the gradient of their logarithms (b, p), (1)."""
@@ -99,7 +99,7 @@ def levels_of(
     columns = np.empty((len(spectrum.frequency), len(x)))
     for i, term in enumerate(terms):
         size = np.exp(x[i])
-        if term in TIMED:
+        if term in TIMED_TERMS:
             j = next(times)
             of = spectrum.markov if term == "G" else spectrum.flicker
             column, slope = of(float(x[j]))
@@ -111,35 +111,37 @@ def levels_of(
     return level, columns / level[:, None]
 
 
-def information_of(powers: Powers, slopes: Array) -> Array:
+def information_matrix(powers: Powers, slopes: Array) -> Array:
     """J of (3), (p, p), by slopes (b, p) of the logarithms of expected powers."""
     count = np.where(powers.free, 0.0, powers.count.sum(axis=1))
     information: Array = 0.5 * slopes.T @ (count[:, None] * slopes)
     return information
 
 
-def likelihood(level: Array, power: Array, count: Array) -> float:
+def whittle_likelihood(level: Array, power: Array, count: Array) -> float:
     """Log likelihood of sums of squares, (2)."""
     return -0.5 * float(np.sum(count * np.log(level) + power / level))
 
 
-def fit(
+def fit_processes(
     spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], start: Array
 ) -> NoiseFit | None:
-    """Most likely sizes; None where one of the processes is not there at all."""
+    """Fit processes by maximum likelihood; None if one of them vanishes."""
     used = ~powers.free
     power, count = powers.power[used].sum(axis=1), powers.count[used].sum(axis=1)
-    within = bounds(spectrum, terms)
+    within = parameter_bounds(spectrum, terms)
     x = np.clip(start, *within)
-    level, slopes = (a[used] for a in levels_of(spectrum, terms, x))
-    best, damping = likelihood(level, power, count), 1e-3
+    level, slopes = (a[used] for a in expected_powers(spectrum, terms, x))
+    best, damping = whittle_likelihood(level, power, count), 1e-3
     for _ in range(MOST_STEPS):
         gradient = 0.5 * slopes.T @ (power / level - count)
         information = 0.5 * slopes.T @ (count[:, None] * slopes)
         step = _step(information, gradient, damping)
         trial = np.clip(x + step, *within)
-        trial_level, trial_slopes = (a[used] for a in levels_of(spectrum, terms, trial))
-        found = likelihood(trial_level, power, count)
+        trial_level, trial_slopes = (
+            a[used] for a in expected_powers(spectrum, terms, trial)
+        )
+        found = whittle_likelihood(trial_level, power, count)
         if not found >= best:
             damping *= 8
             if damping > 1e8:
@@ -153,12 +155,14 @@ def fit(
             return None
         if moved < CLOSE or (gained < 1e-6 and moved < 0.1):
             break
-    return _finished(spectrum, powers, terms, x)
+    return _finished_fit(spectrum, powers, terms, x)
 
 
-def bounds(spectrum: CosineSpectrum, terms: tuple[str, ...]) -> tuple[Array, Array]:
+def parameter_bounds(
+    spectrum: CosineSpectrum, terms: tuple[str, ...]
+) -> tuple[Array, Array]:
     """Least and greatest of each parameter, (p,) both."""
-    times = sum(term in TIMED for term in terms)
+    times = sum(term in TIMED_TERMS for term in terms)
     low, high = spectrum.log_times
     return (
         np.array([-np.inf] * len(terms) + [low] * times),
@@ -174,23 +178,23 @@ def _step(information: Array, gradient: Array, damping: float) -> Array:
     return out
 
 
-def _finished(
+def _finished_fit(
     spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], x: Array
 ) -> NoiseFit:
-    level, slopes = levels_of(spectrum, terms, x)
+    level, slopes = expected_powers(spectrum, terms, x)
     used = np.where(powers.free, 0.0, 1.0)
     count = powers.count * used[:, None]
     power = powers.power * used[:, None]
-    information = information_of(powers, slopes)
-    total = likelihood(level, power.sum(axis=1), count.sum(axis=1))
+    information = information_matrix(powers, slopes)
+    total = whittle_likelihood(level, power.sum(axis=1), count.sum(axis=1))
     total += _free_likelihood(powers)
     scores = np.empty(count.shape[1])
     for f in range(len(scores)):
         own = 0.5 * slopes.T @ (count[:, f][:, None] * slopes)
         gradient = 0.5 * slopes.T @ (power[:, f] / level - count[:, f])
         held = x - _step(information - own, gradient, 1e-6)
-        held_level = levels_of(spectrum, terms, held)[0]
-        scores[f] = likelihood(held_level, power[:, f], count[:, f])
+        held_level = expected_powers(spectrum, terms, held)[0]
+        scores[f] = whittle_likelihood(held_level, power[:, f], count[:, f])
     scores += _free_scores(powers)
     return NoiseFit(terms, x, information, level, total, scores)
 
@@ -213,4 +217,4 @@ def _free_likelihood(powers: Powers) -> float:
     power, count = (a[powers.free].sum(axis=1) for a in (powers.power, powers.count))
     there = (count > 0) & (power > 0)
     power, count = power[there], count[there]
-    return likelihood(power / count, power, count)
+    return whittle_likelihood(power / count, power, count)

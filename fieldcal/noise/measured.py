@@ -1,8 +1,8 @@
-"""The Allan deviation that was measured, from what a recording was reduced to.
+"""The measured Allan deviation, from a reduced recording.
 
     sigma^2(tau) = <(y_k+1 - y_k)^2> / 2          y: means over tau, overlapping     (1)
 
-Of several stretches the squares of all count. Source: IEEE 952-1997 annex C.
+The squares of all stretches are added. Source: IEEE 952-1997 annex C.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.levels import Reduced, neighbours
+from fieldcal.noise.levels import ReducedStretch, neighbour_differences
 
 FEWEST = 2
-"""Averaging times that a stretch holds twice over count."""
+"""Fewest pairs of means in a stretch at an averaging time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class MeasuredAllan:
     ----------
     tau : (t,) s
     deviation : (t,)
-    length : (t,) of the stretches it is from, together, s
+    length : (t,) total length of the stretches used, s
 
     """
 
@@ -36,8 +36,8 @@ class MeasuredAllan:
     length: Array
 
 
-def measured(
-    stretches: Sequence[Reduced], channel: int, per_degree: float = 0.0
+def measured_allan_deviation(
+    stretches: Sequence[ReducedStretch], channel: int, per_degree: float = 0.0
 ) -> MeasuredAllan:
     """Allan deviation of a channel at averaging times a factor of two apart.
 
@@ -45,18 +45,18 @@ def measured(
     ----------
     stretches : reduced, the thermometer their last column
     channel : which
-    per_degree : what follows the temperature, taken out where means are kept
+    per_degree : temperature coefficient, subtracted where means are kept
 
     """
     sums: dict[int, list[float]] = {}
     for s in stretches:
         for lag, row, number in zip(s.lags, s.squares, s.number, strict=True):
-            _count(sums, int(lag), float(row[channel]), float(number), s)
+            _add_squares(sums, int(lag), float(row[channel]), float(number), s)
         y = s.means[:, channel] - per_degree * s.means[:, -1]
         lag = 1
         while lag * 2 * FEWEST <= len(y):
-            steps = neighbours(y[:, None], lag)
-            _count(sums, lag * s.m, float(np.sum(steps**2)), float(len(steps)), s)
+            steps = neighbour_differences(y[:, None], lag)
+            _add_squares(sums, lag * s.m, float(np.sum(steps**2)), float(len(steps)), s)
             lag *= 2
     dt = float(np.median([s.dt for s in stretches]))
     lags = sorted(lag for lag in sums if sums[lag][1])
@@ -65,8 +65,12 @@ def measured(
     return MeasuredAllan(np.array(lags) * dt, deviation, table[:, 2])
 
 
-def _count(
-    sums: dict[int, list[float]], lag: int, squares: float, number: float, s: Reduced
+def _add_squares(
+    sums: dict[int, list[float]],
+    lag: int,
+    squares: float,
+    number: float,
+    s: ReducedStretch,
 ) -> None:
     row = sums.setdefault(lag, [0.0, 0.0, 0.0])
     row[0] += squares

@@ -1,9 +1,10 @@
 """The Allan deviation that another recording of the device will have.
 
-A band holds what is not known of the processes (how large, and which, by the weights of
-`terms`), and the scatter of the estimate from a recording of its length. The sizes are
-drawn from their density with the reference prior (`reference`): from the normal
-distribution about its maximum, weighted by the density and drawn again (Rubin 1987).
+A band includes the uncertainty of the processes (their sizes, and which of them, by the
+weights of `terms`), and the scatter of an estimate from a recording of that length. The
+sizes are drawn from their density with the reference prior (`reference`): drawn from
+the normal distribution about its maximum, weighted by the density, and drawn again
+(Rubin 1987).
 """
 
 from __future__ import annotations
@@ -13,30 +14,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import NoiseFit, bounds
+from fieldcal.noise.likelihood import NoiseFit, parameter_bounds
 from fieldcal.noise.processes import (
     FAR,
     STEPS,
     allan_variance,
-    covariances,
-    freedom,
+    degrees_of_freedom,
+    difference_covariances,
 )
 from fieldcal.noise.reference import SizeDensity
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import Chosen
+from fieldcal.noise.terms import ChosenProcesses
 
 DRAWS = 200
 SHAPES = 8
 WIDER = 1.3
-"""Standard deviations of what is drawn from, so that the tails are there."""
+"""Factor that widens the distribution that is drawn from, to cover the tails."""
 
 FURTHEST = 3.0
-"""No logarithm is drawn further from its maximum."""
+"""Largest distance of a drawn logarithm from the maximum."""
 
 
 @dataclass(frozen=True, slots=True)
-class Draw:
-    """Sizes of processes as they may be, with how often they were drawn."""
+class SizeDraw:
+    """One draw of the sizes of processes."""
 
     terms: tuple[str, ...]
     x: Array
@@ -44,13 +45,14 @@ class Draw:
 
 @dataclass(frozen=True, slots=True)
 class DeviationBand:
-    """What the Allan deviation of another recording will be.
+    """Predicted Allan deviation of another recording.
 
     Attributes
     ----------
     tau : (t,) s
-    median, low, high : (t,) deviation, and what holds 68 of 100
-    variance, freedom : (t, d) of each draw, of which the estimate is chi squared
+    median, low, high : (t,) deviation, and its 68 % interval
+    variance, freedom : (t, d) Allan variance of each draw, and the degrees of freedom
+        of its estimate
 
     """
 
@@ -75,46 +77,48 @@ class DeviationBand:
         return found
 
 
-def draws(spectrum: CosineSpectrum, chosen: Chosen, seed: int = 0) -> list[Draw]:
-    """Sizes of the processes of a channel as they may be."""
+def draw_sizes(
+    spectrum: CosineSpectrum, chosen: ChosenProcesses, seed: int = 0
+) -> list[SizeDraw]:
+    """Draw sizes of the processes of a channel from their probability density."""
     rng = np.random.default_rng(seed)
-    out: list[Draw] = []
-    for weight, one in chosen.others:
+    out: list[SizeDraw] = []
+    for weight, one in chosen.weighted_fits:
         number = round(weight * DRAWS)
         if number:
-            out += _of_fit(spectrum, chosen, one, number, rng)
+            out += _draws_of_fit(spectrum, chosen, one, number, rng)
     return out
 
 
-def _of_fit(
+def _draws_of_fit(
     spectrum: CosineSpectrum,
-    chosen: Chosen,
+    chosen: ChosenProcesses,
     one: NoiseFit,
     number: int,
     rng: np.random.Generator,
-) -> list[Draw]:
+) -> list[SizeDraw]:
     values, axes = np.linalg.eigh(one.covariance)
     spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
     standard = rng.standard_normal((2 * number, len(one.x)))
     steps = np.clip(standard @ spread.T, -FURTHEST, FURTHEST)
-    tried = np.clip(one.x + steps, *bounds(spectrum, one.terms))
+    tried = np.clip(one.x + steps, *parameter_bounds(spectrum, one.terms))
     weights = _density(spectrum, chosen, one, tried)
     weights += 0.5 * np.sum(standard**2, axis=1)
     chance = np.exp(weights - weights.max())
     picked = rng.choice(len(tried), number, p=chance / chance.sum())
-    return [Draw(one.terms, tried[i]) for i in picked]
+    return [SizeDraw(one.terms, tried[i]) for i in picked]
 
 
 def _density(
-    spectrum: CosineSpectrum, chosen: Chosen, one: NoiseFit, tried: Array
+    spectrum: CosineSpectrum, chosen: ChosenProcesses, one: NoiseFit, tried: Array
 ) -> Array:
     """Log density (d,) of sizes and times (d, p)."""
     sizes = tried[:, : len(one.terms)]
     if not one.timed:
         of = SizeDensity.of(spectrum, chosen.powers, one.terms, one.x)
-        return of.at(sizes)
+        return of.log_density(sizes)
     each = [
-        SizeDensity.of(spectrum, chosen.powers, one.terms, x).at(
+        SizeDensity.of(spectrum, chosen.powers, one.terms, x).log_density(
             x[None, : len(one.terms)]
         )
         for x in tried
@@ -122,8 +126,8 @@ def _density(
     return np.concatenate(each)
 
 
-def predict(
-    drawn: list[Draw],
+def predict_allan_deviation(
+    drawn: list[SizeDraw],
     tau: Array,
     length: float,
     dt: float,
@@ -133,7 +137,7 @@ def predict(
 
     Parameters
     ----------
-    drawn : of `draws`
+    drawn : from `draw_sizes`
     tau : (t,) averaging times, s
     length : of the recording, s
     dt : s between samples
@@ -144,11 +148,13 @@ def predict(
     rng = np.random.default_rng(0)
     slope = ramp[0] + ramp[1] * rng.standard_normal(len(drawn))
     variance += slope**2 * tau[:, None] ** 2 / 2
-    # how an estimate scatters depends on the sizes little: some of them tell it
+    # the scatter of an estimate depends little on the sizes: a few draws suffice
     some = drawn[:: max(1, len(drawn) // SHAPES)]
     shapes = [
         [
-            freedom(covariances(d.terms, d.x, t, dt, FAR * STEPS), t, length)
+            degrees_of_freedom(
+                difference_covariances(d.terms, d.x, t, dt, FAR * STEPS), t, length
+            )
             for d in some
         ]
         for t in tau.tolist()

@@ -1,4 +1,4 @@
-"""Allan variance of each process, and how its estimate from a recording scatters.
+"""Allan variance of each process, and the scatter of its estimate from a recording.
 
 With the generalised covariance G(s) of the integral of a process, the half square of
 the difference of neighbouring means has at lag h the covariance
@@ -23,9 +23,9 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import TIMED
+from fieldcal.noise.likelihood import TIMED_TERMS
 
-OF_UNIT = {
+PROCESS_UNITS = {
     "N": "{}/√Hz",
     "Q": "{}·s",
     "B": "{}",
@@ -33,16 +33,16 @@ OF_UNIT = {
     "R": "{}/s",
     "G": "{}",
 }
-"""Unit of each process, of that of the channel."""
+"""Unit of each process, from that of the channel."""
 
 STEPS = 8
-"""Differences that are taken in each averaging time: more of them tell no more."""
+"""Differences in each averaging time; more of them add no information."""
 
 NODES = 33
-"""Correlation times in flicker that is cut off."""
+"""Number of correlation times that make up flicker with a cut-off."""
 
 FAR = 12
-"""Averaging times after which differences have nothing in common."""
+"""Distance of uncorrelated differences, in averaging times."""
 
 
 def allan_variance(
@@ -57,37 +57,39 @@ def allan_variance(
     finest : shortest correlation time in flicker that is cut off, s
 
     """
-    at_two = generalised(terms, x, np.concatenate([tau, 2 * tau]), finest)
+    at_two = generalised_covariance(terms, x, np.concatenate([tau, 2 * tau]), finest)
     one, two = np.split(at_two, 2)
-    zero = generalised(terms, x, np.zeros(1), finest)[0]
+    zero = generalised_covariance(terms, x, np.zeros(1), finest)[0]
     variance: Array = (3 * zero - 4 * one + two) / tau**2  # (1) at h = 0
     return variance
 
 
-def covariances(
+def difference_covariances(
     terms: tuple[str, ...], x: Array, tau: float, finest: float, lags: int
 ) -> Array:
     """Covariance (1) at lags of an eighth of the averaging time, (lags,)."""
     steps = np.arange(-2 * STEPS, lags + 2 * STEPS)
     s = np.abs(steps) * tau / STEPS
-    g = generalised(terms, x, s, finest)
+    g = generalised_covariance(terms, x, s, finest)
     at = [g[i * STEPS : i * STEPS + lags] for i in range(5)]
     found: Array = at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]
     return found / (2 * tau * tau)
 
 
-def generalised(terms: tuple[str, ...], x: Array, s: Array, finest: float) -> Array:
+def generalised_covariance(
+    terms: tuple[str, ...], x: Array, s: Array, finest: float
+) -> Array:
     """Generalised covariance (n,) of the sum of processes at lags s, (2), (3)."""
     total = np.zeros(len(s))
     times = iter(range(len(terms), len(x)))
     for i, term in enumerate(terms):
         size = float(np.exp(x[i]))
-        time = float(np.exp(x[next(times)])) if term in TIMED else 0.0
-        total += size * _of(term, s, time, finest)
+        time = float(np.exp(x[next(times)])) if term in TIMED_TERMS else 0.0
+        total += size * _covariance_of_term(term, s, time, finest)
     return total
 
 
-def _of(term: str, s: Array, time: float, finest: float) -> Array:
+def _covariance_of_term(term: str, s: Array, time: float, finest: float) -> Array:
     if term == "N":
         return -s / 2
     if term == "K":
@@ -113,12 +115,12 @@ def _markov(s: Array, time: Array | float) -> Array:
     return found
 
 
-def freedom(covariance: Array, tau: float, length: float) -> float:
+def degrees_of_freedom(covariance: Array, tau: float, length: float) -> float:
     """Degrees of freedom of an overlapping Allan variance, (4).
 
     Parameters
     ----------
-    covariance : (lags,) of `covariances`
+    covariance : (lags,) from `difference_covariances`
     tau, length : averaging time, and of the recording, s
 
     """

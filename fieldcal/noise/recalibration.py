@@ -1,4 +1,4 @@
-"""When a bias will have left its limit: walk, flicker, ramp, and what history shows.
+"""When a bias will leave its limit, by random walk, flicker, ramp and history.
 
 After t a bias has changed by a normally distributed amount of variance
 
@@ -10,14 +10,14 @@ limit of the grade the chance to be beyond it is
 
     P(t) = 1 - Phi((L - R t)/sqrt v) + Phi((-L - R t)/sqrt v)                      (2)
 
-averaged over the sizes as they may be. A recording that shows no walk leaves room for
-one: where the sizes have none, K is the largest that would not have been seen. Where
-the device's history has calibrations enough, their steps d over the time h between them
-say what months do:
+averaged over the draws of the sizes. A recording that shows no random walk does not
+exclude one: for draws without walk, K is the largest one that would not have been seen.
+If the device's history has enough calibrations, the steps d over the time h between
+them give the walk over months:
 
     d^2 - V_1 - V_2 = K_h^2 h                                                      (3)
 
-by maximum likelihood, and K_h stands in the place of K. Units: s, those of the channel.
+by maximum likelihood, and K_h replaces K. Units: s, those of the channel.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import TIMED
-from fieldcal.noise.prediction import Draw
+from fieldcal.noise.likelihood import TIMED_TERMS
+from fieldcal.noise.prediction import SizeDraw
 
 CHANCES = (0.05, 0.32)
-"""Chances to be beyond the limit for which a time is stated."""
+"""Probabilities to be beyond the limit for which a time is stated."""
 
 LONGEST = 20 * 365.25 * 86400.0
-"""No later than that anything is said, s."""
+"""Longest time that is stated, s."""
 
 STEPS = 3
-"""Steps of the history from which its walk is taken."""
+"""Fewest steps of the history from which its walk is estimated."""
 
 
 class HistoryStep(NamedTuple):
@@ -65,23 +65,23 @@ class Recalibration:
     Attributes
     ----------
     limit : in the channel's unit
-    seconds : after which it is beyond it with each of `CHANCES`; inf where later than
-        `LONGEST`
-    from_history : whether the device's own calibrations say so
-    unseen : whether a walk does that was not seen, and would not have been
-    by_ramp : whether the ramp of the recording does half of it or more, if it goes on
+    seconds : time until it is beyond the limit with each probability of `CHANCES`; inf
+        if longer than `LONGEST`
+    from_history : whether it follows from the device's own calibrations
+    by_unseen_walk : whether it follows from a walk that the recording would not show
+    by_ramp : whether half of it or more is by the ramp of the recording, continued
 
     """
 
     limit: float
     seconds: tuple[float, ...]
     from_history: bool
-    unseen: bool
+    by_unseen_walk: bool
     by_ramp: bool
 
 
-def recalibration(
-    drawn: tuple[Draw, ...],
+def recalibration_time(
+    drawn: tuple[SizeDraw, ...],
     ramp: float,
     limit: float,
     variance: float,
@@ -92,21 +92,21 @@ def recalibration(
 
     Parameters
     ----------
-    drawn : sizes of the processes as they may be
-    ramp : units per s; counts only where the history says nothing
-    limit : change that is too much
+    drawn : draws of the sizes of the processes
+    ramp : units per s; used only without history
+    limit : largest allowed change
     variance : V, of the calibration
     steps : of the device's history
     unseen : the largest K that the recording would not show; 0 where it shows one
 
     """
     seconds = np.geomspace(60.0, LONGEST, 120)
-    known = walk_of(steps) if len(steps) >= STEPS else None
+    known = walk_from_history(steps) if len(steps) >= STEPS else None
     chance = np.zeros(len(seconds))
     for one in drawn:
         v = variance + _structure(one, seconds, known, unseen)
         root, mean = np.sqrt(v), (0.0 if known is not None else ramp * seconds)
-        chance += _beyond(limit, mean, root) / len(drawn)
+        chance += _chance_beyond(limit, mean, root) / len(drawn)
     times = []
     for level in CHANCES:
         over = np.flatnonzero(chance > level)
@@ -117,7 +117,7 @@ def recalibration(
     return Recalibration(limit, tuple(times), known is not None, guessed, ramped)
 
 
-def walk_of(steps: Sequence[HistoryStep]) -> float:
+def walk_from_history(steps: Sequence[HistoryStep]) -> float:
     """K^2 of (3) at its most likely."""
     from scipy.optimize import minimize_scalar
 
@@ -132,13 +132,15 @@ def walk_of(steps: Sequence[HistoryStep]) -> float:
     return float(np.exp(found.x))
 
 
-def _structure(one: Draw, seconds: Array, known: float | None, unseen: float) -> Array:
+def _structure(
+    one: SizeDraw, seconds: Array, known: float | None, unseen: float
+) -> Array:
     """Variance of the change, (1), without the calibration's own."""
     total = np.zeros(len(seconds))
     times = iter(range(len(one.terms), len(one.x)))
     for i, term in enumerate(one.terms):
         size = float(np.exp(one.x[i]))
-        time = float(np.exp(one.x[next(times)])) if term in TIMED else np.inf
+        time = float(np.exp(one.x[next(times)])) if term in TIMED_TERMS else np.inf
         if term == "K" and known is None:
             total += size * seconds
         elif term == "G":
@@ -151,7 +153,7 @@ def _structure(one: Draw, seconds: Array, known: float | None, unseen: float) ->
     return total + known * seconds
 
 
-def _beyond(limit: float, mean: Array | float, root: Array) -> Array:
+def _chance_beyond(limit: float, mean: Array | float, root: Array) -> Array:
     from scipy.special import ndtr
 
     chance: Array = 1 - ndtr((limit - mean) / root) + ndtr((-limit - mean) / root)

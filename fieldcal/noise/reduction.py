@@ -1,7 +1,7 @@
-"""From samples as they come to stretches reduced to powers, in constant memory.
+"""Reduces samples, as they come, to stretches with powers, in constant memory.
 
-Samples count as evenly spaced, as a device takes them; where none came for a second or
-more, and where the level is another after a disturbance, a new stretch begins.
+Samples count as evenly spaced, as a device takes them. A new stretch begins after a gap
+of a second or more, and where the level changes at a disturbance.
 """
 
 from __future__ import annotations
@@ -12,35 +12,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.noise.disturbed import calmed
-from fieldcal.noise.levels import CosineLevels, Reduced
+from fieldcal.noise.disturbed import bridge_disturbances
+from fieldcal.noise.levels import CosineLevels, ReducedStretch
 
 GAP = 1.0
 """Time without samples that begins a new stretch, s."""
 
 ROWS = 1 << 17
-"""Samples that are looked at together."""
+"""Samples that are processed together."""
 
 CHANNELS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """A recording as `CosineSpectrum` takes it.
+    """A reduced recording, as input of `CosineSpectrum`.
 
     Attributes
     ----------
     stretches : reduced, columns: six channels and the thermometer
     known : (6,) whether a channel was measured
-    warm : whether a thermometer was
-    samples, bridged : how many, and how many of them were disturbed and replaced
+    has_temperature : whether a temperature was measured
+    samples, bridged : number of samples, and of those that were disturbed and replaced
     start, end : first and last time, s
 
     """
 
-    stretches: tuple[Reduced, ...]
+    stretches: tuple[ReducedStretch, ...]
     known: Array
-    warm: bool
+    has_temperature: bool
     samples: int
     bridged: int
     start: float
@@ -48,10 +48,10 @@ class Reduction:
 
 
 class Reducer:
-    """Takes the samples of one recording."""
+    """Reduces the samples of one recording."""
 
     def __init__(self) -> None:
-        self._done: list[Reduced] = []
+        self._done: list[ReducedStretch] = []
         self._levels: CosineLevels | None = None
         self._waiting: list[Block] = []
         self._rows = self._samples = self._bridged = 0
@@ -77,7 +77,7 @@ class Reducer:
         self._last = float(block.t[-1])
 
     def reduction(self) -> Reduction:
-        """Everything that was taken."""
+        """Return the reduction of all samples so far."""
         self._flush()
         self._end()
         return Reduction(
@@ -98,7 +98,7 @@ class Reducer:
             self._flush()
 
     def _flush(self) -> None:
-        """Look at what is waiting."""
+        """Process the waiting samples."""
         if not self._rows:
             return
         t = np.concatenate([b.t for b in self._waiting])
@@ -111,7 +111,9 @@ class Reducer:
             self._stepped += float(t[-1] - t[0])
         if not self._steps:
             return
-        for calm in calmed(self._filled(rows), self._stepped / self._steps, CHANNELS):
+        for calm in bridge_disturbances(
+            self._filled(rows), self._stepped / self._steps, CHANNELS
+        ):
             if calm.begins:
                 self._end(keep=True)
             if self._levels is None:
@@ -120,8 +122,8 @@ class Reducer:
             self._bridged += calm.bridged
 
     def _filled(self, rows: Array) -> Array:
-        """Samples with missing values as the last one known; 0 where none is."""
-        # by column: along rows of seven, what is asked costs more than the answer
+        """Replace missing values by the last known one; 0 if there is none."""
+        # by column, which is faster than along rows of seven
         missing = np.ascontiguousarray(~np.isfinite(rows).T)
         found = np.logical_not(missing.all(axis=1))
         self._known |= found[:CHANNELS]
@@ -147,7 +149,7 @@ class Reducer:
             self._steps, self._stepped = 0, 0.0
 
 
-def reduced(blocks: Iterable[Block]) -> Reduction:
+def reduce_recording(blocks: Iterable[Block]) -> Reduction:
     """Reduce a recording of a device at rest, block by block."""
     reducer = Reducer()
     for block in blocks:

@@ -2,14 +2,14 @@
 
     log p = log L + log |J| / 2                                                    (1)
 
-J is the information about the logarithms of the sizes, L and J as in `likelihood`.
-Where a process is known to a third, its most likely size is near nothing in a few of a
-hundred recordings, and too small on average: the likelihood is as high at none of it. J
-has no information about the logarithm of what adds nothing, so (1) is low there. Where
-a size is known well J hardly depends on it, and (1) has its maximum where L has. The
-prior is the same whether a size is told as a deviation, as a variance or as its
-logarithm. Correlation times stay the most likely ones: of what is hardly there no time
-is known either, and J is largest at any time that would make it known. Sources:
+J is the information about the logarithms of the sizes, L and J as in `likelihood`. If a
+process is known to a third of its size, its most likely size is near zero in a few of a
+hundred recordings, and too small on average, because the likelihood stays high at zero.
+J vanishes for a process that adds nothing, so (1) is low there. If a size is well
+known, J hardly depends on it, and (1) has its maximum where L has. The prior is the
+same for a deviation, a variance and its logarithm. Correlation times stay the most
+likely ones: the time of a negligible process is unknown, and J would be largest at a
+time that makes it known. Sources:
 Jeffreys 1946; Firth 1993, whose correction of the bias of first order this maximum is.
 """
 
@@ -26,21 +26,21 @@ from fieldcal.noise.likelihood import (
     MOST_STEPS,
     NoiseFit,
     Powers,
-    information_of,
-    levels_of,
+    expected_powers,
+    information_matrix,
 )
 from fieldcal.noise.spectrum import CosineSpectrum
 
 APART = 1e-3
-"""Logarithms between which the slope of (1) is taken."""
+"""Step of the logarithms for the numerical slope of (1)."""
 
 SHORTEST = 2.0**-12
-"""Part of a step that is tried last."""
+"""Least part of a step that is tried."""
 
 
 @dataclass(frozen=True, slots=True)
 class SizeDensity:
-    """Log density (1) of the sizes, at correlation times that are given.
+    """Log density (1) of the sizes, at given correlation times.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class SizeDensity:
     def of(
         cls, spectrum: CosineSpectrum, powers: Powers, terms: tuple[str, ...], x: Array
     ) -> SizeDensity:
-        """Of processes at the times in x, log of variances and times."""
+        """The density for processes with the times in x, log of variances and times."""
         used = ~powers.free
-        level, slopes = levels_of(spectrum, terms, x)
+        level, slopes = expected_powers(spectrum, terms, x)
         sizes = slice(0, len(terms))
         columns = slopes[used, sizes] * level[used, None] * np.exp(-x[sizes])
         power, count = (a[used].sum(axis=1) for a in (powers.power, powers.count))
@@ -72,7 +72,7 @@ class SizeDensity:
         turned = (self.count[:, None] * shares).transpose(0, 2, 1)
         return np.asarray(0.5 * turned @ shares)
 
-    def at(self, x: Array) -> Array:
+    def log_density(self, x: Array) -> Array:
         """Log density (d,) at logarithms of variances (d, p), but for a constant."""
         level = np.exp(x) @ self.columns.T
         likely = np.log(level) @ self.count + (self.power / level).sum(axis=1)
@@ -80,7 +80,7 @@ class SizeDensity:
         return np.asarray((volume - likely) / 2)  # (1)
 
 
-def most_probable(
+def most_probable_sizes(
     spectrum: CosineSpectrum, powers: Powers, found: NoiseFit
 ) -> NoiseFit:
     """The sizes where (1) is highest, from the most likely ones.
@@ -89,19 +89,21 @@ def most_probable(
     compared by these.
     """
     density = SizeDensity.of(spectrum, powers, found.terms, found.x)
-    sizes = _highest(density, found.x[: len(found.terms)])
+    sizes = _maximise(density, found.x[: len(found.terms)])
     x = np.concatenate([sizes, found.x[len(found.terms) :]])
-    level, slopes = levels_of(spectrum, found.terms, x)
-    return replace(found, x=x, level=level, information=information_of(powers, slopes))
+    level, slopes = expected_powers(spectrum, found.terms, x)
+    return replace(
+        found, x=x, level=level, information=information_matrix(powers, slopes)
+    )
 
 
-def _highest(density: SizeDensity, x: Array) -> Array:
+def _maximise(density: SizeDensity, x: Array) -> Array:
     """Logarithms of variances (p,) where (1) is highest, near some."""
-    best = float(density.at(x[None])[0])
+    best = float(density.log_density(x[None])[0])
     for _ in range(MOST_STEPS):
         step, part = _step(density, x), 1.0
         while part >= SHORTEST:
-            higher = float(density.at((x + part * step)[None])[0])
+            higher = float(density.log_density((x + part * step)[None])[0])
             if higher > best:
                 break
             part /= 2
@@ -116,7 +118,9 @@ def _highest(density: SizeDensity, x: Array) -> Array:
 def _step(density: SizeDensity, x: Array) -> Array:
     """J^-1 times the slope of (1), (p,)."""
     aside = APART * np.eye(len(x))
-    slope = (density.at(x + aside) - density.at(x - aside)) / (2 * APART)
+    slope = (density.log_density(x + aside) - density.log_density(x - aside)) / (
+        2 * APART
+    )
     step = np.linalg.pinv(density.information(x[None])[0], hermitian=True) @ slope
     out: Array = step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
     return out

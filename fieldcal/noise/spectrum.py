@@ -1,8 +1,8 @@
-"""Powers of a device's cosine coefficients, with what each process adds to them.
+"""Powers of a device's cosine coefficients, and the contribution of each process.
 
-Rows are bins of frequency of all stretches of a device, in whatever sessions; columns
-are processes (`cosine`). The last level of each stretch keeps its coefficients, so that
-what is known of time and temperature can be subtracted from them.
+Rows are frequency bins of all stretches of a device, over all sessions; columns are
+processes (`cosine`). The last level of each stretch keeps its coefficients, so that the
+parts that follow time and temperature can be subtracted.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Index
 from fieldcal.noise import cosine
-from fieldcal.noise.levels import FOLDS, SEGMENT, Reduced, bins
+from fieldcal.noise.levels import FOLDS, SEGMENT, ReducedStretch, octave_bins
 
 NODES = 2
-"""Correlation times an octave at which the column of a Gauss-Markov process is taken;
-between them goes a cubic spline."""
+"""Correlation times per octave at which the column of a Gauss-Markov process is
+calculated; a cubic spline interpolates."""
 
 BEYOND = 64.0
-"""Flicker reaches to correlation times so many times as long as the longest stretch:
-what is slower is a constant and a ramp there."""
+"""Longest correlation time of flicker, in lengths of the longest stretch: slower parts
+are a constant and a ramp there."""
 
 WITHIN = 8.0
-"""And down to such a part of the time between samples."""
+"""Shortest correlation time of flicker: this fraction of the sampling period."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +37,10 @@ class LastLevel:
 
     Attributes
     ----------
-    values : (k, c)
-    time : (k,) those of the time, s
-    bin, fold : (k,) where each counts
-    stretch : (k,) which it is of
+    values : (k, c) of channels and covariates
+    time : (k,) of the time, s
+    bin, fold : (k,) to which each belongs
+    stretch : (k,) from which each comes
 
     """
 
@@ -69,7 +69,7 @@ class CosineSpectrum:
 
     """
 
-    def __init__(self, stretches: Sequence[Reduced], noisy: int) -> None:
+    def __init__(self, stretches: Sequence[ReducedStretch], noisy: int) -> None:
         if not stretches:
             raise InputError("there is no stretch at rest to take noise from")
         self.stretches = tuple(stretches)
@@ -100,7 +100,7 @@ class CosineSpectrum:
         self._count = np.concatenate([np.empty((0, FOLDS)), *count])
 
     def _above(self) -> None:
-        """Coefficients of the last levels; those of a length share their bins."""
+        """Coefficients of the last levels; those of equal length share their bins."""
         from scipy.fft import dct
 
         rows, known = self._rows, dict[tuple[int, int], tuple[int, Index]]()
@@ -111,7 +111,7 @@ class CosineSpectrum:
             if end < 3:
                 continue
             if (n, s.m) not in known:
-                edges = bins(1, end)
+                edges = octave_bins(1, end)
                 known[n, s.m] = rows, edges
                 self._parts.append((n, s.m, edges))
                 rows += len(edges) - 1
@@ -135,14 +135,16 @@ class CosineSpectrum:
         self.last = LastLevel(*(np.concatenate(c) for c in zip(*found, strict=True)))
         self._bins = rows
 
-    def of(self, channel: int, rest: Array, weight: Array) -> tuple[Array, Array]:
+    def channel_powers(
+        self, channel: int, rest: Array, weight: Array
+    ) -> tuple[Array, Array]:
         """Sums of squares and numbers of one channel, (b, folds) both.
 
         Parameters
         ----------
         channel : which
-        rest : (k,) coefficients of the last levels, less what is explained
-        weight : (k,) what of each is left to be explained, 1 at most
+        rest : (k,) coefficients of the last levels, less the covariates
+        weight : (k,) part of the variance of each that the regression leaves, 1 at most
 
         """
         power, count = np.zeros((2, self._bins, FOLDS))
@@ -153,13 +155,13 @@ class CosineSpectrum:
         np.add.at(count, where, weight)
         return power, count
 
-    def moves(self, channel: int) -> bool:
+    def ever_changes(self, channel: int) -> bool:
         """Whether a channel ever changes."""
         last = self.last.values[:, channel]
         return bool(self._power[:, :, channel].any() or last.any())
 
     @cached_property
-    def fixed(self) -> dict[str, Array]:
+    def fixed_columns(self) -> dict[str, Array]:
         """Columns of the processes without a correlation time, (b,) each, by symbol."""
         made = {"N": cosine.white, "Q": cosine.quantisation, "K": cosine.walk}
         return {
@@ -207,9 +209,9 @@ class CosineSpectrum:
 
     def column(self, process: str) -> Array:
         """Column of a process without a correlation time."""
-        return self._endless if process == "B" else self.fixed[process]
+        return self._endless if process == "B" else self.fixed_columns[process]
 
     @property
     def log_times(self) -> tuple[float, float]:
-        """Correlation times that can be told from white noise and from a walk."""
+        """Range of correlation times distinct from white noise and walk, ln s."""
         return float(np.log(2 * self.dt)), float(np.log(self.seconds))

@@ -1,10 +1,10 @@
-"""Which processes a channel has: those that predict what they were not fitted to.
+"""Which processes a channel has: those that predict held-out coefficients.
 
-A process more, or less, is weighed by the score of held-out coefficients
-(`likelihood`): it is taken where the gain is more than its own standard error.
-Above 1 Hz, where a device filters its outputs and machines hum, bins can be described
-by their own level instead: what windows of seconds obey is below. Where processes do
-not explain the scatter of the powers, all is known as much less well.
+A process is added or removed by the score of held-out coefficients (`likelihood`): it
+is accepted if the gain exceeds its standard error. Above 1 Hz, where a device filters
+its outputs and machines hum, bins can have a level of their own instead: the noise of
+windows of seconds is below. If the processes do not explain the scatter of the powers,
+all uncertainties are enlarged by that dispersion.
 
 Source of the rule: Breiman et al. 1984, one standard error.
 """
@@ -17,60 +17,66 @@ import numpy as np
 
 from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import TIMED, Flags, NoiseFit, Powers, fit
-from fieldcal.noise.reference import most_probable
+from fieldcal.noise.likelihood import (
+    TIMED_TERMS,
+    Flags,
+    NoiseFit,
+    Powers,
+    fit_processes,
+)
+from fieldcal.noise.reference import most_probable_sizes
 from fieldcal.noise.spectrum import CosineSpectrum
 
 FILTERED_HZ = 1.0
-"""From this frequency on a spectrum may be the device's filter, Hz."""
+"""Lowest corner frequency of a device's filter, Hz."""
 
-RICH = ("N", "Q", "B", "K")
+UNTIMED_TERMS = ("N", "Q", "B", "K")
 MOST_MARKOV = 2
 NEGLIGIBLE = 0.01
 MULTIPLIED = 100
 STARTS = 6
-"""Correlation times from which a Gauss-Markov process is looked for."""
+"""Correlation times with which the fit of a Gauss-Markov process begins."""
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class ChosenProcesses:
     """The processes of a channel.
 
     Attributes
     ----------
     best : the chosen processes at their most probable sizes
-    others : (weight, fit) of all that predict, the chosen one among them, at their most
-        probable sizes; weights add to 1
-    powers : with the bins that are left to themselves
-    dispersion : by how much the powers scatter more than the processes alone would have
-        them, as a factor of variance; at least 1
+    weighted_fits : (weight, fit) of all sets that predict well, the chosen one among
+        them, at their most probable sizes; the sum of weights is 1
+    powers : to which they were fitted
+    dispersion : scatter of the powers relative to that by the processes alone, as a
+        factor of variance; at least 1
 
     """
 
     best: NoiseFit
-    others: tuple[tuple[float, NoiseFit], ...]
+    weighted_fits: tuple[tuple[float, NoiseFit], ...]
     powers: Powers
     dispersion: float
 
 
-def choose(spectrum: CosineSpectrum, powers: Powers) -> Chosen:
-    """Find the processes of a channel."""
+def choose_processes(spectrum: CosineSpectrum, powers: Powers) -> ChosenProcesses:
+    """Choose the processes of a channel."""
     powers = _without_filter(spectrum, powers)
-    best, seen = grown(spectrum, powers)
+    best, seen = grow_set(spectrum, powers)
     dispersion = _dispersion(powers, best)
     if dispersion > 1:
         powers = powers.scaled(dispersion)
-        best, seen = grown(spectrum, powers)
+        best, seen = grow_set(spectrum, powers)
     others = [
-        (weight, most_probable(spectrum, powers, one))
-        for weight, one in _weighted(seen)
+        (weight, most_probable_sizes(spectrum, powers, one))
+        for weight, one in _weighted_by_prediction(seen)
     ]
-    best = most_probable(spectrum, powers, best)
-    return Chosen(best, tuple(others), powers, dispersion)
+    best = most_probable_sizes(spectrum, powers, best)
+    return ChosenProcesses(best, tuple(others), powers, dispersion)
 
 
-def _weighted(fits: list[NoiseFit]) -> tuple[tuple[float, NoiseFit], ...]:
-    """Each set of processes once, weighted by what it predicts (Geisser, Eddy 1979)."""
+def _weighted_by_prediction(fits: list[NoiseFit]) -> tuple[tuple[float, NoiseFit], ...]:
+    """Each set of processes once, weighted by its predictions (Geisser, Eddy 1979)."""
     sets = {tuple(sorted(f.terms)): f for f in fits}
     scores = np.array([f.scores.sum() for f in sets.values()])
     weights = np.exp(scores - scores.max())
@@ -83,24 +89,28 @@ def _weighted(fits: list[NoiseFit]) -> tuple[tuple[float, NoiseFit], ...]:
     )
 
 
-def grown(spectrum: CosineSpectrum, powers: Powers) -> tuple[NoiseFit, list[NoiseFit]]:
-    """The set that no further process, and none less, would predict better.
+def grow_set(
+    spectrum: CosineSpectrum, powers: Powers
+) -> tuple[NoiseFit, list[NoiseFit]]:
+    """Add and remove processes until the predictions do not improve.
 
-    Beside it all that were tried.
+    Returns the best fit, and all fits that were tried.
     """
-    best = _first(spectrum, powers)
+    best = _white_only(spectrum, powers)
     seen = [best]
     while True:
-        tried = [_with(spectrum, powers, best, new) for new in _additions(best.terms)]
-        every = [f for f in [*tried, _pair(spectrum, powers, best)] if f]
+        tried = [
+            _with_process(spectrum, powers, best, new) for new in _additions(best.terms)
+        ]
+        every = [f for f in [*tried, _with_two_processes(spectrum, powers, best)] if f]
         seen += every
         more = [f for f in every if _better(f, best)]
         if not more:
             break
         best = max(more, key=lambda f: float(f.scores.sum()))
     for place in range(1, len(best.terms)):  # white noise is always there
-        less = _dropped(best, place)
-        if found := fit(spectrum, powers, less.terms, less.x):
+        less = _without_process(best, place)
+        if found := fit_processes(spectrum, powers, less.terms, less.x):
             seen.append(found)
     return _simplest(seen), seen
 
@@ -112,19 +122,19 @@ def _simplest(fits: list[NoiseFit]) -> NoiseFit:
     return _simplest(fewer) if fewer else best
 
 
-def _first(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
+def _white_only(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
     used = ~powers.free
-    column = spectrum.fixed["N"][used]
+    column = spectrum.fixed_columns["N"][used]
     total = (powers.power[used].sum(axis=1) / column).sum() / powers.count[used].sum()
-    # white noise is what the quickest bins have
-    found = fit(spectrum, powers, ("N",), np.log([total]))
+    # white noise alone
+    found = fit_processes(spectrum, powers, ("N",), np.log([total]))
     if found is None:
         raise AssertionError("white noise is in every bin")
     return found
 
 
 def _additions(terms: tuple[str, ...]) -> list[str]:
-    """What may be added to a set."""
+    """Processes that may be added to a set."""
     new = [t for t in ("K", "Q") if t not in terms]
     if "B" in terms:
         new.append("BT")
@@ -135,30 +145,30 @@ def _additions(terms: tuple[str, ...]) -> list[str]:
     return new
 
 
-def _with(
+def _with_process(
     spectrum: CosineSpectrum, powers: Powers, old: NoiseFit, new: str
 ) -> NoiseFit | None:
-    """The most likely fit with one process more, or with flicker cut off."""
+    """The most likely fit with one more process, or with a cut-off of flicker."""
     low, high = spectrum.log_times
-    if new not in TIMED:
-        return _started(spectrum, powers, old, new, None)
+    if new not in TIMED_TERMS:
+        return _fit_from_residual(spectrum, powers, old, new, None)
     kept = old
     if new == "BT":
         place = old.terms.index("B")
-        kept = _dropped(old, place)
+        kept = _without_process(old, place)
     tries = np.linspace(low, high, STARTS + 2)[1:-1]
-    found = [_started(spectrum, powers, kept, new, float(t)) for t in tries]
+    found = [_fit_from_residual(spectrum, powers, kept, new, float(t)) for t in tries]
     return max((f for f in found if f), key=lambda f: f.log_likelihood, default=None)
 
 
-def _started(
+def _fit_from_residual(
     spectrum: CosineSpectrum,
     powers: Powers,
     old: NoiseFit,
     new: str,
     log_time: float | None,
 ) -> NoiseFit | None:
-    """A fit that begins where the new process would explain what is left."""
+    """Fit with a new process, beginning with the size that explains the residual."""
     if log_time is None:
         column = spectrum.column(new)
     else:
@@ -173,13 +183,13 @@ def _started(
     sizes, times = old.x[: len(old.terms)], old.x[len(old.terms) :]
     new_time = [] if log_time is None else [log_time]
     start = np.concatenate([sizes, [np.log(max(size, least))], times, new_time])
-    return fit(spectrum, powers, (*old.terms, new), start)
+    return fit_processes(spectrum, powers, (*old.terms, new), start)
 
 
-def _dropped(old: NoiseFit, place: int) -> NoiseFit:
-    """The same without one process, not fitted again."""
+def _without_process(old: NoiseFit, place: int) -> NoiseFit:
+    """The fit without one process, not fitted again."""
     keep = [i for i in range(len(old.terms)) if i != place]
-    if old.terms[place] in TIMED:
+    if old.terms[place] in TIMED_TERMS:
         gone = len(old.terms) + old.timed.index(place)
     else:
         gone = -1
@@ -189,17 +199,19 @@ def _dropped(old: NoiseFit, place: int) -> NoiseFit:
     )
 
 
-def _pair(spectrum: CosineSpectrum, powers: Powers, best: NoiseFit) -> NoiseFit | None:
-    """Two processes more, of which neither may help alone."""
+def _with_two_processes(
+    spectrum: CosineSpectrum, powers: Powers, best: NoiseFit
+) -> NoiseFit | None:
+    """Fit with two more processes, neither of which may help alone."""
     new = [t for t in ("K", "B") if t not in best.terms and t + "T" not in best.terms]
     if len(new) < 2:
         return None
-    one = _with(spectrum, powers, best, new[0])
-    return one and _with(spectrum, powers, one, new[1])
+    one = _with_process(spectrum, powers, best, new[0])
+    return one and _with_process(spectrum, powers, one, new[1])
 
 
 def _better(more: NoiseFit, less: NoiseFit) -> bool:
-    """Whether held-out coefficients say so by more than the gain is uncertain.
+    """Whether the gain of held-out coefficients exceeds its standard error.
 
     Twice the gain in likelihood is noncentral chi squared: its standard error is twice
     its root.
@@ -210,14 +222,14 @@ def _better(more: NoiseFit, less: NoiseFit) -> bool:
 
 
 def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
-    """With the bins above a corner left to themselves, if that predicts better."""
+    """Leave bins above a corner out of the fit, if that predicts better."""
     top = spectrum.frequency.max()
-    best, chosen = rich(spectrum, powers), powers
+    best, chosen = fit_untimed_terms(spectrum, powers), powers
     corner = top / 2
     while corner >= FILTERED_HZ:
         free = powers.free | (spectrum.frequency > corner)
         tried = replace(powers, free=free)
-        found = rich(spectrum, tried)
+        found = fit_untimed_terms(spectrum, tried)
         if _better(found, best):
             best, chosen = found, tried
         corner /= 2
@@ -225,32 +237,32 @@ def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
 
 
 def _without_lines(spectrum: CosineSpectrum, powers: Powers, rich: NoiseFit) -> Powers:
-    """Bins above 1 Hz in which something hums, left to themselves."""
+    """Leave bins above 1 Hz with lines out of the fit."""
     excess = _excess(powers, rich)
     usual = DEVIATION * np.median(np.abs(excess[~powers.free]))
     odd = (excess > 6 * max(1.0, usual)) & (spectrum.frequency > FILTERED_HZ)
     return replace(powers, free=powers.free | odd)
 
 
-def rich(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
-    """A fit of all processes without a correlation time that are there."""
+def fit_untimed_terms(spectrum: CosineSpectrum, powers: Powers) -> NoiseFit:
+    """Fit all processes without a correlation time, less those that vanish."""
     used = ~powers.free
-    terms = list(RICH)
-    columns = np.array([spectrum.column(term) for term in RICH])[:, used]
-    sizes = _multiplied(columns, powers.power[used].sum(axis=1),
-                        powers.count[used].sum(axis=1))  # fmt: skip
+    terms = list(UNTIMED_TERMS)
+    columns = np.array([spectrum.column(term) for term in UNTIMED_TERMS])[:, used]
+    sizes = _multiplicative_sizes(columns, powers.power[used].sum(axis=1),
+                                  powers.count[used].sum(axis=1))  # fmt: skip
     while len(terms) > 1:
-        if found := fit(spectrum, powers, tuple(terms), np.log(sizes)):
+        if found := fit_processes(spectrum, powers, tuple(terms), np.log(sizes)):
             return found
-        # what has the least part in any bin goes first
+        # remove the process with the least part in any bin
         parts = (sizes[:, None] * columns / (sizes @ columns)).max(axis=1)
         gone = 1 + int(np.argmin(parts[1:]))
         terms.pop(gone)
         sizes, columns = np.delete(sizes, gone), np.delete(columns, gone, axis=0)
-    return _first(spectrum, powers)
+    return _white_only(spectrum, powers)
 
 
-def _multiplied(columns: Array, power: Array, count: Array) -> Array:
+def _multiplicative_sizes(columns: Array, power: Array, count: Array) -> Array:
     """Variances (p,) near their most likely ones, by multiplication.
 
     Each step raises the likelihood (Fevotte and Idier 2011, Itakura-Saito).
@@ -264,7 +276,7 @@ def _multiplied(columns: Array, power: Array, count: Array) -> Array:
 
 
 def _excess(powers: Powers, found: NoiseFit) -> Array:
-    """By how many of its standard errors each bin is above the model, (b,)."""
+    """Excess of each bin over the model, in standard errors, (b,)."""
     count = powers.count.sum(axis=1)
     ratio = powers.power.sum(axis=1) / np.maximum(count, 1e-300) / found.level
     excess: Array = np.where(count > 0, (ratio - 1) * np.sqrt(count / 2), 0.0)
@@ -278,5 +290,5 @@ def _dispersion(powers: Powers, found: NoiseFit) -> float:
     if freedom < 1:
         return 1.0
     squares = float(np.sum(_excess(powers, found)[some] ** 2)) / freedom
-    # what chance alone reaches in one of forty
+    # exceeded by chance in one of forty
     return squares if squares > 1 + 2 * np.sqrt(2 / freedom) else 1.0

@@ -1,4 +1,4 @@
-"""Words for the noise of a device, the same on the terminal and on the page."""
+"""Sentences about the noise of a device, for the terminal and the report."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ def value_or_bound(value: float, sigma: float) -> str:
     return f"{value:.3g} ± {sigma:.1g}" if math.isfinite(sigma) else f"< {value:.2g}"
 
 
-def follows(found: NoiseResult) -> list[str]:
-    """What the two numbers leave out, when to recalibrate, and how well north is found.
+def consequences(found: NoiseResult) -> list[str]:
+    """Sentences: factor of the filter noise, date of recalibration, gyrocompassing.
 
-    The date is of the first bias that leaves its limit.
+    The date is that of the first bias that leaves its limit.
     """
     left = max(c.pair.left_out for c in found.model.channels.values())
     out = [
         f"white noise and walk that filters are told are {left:.2f} times the fitted"
         " ones at most: what the two leave out",
-        f"recalibrate: {_due(found)}",
+        f"recalibrate: {_recalibration_sentence(found)}",
     ]
     if found.alignment is not None:
         seconds, sigma, spread = found.alignment.best
@@ -43,12 +43,12 @@ def follows(found: NoiseResult) -> list[str]:
     return out
 
 
-def _due(found: NoiseResult) -> str:
-    """When the first bias leaves its limit, and who says so."""
+def _recalibration_sentence(found: NoiseResult) -> str:
+    """When the first bias leaves its limit, and from what that follows."""
     first = min(found.recalibrate, key=lambda n: found.recalibrate[n].seconds[0])
     when = found.recalibrate[first]
     sure = f"{100 * CHANCES[0]:.0f} %"
-    if (when.by_ramp or when.unseen) and math.isfinite(when.seconds[0]):
+    if (when.by_ramp or when.by_unseen_walk) and math.isfinite(when.seconds[0]):
         why = "by a walk that this recording would not show: a longer one tells more"
         if when.by_ramp:
             why = "if the ramp of this recording goes on: a longer one tells whether"

@@ -20,7 +20,7 @@ from fieldcal.calibration.wording import (
     position_numbers,
 )
 from fieldcal.core.samples import CHANNELS, common_unit
-from fieldcal.diagnosis.wording.lines import of_verdict
+from fieldcal.diagnosis.wording.lines import verdict_probability
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
     Block,
@@ -63,7 +63,7 @@ def verdict_box(
     """The verdict of a diagnosis, or as it is called else, with its probability."""
     verdict = str(found.get("verdict", "unknown"))
     named = len(objects_at(found, "lines"))
-    sure = of_verdict(verdict, real(found.get("probability")), named)
+    sure = verdict_probability(verdict, real(found.get("probability")), named)
     name = (called or {}).get(verdict, verdict).replace("_", " ")
     lead = f"{name.upper()}, {sure}"
     return WarningBox(lead, TONES.get(verdict, "warn"))

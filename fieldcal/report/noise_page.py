@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate
-from fieldcal.noise.wording import PROCESSES, TRIADS, follows, value_or_bound
+from fieldcal.noise.wording import PROCESSES, TRIADS, consequences, value_or_bound
 from fieldcal.report.blocks import Block as Part
 from fieldcal.report.blocks import Figure, NameValues, Section, Table, Text, table
 from fieldcal.report.charts import Chart, Series
@@ -59,7 +59,7 @@ def _chart(what: str, some: list[ChannelEstimate], length: float) -> Chart:
     series = []
     for i, channel in enumerate(some):
         seen = channel.measured
-        said = channel.predicted(seen.tau, length)
+        said = channel.predict_allan(seen.tau, length)
         series += [
             Series(channel.name, seen.tau, seen.deviation, i + 1),
             Series(f"{channel.name} model", said.tau, said.median, i + 1, "line",
@@ -90,7 +90,7 @@ def _named(process: str) -> str:
 
 
 def _follows(found: NoiseResult) -> list[Part]:
-    return [Text(f"{text[0].upper()}{text[1:]}.") for text in follows(found)]
+    return [Text(f"{text[0].upper()}{text[1:]}.") for text in consequences(found)]
 
 
 def _programs(found: NoiseResult) -> Table:

@@ -21,8 +21,8 @@ from fieldcal.report.charts import Axis, Chart, Mark, Series
 from fieldcal.report.gather import Material
 from fieldcal.report.recording import windows
 from fieldcal.windows import StillnessLimits
-from fieldcal.windows.cells import CELL, Cells, CellTable
-from fieldcal.windows.verdict import judge
+from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
+from fieldcal.windows.verdict import judge_window
 
 SPAN = 10
 """Cells whose spread is looked at: 1 s."""
@@ -82,7 +82,7 @@ def _found(material: Material, marks: Sequence[Mapping[str, Any]]) -> blocks.Tab
 
 def motion_by_second(cells: CellTable) -> tuple[Array, Array]:
     """Middle of each second, s, and r of it, (m,) each."""
-    means = cells.steady
+    means = cells.steady_means
     view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
     spread = view.std(axis=-1)
     quiet = np.quantile(spread, 0.1, axis=0)
@@ -97,7 +97,7 @@ def _thinned(t: Array, r: Array) -> tuple[Array, Array]:
 
 
 def _cells(block: Block) -> CellTable:
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     return cells.table
 
@@ -111,7 +111,7 @@ def _windows(material: Material, still: UsableWindows) -> blocks.Table:
         if about.positions[row].turning:
             rate = table_rate(material.block, span, about, row)
             window, _ = without_table_rotation(window, rate)
-        worst = judge(_cells(window), StillnessLimits()).worst
+        worst = judge_window(_cells(window), StillnessLimits()).worst
         tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
         share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))
         what = f"{worst.kind} on {CHANNELS[worst.channel]}"

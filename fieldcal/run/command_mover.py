@@ -16,10 +16,10 @@ from fieldcal.core.errors import MoverFailed, MoverGone, PlanError
 from fieldcal.core.positions import Position
 
 PLACES = ("alpha", "beta", "gamma", "position", "name")
-"""What a command's template can name: angles in deg, number from 1, name."""
+"""Placeholders of a command: angles in deg, number from 1, name."""
 
 LAST = 1.0
-"""What a command gets to end by itself before it is killed, s."""
+"""Time for a command to end by itself before it is killed, s."""
 
 
 class CommandMover:
@@ -117,7 +117,7 @@ class CommandMover:
         return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
     def close(self) -> None:
-        """End it with all that it has started; safe to call twice."""
+        """End the command and its child processes; safe to call twice."""
         if self._process is not None:
             if self._code(self._process) is None:
                 _signal(self._process, "SIGTERM")
@@ -162,7 +162,7 @@ class CommandMover:
 
 
 def _signal(process: subprocess.Popen[str], name: str) -> None:
-    """End a command with all that it has started, by a signal where there are any."""
+    """End a command and its child processes, by a signal where the system has them."""
     if hasattr(os, "killpg"):
         with suppress(ProcessLookupError):
             os.killpg(process.pid, getattr(signal, name))

@@ -32,10 +32,10 @@ from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.marks import ADDED
 from fieldcal.session.recorder import Recorder
 
-ALIKE = ("grade", *FACTORY)
-"""What is said of the device that is led holds for the further ones as well."""
+SHARED_KEYS = ("grade", *FACTORY)
+"""Keys of the first device's table that are copied to the further ones."""
 
-BATCHES = 1 << 17
+MOST_BATCHES = 1 << 17
 """Batches whose times are kept: more than an hour."""
 
 
@@ -43,11 +43,11 @@ Span = tuple[float, float]
 """Start and end, s."""
 
 
-class Times:
+class ArrivalTimes:
     """Host arrival times of the samples."""
 
     def __init__(self) -> None:
-        self._pairs: deque[tuple[float, float]] = deque(maxlen=BATCHES)
+        self._pairs: deque[tuple[float, float]] = deque(maxlen=MOST_BATCHES)
 
     def add(self, block: Block) -> None:
         """Take samples that follow; those whose arrival is not known came just now."""
@@ -60,12 +60,12 @@ class Times:
         """Whether any samples have come."""
         return bool(self._pairs)
 
-    def host(self, t: float) -> float:
+    def host_time(self, t: float) -> float:
         """Host time of a device time."""
         times, hosts = np.array(self._pairs).T
         return float(np.interp(t, times, hosts))
 
-    def device(self, host: float) -> float:
+    def device_time(self, host: float) -> float:
         """Device time of a host time; nan before there are samples."""
         if not self._pairs:
             return np.nan
@@ -87,7 +87,7 @@ class Companion:
         self.folder = recorder.folder
         self.failed: FieldcalError | None = None
         self._driver, self._recorder = driver, recorder
-        self._lock, self._times, self._ends = Lock(), Times(), False
+        self._lock, self._times, self._ends = Lock(), ArrivalTimes(), False
         if driver.notes:
             recorder.mark("device", **driver.notes)
         self._thread = Thread(target=self._run, name=f"record {driver.name}")
@@ -101,8 +101,8 @@ class Companion:
     def window(self, position: int, span: Span, without: Sequence[Span] = ()) -> None:
         """Mark a window between two host times, less some stretches, s."""
         with self._lock:
-            first, last = (self._times.device(t) for t in span)
-            gaps = [[self._times.device(t) for t in gap] for gap in without]
+            first, last = (self._times.device_time(t) for t in span)
+            gaps = [[self._times.device_time(t) for t in gap] for gap in without]
         if last > first:
             end_s = float(np.nextafter(last, np.inf))
             more = {"without_s": gaps} if gaps else {}
@@ -150,7 +150,7 @@ class LeadRecorder:
     def __init__(self, recorder: Recorder, others: Sequence[Companion]) -> None:
         self._recorder, self.others = recorder, others
         self.folder = recorder.folder
-        self._times = Times()
+        self._times = ArrivalTimes()
         self._told: set[Path] = set()
         self.tell: Callable[[str], None] = lambda text: None
 
@@ -178,7 +178,7 @@ class LeadRecorder:
             if event in ("asked", "insisted", ADDED):
                 other.mark(event, **what)
             elif event == "window":
-                host = self._times.host
+                host = self._times.host_time
                 gaps = [(host(a), host(b)) for a, b in what.get("without_s", ())]
                 span = (host(what["start_s"]), host(what["end_s"]))
                 other.window(what["position"], span, gaps)
@@ -213,7 +213,7 @@ def record_companions(
             if serial:
                 device["serial"] = serial
             lead = about.get("device", {})
-            device |= {key: lead[key] for key in ALIKE if key in lead}
+            device |= {key: lead[key] for key in SHARED_KEYS if key in lead}
             folder = recorder.folder / f"device-{number}"
             known = (folder / DESCRIPTION).exists()
             tables = None if known else {**about, "device": device}

@@ -3,12 +3,12 @@
 Every sample that comes is recorded, whatever else happens; all waiting is counted in
 device time, so a virtual device may run faster than the wall clock and nothing changes.
 
-A hold goes through three phases. *Turning*: until the device has come to rest where it
-was asked to be; a wrong place is said, and nothing is averaged there. *Averaging*:
-until the window is long enough; what was calm before a disturbance is kept if the
-device lies as before, otherwise the window begins again. *Taken*: the window is marked
-and its average goes back to the plan. What was taken before, by an engine whose link
-broke or whose process was killed, is handed back at once and not asked for again.
+A hold goes through three phases. *Turning*: until the device has come to rest in the
+position; a wrong position is reported, and nothing is averaged there. *Averaging*:
+until the window is long enough; after a disturbance the part before it is kept if the
+attitude is unchanged, otherwise the window begins again. *Taken*: the window is marked
+and its average returns to the plan. The average of a position that was taken before the
+link broke or the process was killed is returned at once.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Add, Hold, Judge, Note, Plan, Repeat, Step
 from fieldcal.run.gyro_unit import GyroUnitWatch
-from fieldcal.run.incoming import SAID, IncomingSamples
-from fieldcal.run.interruptions import Disturbed, kept_notice, restart_notice
+from fieldcal.run.incoming import SILENCES_UNTIL_TOLD, IncomingSamples
+from fieldcal.run.interruptions import WindowDisturbed, kept_notice, restart_notice
 from fieldcal.run.link_marks import MarkedRecorder
-from fieldcal.run.operator.desk import OperatorDesk, question
+from fieldcal.run.operator.desk import OperatorDesk, confirmation_question
 from fieldcal.run.operator.protocol import Display, Operator
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
-from fieldcal.run.waiting import PositionWait, force
+from fieldcal.run.waiting import PositionWait, measured_force
 from fieldcal.run.warm_up import WarmUpWatch
-from fieldcal.run.window_taking import WindowTaking
+from fieldcal.run.window_taking import WindowTaker
 from fieldcal.session.description import Description
 from fieldcal.session.marks import ADDED
 from fieldcal.windows import Average
@@ -51,16 +51,15 @@ class Engine:
     about : the session's description; site, mounting and nominal calibration serve to
         judge where the device is
     recorder : the session folder being written
-    give_up : s of device time away from where it should be after which the hold is
-        given up, if the host's clock has gone on as well; None waits for ever, and
-        begins a window that was disturbed again for ever, as for a person
-    taken : averages of positions taken before, by number; what is taken is added
+    give_up : s of device time away from the position after which the hold is given up,
+        if the host's clock has advanced as well; None, as for a person, waits for ever
+        and repeats a disturbed window for ever
+    taken : averages of positions taken before, by number; new ones are added
     warm_up : judges whether the device is still warming up; None does not ask
     lost_share : share of a window's samples that may be missing; with more it is taken
         again, if that helps
-    judge : says what the windows taken so far are good for, quickly or in full
-    added : positions that were taken into the session behind the planned ones; what is
-        added is appended
+    judge : evaluates the windows taken so far, quickly or in full
+    added : positions of the session beyond the planned ones; new ones are appended
 
     """
 
@@ -94,12 +93,14 @@ class Engine:
         self._warned_of_unit = False
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver)
-        self._incoming = IncomingSamples(driver, recorder, self._heard, self._units.add)
-        self._windows = WindowTaking(
+        self._incoming = IncomingSamples(
+            driver, recorder, self._on_samples, self._units.add
+        )
+        self._windows = WindowTaker(
             driver, about, recorder, self._desk, self._display, self._incoming,
             lost_share,
         )  # fmt: skip
-        driver.on_silence = self._silent
+        driver.on_silence = self._on_silence
         if warm_up:
             warm_up.forget()  # a link opened again: nobody knows whether it was off
 
@@ -122,7 +123,7 @@ class Engine:
                 step = plan.throw(error) if error else plan.send(reply)
                 reply, error = None, None
                 try:
-                    reply = self._do(step)
+                    reply = self._carry_out(step)
                 except (Moved, WrongPosition, Skipped) as failed:
                     error = failed
         except StopIteration as done:
@@ -131,7 +132,7 @@ class Engine:
         finally:
             self._incoming.end()
 
-    def _do(self, step: Step) -> object:
+    def _carry_out(self, step: Step) -> object:
         match step:
             case Hold():
                 average = self._taken.get(step.index)
@@ -141,7 +142,7 @@ class Engine:
                 else:
                     self._display.taken_before(step, average)
                 if step.position.oriented:
-                    f = force(average.mean[None, :3], self._about)
+                    f = measured_force(average.mean[None, :3], self._about)
                     self._held = AcceptedPosition(step.position, f)
                 self._before = step.index
                 return average
@@ -149,15 +150,15 @@ class Engine:
                 self._desk.tell(text)
                 return None
             case Add(position):
-                return self._add(position)
+                return self._add_position(position)
             case Repeat(index):
                 self._desk.repeat(index)
                 return None
             case Judge(quick):
                 return self._judge(quick)
 
-    def _add(self, position: Position) -> int:
-        """Take a position into the session; back comes its number."""
+    def _add_position(self, position: Position) -> int:
+        """Add a position to the session; returns its number."""
         number = len(self._about.positions) + len(self._added)
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
@@ -172,7 +173,7 @@ class Engine:
             self._recorder.mark("asked", position=hold.index, name=name)
             self._operator.place(hold)
             try:
-                average = self._in_pieces(hold)
+                average = self._average_position(hold)
             except Moved as moved:
                 if self._give_up is not None:
                     raise
@@ -182,50 +183,50 @@ class Engine:
             if average is not None:
                 return average
 
-    def _in_pieces(self, hold: Hold) -> Average | None:
-        """Average a window, what was calm before a disturbance included.
+    def _average_position(self, hold: Hold) -> Average | None:
+        """Average a window, including the undisturbed part before a disturbance.
 
         None if the operator wants to begin it again.
         """
-        pieces, same = self._windows.new(), self._incoming.same
+        pieces, same = self._windows.new_window(), self._incoming.source_state
         while True:
-            self._arrive(hold)
-            if self._incoming.same != same:  # what is sent now is not what was before
-                pieces, same = self._windows.new(), self._incoming.same
+            self._wait_for_arrival(hold)
+            if self._incoming.source_state != same:  # the device changed
+                pieces, same = self._windows.new_window(), self._incoming.source_state
             away = self._incoming.breaks
             try:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
                     self._say_if_cold()
                 return average
-            except Disturbed as disturbed:
+            except WindowDisturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
                 self._desk.tell(kept_notice(moved, kept, hold.seconds, pieces.dropped))
-            if self._incoming.breaks != away:  # who knows how it stands by now
+            if self._incoming.breaks != away:  # it may have been turned meanwhile
                 self._operator.place(hold)
 
-    def _heard(self, block: Block) -> None:
+    def _on_samples(self, block: Block) -> None:
         """Look at samples that have just been recorded."""
-        self._display.heard(block)
+        self._display.note_samples(block)
         if self._warm_up:
             if self._restarts != self._driver.health.restarts:
                 self._restarts = self._driver.health.restarts
                 self._warm_up.forget()
             self._warm_up.add(block)
 
-    def _silent(self) -> None:
-        """Report that no samples arrive, and what comes instead."""
-        reason = self._incoming.silent()
+    def _on_silence(self) -> None:
+        """Report that no samples arrive, and why."""
+        reason = self._incoming.note_silence()
         if reason:
             if self._hold_now:
                 self._display.silent(self._hold_now, reason)
-            if self._incoming.silence == SAID:
+            if self._incoming.silence == SILENCES_UNTIL_TOLD:
                 self._desk.alarm(reason)
         self._desk.stop_if_wanted()
 
-    def _arrive(self, hold: Hold) -> None:
+    def _wait_for_arrival(self, hold: Hold) -> None:
         """Wait until the device rests where it should."""
-        left = self._windows.left == hold.index
+        left = self._windows.disturbed_index == hold.index
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
@@ -240,17 +241,17 @@ class Engine:
             wish = self._desk.wish(hold)
             if wish == "repeat":
                 self._desk.repeat(self._before)
-            if wish == "confirm" and self._warm_up and self._warm_up.waits:
+            if wish == "confirm" and self._warm_up and self._warm_up.must_wait:
                 self._warm_up.waived = True
             elif wish == "confirm" and not waiting.arrived:
-                if insisted and waiting.usable:
-                    self._desk.insisted(hold, waiting.problem)
+                if insisted and waiting.may_insist:
+                    self._desk.record_insistence(hold, waiting.problem)
                     return
                 insisted = self._desk.ask_back(waiting)
-            if not (waiting.usable and waiting.problem):
+            if not (waiting.may_insist and waiting.problem):
                 insisted = False  # moved since: that place is not asked about
-            waits = self._warm_up is not None and self._warm_up.waits
-            reason = question(waiting) if insisted else waiting.reason
+            waits = self._warm_up is not None and self._warm_up.must_wait
+            reason = confirmation_question(waiting) if insisted else waiting.reason
             if waiting.arrived and self._warm_up and self._warm_up.says and waits:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.says)
             self._display.turning(hold, waiting, reason)
@@ -260,7 +261,7 @@ class Engine:
                 self._desk.alarm(reason)
             if waiting.arrived and not waits and wish != "wait":
                 return
-            self._complain(hold, waiting, quiet=wish == "wait")
+            self._report_wrong_place(hold, waiting, quiet=wish == "wait")
         raise AssertionError("blocks() ends in an exception only")
 
     def _warn_of_unit(self) -> None:
@@ -269,11 +270,13 @@ class Engine:
             self._warned_of_unit = True
             self._desk.alarm(WaitReason(WaitState.WRONG_UNIT, self._units.says))
 
-    def _complain(self, hold: Hold, waiting: PositionWait, quiet: bool) -> None:
-        """Say that it rests at a wrong place, and give up in the end."""
+    def _report_wrong_place(
+        self, hold: Hold, waiting: PositionWait, quiet: bool
+    ) -> None:
+        """Report that the device rests in a wrong position, and finally give up."""
         if quiet:
-            waiting.excuse()
-        elif (waited := waiting.alarm()) is not None:
+            waiting.restart_waiting()
+        elif (waited := waiting.alarm_due()) is not None:
             text = reminder(waited) + waiting.problem
             self._recorder.mark("wrong", position=hold.index, text=text)
             self._operator.alarm(waiting.reason, waited)
@@ -281,7 +284,7 @@ class Engine:
                 self._operator.place(hold)  # a mover can be told once more
         if waiting.arrived or not self._give_up:
             return
-        if waiting.waited_enough(self._give_up):
+        if waiting.has_waited_enough(self._give_up):
             what = (
                 waiting.problem
                 or f"it has not come to rest in {waiting.waited:.0f} s"

@@ -1,8 +1,8 @@
 """Whether the gyroscopes are in the unit that they are taken for, by the first turns.
 
-As gravity turns in device axes, the rates say how fast: what 1 rad/s reads is then 1,
-or 57.3 of a device that sends deg/s. Before anything turned there is a hint: it rests
-by its accelerometers while the rates move as no device at rest does.
+The rotation of gravity in device axes gives the true rate. A reading of 1 per rad/s
+means rad/s, one of 57.3 means deg/s. Before the first turn there is a hint: at rest by
+the accelerometers, while the rates change more than those of any device at rest.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ CALM = 0.1
 """Scatter of means of the accelerometers that is rest, m/s^2."""
 
 TURNED = 0.15
-"""Turn of gravity that tells the unit, as of `rate_size.TURNED`, rad: 45° within 9 s,
-or 22° within 4 s there and back. On a bench nothing else moves gravity, so less of a
-turn is enough than of a recording of which nobody knows what it is."""
+"""Turn of gravity that shows the unit, as of `rate_size.TURNED`, rad: 45° within 9 s,
+or 22° within 4 s there and back. On a bench nothing else moves gravity, so a smaller
+turn is enough than in an unknown recording."""
 
 HINT = 5.0
-"""Rest by the accelerometers alone after which moving rates are asked about, s."""
+"""Rest by the accelerometers alone after which changing rates are reported, s."""
 
 
 class GyroUnitWatch:
@@ -71,9 +71,9 @@ class GyroUnitWatch:
             self._part = []
         if last - self._looked >= EVERY and not self.says:
             self._looked = last
-            self.says = self._look()
+            self.says = self._check_unit()
 
-    def _look(self) -> str:
+    def _check_unit(self) -> str:
         if not self._means:
             return ""
         table = np.array(self._means)
@@ -96,10 +96,10 @@ class GyroUnitWatch:
             f" again with gyr_unit={fits[0].unit} in the device's address"
         )
 
-    def asks(self, moving: float) -> str:
-        """What to ask of a device that has not come to rest for so long, s.
+    def question(self, moving: float) -> str:
+        """Question about the unit if the device has not come to rest for `moving` s.
 
-        Empty unless it rests by its accelerometers alone, and no turn has told.
+        Empty unless it rests by its accelerometers, and no turn has shown the unit.
         """
         lately = np.array(self._means)[-int(HINT / PART) :]
         if self.says or self._proved or moving < HINT or len(lately) < HINT / PART:

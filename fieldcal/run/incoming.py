@@ -13,27 +13,27 @@ from fieldcal.run.interruptions import GAP
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
-SAID = 2
-"""Silences of half a second after which the operator is told."""
+SILENCES_UNTIL_TOLD = 2
+"""Half seconds of silence after which the operator is told."""
 
 PIECE = 0.1
-"""Longest stretch of samples that is looked at as one, s."""
+"""Longest stretch of samples that is processed at once, s."""
 
 
 class IncomingSamples:
-    """What one device sends, from the first sample to the last.
+    """The samples of one device, from the first to the last.
 
     Parameters
     ----------
     driver : the device
     recorder : the session folder being written
-    heard : told of every block once it is recorded
-    seen : told of every piece before it is handed on
+    heard : called with every block once it is recorded
+    seen : called with every piece before it is handed on
 
     Attributes
     ----------
     pieces : an iterator over the samples, `PIECE` at a time
-    breaks : times that samples were missing for so long that nobody knows what was
+    breaks : number of gaps that are longer than `GAP`
     silence : half seconds since the last sample
 
     """
@@ -53,14 +53,14 @@ class IncomingSamples:
         self.pieces: Iterator[Block] = self._record()
 
     @property
-    def same(self) -> tuple[int, int]:
-        """What changes when samples are no longer like those before."""
+    def source_state(self) -> tuple[int, int]:
+        """A state that changes when the device restarts or changes its settings."""
         return self._driver.health.restarts, self._driver.read_back.changed
 
-    def silent(self) -> WaitReason | None:
-        """Take note of half a second without samples; why, once it is to be said."""
+    def note_silence(self) -> WaitReason | None:
+        """Note half a second without samples; returns the reason if it is reported."""
         self.silence += 1
-        if self.silence < SAID:
+        if self.silence < SILENCES_UNTIL_TOLD:
             return None
         why = self._driver.why_silent(self._health)
         if self._driver.health.received == self._health.received:
@@ -69,7 +69,7 @@ class IncomingSamples:
         return WaitReason(WaitState.NO_SAMPLES, text)
 
     def end(self) -> None:
-        """Mark what the link has lost to the last."""
+        """Mark the last losses of the link."""
         self._link.end()
 
     def _record(self) -> Iterator[Block]:

@@ -21,17 +21,17 @@ class RepeatPosition(Exception):
         self.index = index
 
 
-class Unlike(Moved):
-    """What came before is not like what comes now, however still the device lay."""
+class DeviceChanged(Moved):
+    """The device restarted or changed its settings: earlier samples do not count."""
 
 
-class Disturbed(Exception):
-    """A window was disturbed, and what was calm before is kept.
+class WindowDisturbed(Exception):
+    """A window was disturbed, and the part before the disturbance is kept.
 
     Attributes
     ----------
     moved : the disturbance
-    kept : seconds there are, s
+    kept : duration of the kept part, s
 
     """
 
@@ -43,7 +43,7 @@ class Disturbed(Exception):
 def kept_notice(
     moved: Moved | None, kept: float, seconds: float, dropped: float
 ) -> str:
-    """Sentence about a window that goes on behind a disturbance, s."""
+    """Sentence about a window that continues after a disturbance; times in s."""
     said = f"{moved}; " if moved else ""
     if dropped:
         said += f"it lies otherwise than before: those {dropped:.0f} s do not count; "
@@ -53,7 +53,7 @@ def kept_notice(
 
 
 OFTEN = 3
-"""Disturbed windows in one position from which the remedy is said as well."""
+"""Disturbed windows in one position from which a remedy is stated as well."""
 
 
 def restart_notice(moved: Moved, times: int) -> str:
@@ -71,8 +71,8 @@ GAP = 0.5
 """Longest time without samples that a window may have, s."""
 
 THIN = 2
-"""Windows of a position that are begun again for samples missing: a link that loses
-some all the time loses them in the next window as well."""
+"""Most windows of a position that begin again because of missing samples: a link that
+always loses some will lose them in the next window as well."""
 
 
 class SamplesLost(Moved):
@@ -80,7 +80,7 @@ class SamplesLost(Moved):
 
 
 class WindowWatch:
-    """What befalls a window beside motion: its link, or the device itself.
+    """Watches for interruptions of a window other than motion: by link or device.
 
     Parameters
     ----------
@@ -109,10 +109,10 @@ class WindowWatch:
         """
         now, health = float(block.t[0]), self._driver.health
         if now - self._last > GAP:
-            raise _gap(self._last, now)
+            raise _gap_error(self._last, now)
         if health.restarts != self._restarts:
-            raise _restarted(now)
-        self.check_same(now)
+            raise _restart_error(now)
+        self.check_device_unchanged(now)
         if not self._samples:
             self._first = now
         self._samples, self._last = self._samples + len(block), float(block.t[-1])
@@ -125,10 +125,10 @@ class WindowWatch:
                 "t",
             )
 
-    def check_same(self, now: float) -> None:
+    def check_device_unchanged(self, now: float) -> None:
         """Raise Moved if the device has changed what it does to its samples."""
         if self._driver.read_back.changed != self._changed:
-            raise Unlike(
+            raise DeviceChanged(
                 f"the device changed its own calibration before {now:.2f} s, as"
                 " autopilots do when they start",
                 now,
@@ -136,13 +136,13 @@ class WindowWatch:
             )
 
     def _expected(self, missing: int) -> float:
-        """How many samples the whole window would have."""
+        """Expected number of samples of the whole window."""
         elapsed = max(self._last - self._first, 1e-9)
         return (self._samples + missing) * max(1.0, self._seconds / elapsed)
 
 
-def _gap(last: float, now: float) -> Moved:
-    """Samples are missing between two device times, s."""
+def _gap_error(last: float, now: float) -> Moved:
+    """Error that samples are missing between two device times, s."""
     return Moved(
         f"no samples came between {last:.2f} s and {now:.2f} s: check the cable if it"
         " happens once more",
@@ -151,9 +151,9 @@ def _gap(last: float, now: float) -> Moved:
     )
 
 
-def _restarted(now: float) -> Unlike:
-    """The device's clock began anew at a device time, s."""
-    return Unlike(
+def _restart_error(now: float) -> DeviceChanged:
+    """Error that the device restarted at a device time, s."""
+    return DeviceChanged(
         f"the device started anew at {now:.2f} s: check its power if it happens once"
         " more",
         now,

@@ -1,8 +1,8 @@
-"""What a device tells of itself in its first seconds: which way is up, what it sends.
+"""Properties of a device from its first seconds: which way is up, what it sends.
 
-Gravity says which of its axes is up and what mounting that would be on the ladder, the
-rates at rest whether it takes their bias out itself, and a turn by hand in which unit
-they are.
+Gravity shows which axis is up, and the mounting on the ladder that follows. The rates
+at rest show whether the device removes their bias itself. A turn by hand shows their
+unit.
 """
 
 from __future__ import annotations
@@ -15,46 +15,46 @@ import numpy as np
 from fieldcal.core.frames import force_home
 from fieldcal.core.samples import Array, Block, pieces
 from fieldcal.run.gyro_unit import GyroUnitWatch
-from fieldcal.run.mounting_check import other_mounting, up_axis
+from fieldcal.run.mounting_check import fitting_mounting, up_axis
 from fieldcal.run.position_check import NORM
 
-PLAIN = ("+x", "+y", "+z")
+PLAIN_MOUNTING = ("+x", "+y", "+z")
 """The mounting unless another is declared."""
 
 ZERO = 3.0
-"""Standard errors within which all rates at rest are zero, as no bias leaves them."""
+"""Standard errors within which all rates at rest are zero, which means no bias."""
 
 ZEROED = (
     "; its rates are zero at rest: it takes their bias out itself; switch that off"
     " (gyro bias estimation, zero velocity update), or the result is NO-GO"
 )
-"""What is said of rates that have no bias."""
+"""Notice about rates without a bias."""
 
 PIECE = 0.1
-"""Longest stretch that is looked at as one, s."""
+"""Longest stretch that is processed at once, s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Introduction:
-    """What the first seconds tell.
+class DeviceIntroduction:
+    """Properties of a device from its first seconds.
 
     Attributes
     ----------
-    up : device axis that is up, as in "+z"; empty where it stands askew, or reads no g
-    mounting : by which it would stand at home; the plain one where it is so already
-    centred : whether its rates are zero at rest
+    up : device axis that is up, as in "+z"; empty if none is, or if it reads no gravity
+    mounting : mounting with which the device is at home; the plain one by default
+    rates_zeroed : whether its rates are zero at rest
     says : one sentence
 
     """
 
     up: str
     mounting: tuple[str, ...]
-    centred: bool
+    rates_zeroed: bool
     says: str
 
 
-def introduced(block: Block, gravity: float) -> Introduction:
-    """What samples of a device at rest tell of it.
+def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
+    """Determine the properties of a device from samples at rest.
 
     Parameters
     ----------
@@ -64,19 +64,19 @@ def introduced(block: Block, gravity: float) -> Introduction:
     """
     f: Array = np.nanmean(block.acc, axis=0)
     size = float(np.linalg.norm(f))
-    centred = _centred(block.gyr)
+    centred = _rates_are_zero(block.gyr)
     zero = ZEROED * centred
     if not abs(size - gravity) <= NORM * gravity:
         says = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
-        return Introduction("", PLAIN, centred, says + zero)
-    mounting = other_mounting(f, force_home(gravity), PLAIN)
+        return DeviceIntroduction("", PLAIN_MOUNTING, centred, says + zero)
+    mounting = fitting_mounting(f, force_home(gravity), PLAIN_MOUNTING)
     if mounting is None:
-        return Introduction("", PLAIN, centred, "it stands askew" + zero)
+        return DeviceIntroduction("", PLAIN_MOUNTING, centred, "it stands askew" + zero)
     up = up_axis(f)
-    return Introduction(up, mounting, centred, f"{up} is up{zero}")
+    return DeviceIntroduction(up, mounting, centred, f"{up} is up{zero}")
 
 
-def _centred(gyr: Array) -> bool:
+def _rates_are_zero(gyr: Array) -> bool:
     """Whether rates (n, 3) at rest are zero on each axis, by their own noise."""
     known = gyr[np.isfinite(gyr).all(axis=1)]
     if len(known) < 2:
@@ -86,10 +86,10 @@ def _centred(gyr: Array) -> bool:
     return bool((noise > 0).all() and (np.abs(known.mean(axis=0)) < ZERO * error).all())
 
 
-def unit_by_a_turn(
+def rate_unit_from_turn(
     blocks: Iterable[Block], gravity: float, patience: float
 ) -> str | None:
-    """Unit in which rates are that are taken for rad/s; None if no turn told.
+    """Unit of rates that are taken for rad/s, from a turn; None without a turn.
 
     Parameters
     ----------

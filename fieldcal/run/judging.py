@@ -1,4 +1,4 @@
-"""Judges a session while it is being recorded, for procedures that go by it."""
+"""Judges a session while it is being recorded, for procedures that depend on it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.session.folder import Session
 
-MENDED = ("fit", "positions", "witnesses", "turns", "level")
-"""Checks beside those of uncertainties that further positions may mend. The place, the
-temperature, the link, what the operator insisted on and how the device was at earlier
-calibrations stay as they are."""
+MENDABLE_CHECKS = ("fit", "positions", "witnesses", "turns", "level")
+"""Checks, beside those of uncertainties, that further positions may change. Checks of
+site, temperature, link, insisted positions and earlier calibrations are unaffected."""
 
 
-def judged(
+def judge_session(
     folder: Path, limits: GradeLimits, before: InterimResult | None = None
 ) -> InterimResult:
-    """What the windows that a session has are good for.
+    """Judge the windows that a session has so far.
 
-    Beginning with what was found of some of them `before` takes half the time: enough
-    for the choice of a position, and for no end.
+    Beginning with the explanation of `before` takes half the time. That is enough to
+    choose a position, but not to end the session.
 
     Raises
     ------
@@ -35,23 +34,23 @@ def judged(
 
     """
     session = Session.open(folder)
-    still = usable_windows(session)
-    prepared = PreparedSession(
-        session, still, None if before is None else before.explanation
-    )
+    windows = usable_windows(session)
+    previous = None if before is None else before.explanation
+    prepared = PreparedSession(session, windows, previous)
     try:
-        found = assess(solve_prepared(prepared), session, still, limits, None)
+        found = assess(solve_prepared(prepared), session, windows, limits, None)
     except FieldcalError as error:
         return InterimResult(prepared, limits, None, str(error))
-    return InterimResult(prepared, limits, found, failed_checks=tuple(_failed(found)))
+    failed = tuple(_failed_checks(found))
+    return InterimResult(prepared, limits, found, failed_checks=failed)
 
 
-def _failed(found: Calibration) -> list[str]:
-    """Checks that failed and may be mended, or could not be made as yet."""
+def _failed_checks(found: Calibration) -> list[str]:
+    """Checks that failed or could not be made yet, and that positions may change."""
     checks = found.info["decision"]["checks"]
     return [
         c["name"]
         for c in checks
         if (c["ok"] is False or (c["ok"] is None and c["name"] == "fit"))
-        and (c["name"] in MENDED or c["name"].endswith(UNCERTAINTY))
+        and (c["name"] in MENDABLE_CHECKS or c["name"].endswith(UNCERTAINTY))
     ]

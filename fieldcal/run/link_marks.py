@@ -31,14 +31,14 @@ COUNTS = ("gaps", "missing", "repeated", "restarts", "bad", "skipped")
 
 
 class Marker(Protocol):
-    """Where marks go."""
+    """Receives marks."""
 
     def mark(self, event: str, **what: Any) -> None:
         """Append a mark."""
 
 
 class MarkedRecorder(Marker, Protocol):
-    """Where an engine puts what happens."""
+    """Receives samples and marks of an engine."""
 
     def append(self, block: Block) -> Block:
         """Record samples; returns them as recorded."""
@@ -62,7 +62,7 @@ class LinkMarks:
         self._marked = -EVERY
         self._clocked = monotonic()
         self._grain = Grain()
-        self._facts = self._told()
+        self._facts = self._device_facts()
         self._same, self._sure = driver.read_back.same, float("nan")
 
     def take(self, block: Block) -> None:
@@ -76,8 +76,8 @@ class LinkMarks:
         if self._grain != self._driver.grain:
             self._grain = self._driver.grain
             self._recorder.mark("grain", **asdict(self._grain))
-        if self._told() != self._facts:
-            self._facts = self._told()
+        if self._device_facts() != self._facts:
+            self._facts = self._device_facts()
             until = {"until_s": self._sure} if np.isfinite(self._sure) else {}
             self._recorder.mark("device", **self._driver.notes, **until)
         if self._counts() == self._before:
@@ -92,13 +92,13 @@ class LinkMarks:
             self._mark()
 
     def end(self) -> None:
-        """Mark what has not been marked."""
+        """Mark everything that has not been marked yet."""
         if self._counts() != self._before:
             self._mark()
         self._clock(at_once=True)
 
-    def _told(self) -> dict[str, Any]:
-        """What the driver knows of the device, without what changes all the time."""
+    def _device_facts(self) -> dict[str, Any]:
+        """Facts of the driver about the device, without those that change always."""
         return {k: v for k, v in self._driver.notes.items() if k not in LIVE}
 
     def _counts(self) -> dict[str, int]:

@@ -20,10 +20,10 @@ from fieldcal.core.samples import Array
 from fieldcal.run.position_check import FIRST
 
 
-def other_mounting(
+def fitting_mounting(
     device: Array, wanted: Array, declared: tuple[str, ...]
 ) -> tuple[str, ...] | None:
-    """Mounting by which the device would stand where it should; None if none does.
+    """Mounting with which the device would be in position; None if there is none.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def other_mounting(
     declared : the mounting so far
 
     >>> z_up, home = np.array([0.0, 0.1, 9.8]), np.array([0.0, -9.81, 0.0])
-    >>> other_mounting(z_up, home, ("+x", "+y", "+z"))
+    >>> fitting_mounting(z_up, home, ("+x", "+y", "+z"))
     ('+x', '-z', '+y')
     """
     length = float(np.linalg.norm(device) * np.linalg.norm(wanted))
@@ -46,7 +46,7 @@ def other_mounting(
 
 @cache
 def _mountings() -> list[tuple[tuple[str, ...], Array]]:
-    """Every right-handed mounting with its matrix, 24."""
+    """All 24 right-handed mountings, each with its matrix."""
     found = []
     for names in permutations("xyz"):
         for signs in product("+-", repeat=3):
@@ -56,9 +56,11 @@ def _mountings() -> list[tuple[tuple[str, ...], Array]]:
     return found
 
 
-def mounted_otherwise(device: Array, wanted: Array, declared: tuple[str, ...]) -> str:
-    """What to say of a device that would be in place if it were mounted otherwise."""
-    axes = other_mounting(device, wanted, declared)
+def wrong_mounting_message(
+    device: Array, wanted: Array, declared: tuple[str, ...]
+) -> str:
+    """Notice about a device that would be in position with another mounting."""
+    axes = fitting_mounting(device, wanted, declared)
     if axes is None or axes == declared:
         return ""
     return (

@@ -1,4 +1,4 @@
-"""Who turns the device: a person, or the virtual device itself."""
+"""Movers, which turn the device: a person, or the virtual device itself."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class ManualMover:
     """A person turns the device, as instructed."""
 
     def turn(self, position: Position, number: int = 0) -> None:
-        """Leave it to the person."""
+        """Nothing to do: the operator turns the device."""
 
     def busy(self) -> bool:
-        """A person gives no signal."""
+        """False: a person gives no signal."""
         return False
 
 
@@ -154,7 +154,7 @@ class VirtualMover(RunningDevice):
 
     @property
     def truth(self) -> Mapping[str, Any]:
-        """What it conceals."""
+        """True parameters of the virtual device, which it conceals."""
         truth: Mapping[str, Any] = json.loads(self._truth.read_text(encoding="utf-8"))
         return truth
 

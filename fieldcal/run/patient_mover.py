@@ -1,4 +1,4 @@
-"""A mover that is gone is tried again for a while, as a device is."""
+"""A mover that is retried for some time after its connection is lost."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class PatientMover:
         return True
 
     def _try(self, what: Callable[[], bool]) -> bool:
-        """Do it; whoever fails is gone, since the first time that it was."""
+        """Try an action of the mover; a failure marks it as lost from the first one."""
         try:
             done = what()
         except MoverGone as gone:

@@ -33,7 +33,7 @@ APART = math.radians(0.5)
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class PlanTask:
     """Content of a plan.
 
     Attributes
@@ -73,13 +73,13 @@ class Task:
 
     @property
     def further(self) -> Mapping[str, str]:
-        """Serial number of each further device, by its address; empty if not said."""
+        """Serial number of each further device, by its address; empty if not given."""
         urls, serials = self.run.get("further", ()), self.run.get("further_serial", ())
         return dict(zip_longest(urls, serials, fillvalue=""))
 
     @property
     def positions(self) -> tuple[Position, ...]:
-        """All that is to be held, the verification last."""
+        """All positions to be held, the verification last."""
         last = () if self.verification is None else (self.verification,)
         return (*self.about.positions, *last)
 
@@ -95,7 +95,7 @@ def schema() -> dict[str, Any]:
 
 
 def positions_of(procedure: str) -> list[dict[str, Any]]:
-    """Tables ``[[position]]`` that a procedure takes unless others are said."""
+    """Default tables ``[[position]]`` of a procedure."""
     taken = procedures.procedure(procedure).POSITIONS
     return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
 
@@ -125,7 +125,7 @@ def read(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is no plan file: {error}") from error
 
 
-def task(tables: Mapping[str, Any], name: str) -> Task:
+def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
     """Check a plan before anything moves.
 
     Parameters
@@ -149,7 +149,7 @@ def task(tables: Mapping[str, Any], name: str) -> Task:
         raise PlanError(f"{name}: {error}") from error
     _check_positions(about, name)
     _check_further(about, run, name)
-    made = Task(tables, about, run, planned_verification(about))
+    made = PlanTask(tables, about, run, planned_verification(about))
     _check_mover(made, name)
     return made
 
@@ -186,7 +186,7 @@ def _check_positions(about: Description, name: str) -> None:
 
 
 def _check_further(about: Description, run: Mapping[str, Any], name: str) -> None:
-    """Whether each further device, and each serial number, is one and is named once."""
+    """Refuse further devices and serial numbers that are invalid or named twice."""
     urls, serials = run.get("further", ()), run.get("further_serial", ())
     if len(serials) > len(urls):
         raise PlanError(
@@ -202,8 +202,8 @@ def _check_further(about: Description, run: Mapping[str, Any], name: str) -> Non
             raise PlanError(f"{name}: {what} {twice[0]!r} is named twice: name it once")
 
 
-def _check_third_angles(made: Task, name: str) -> None:
-    """Refuse a third angle that nobody would turn to."""
+def _check_third_angles(made: PlanTask, name: str) -> None:
+    """Refuse a third angle that the mover does not turn to."""
     third = [p for p in made.positions if p.gamma]
     if not third:
         return
@@ -215,7 +215,7 @@ def _check_third_angles(made: Task, name: str) -> None:
         )
 
 
-def _check_mover(made: Task, name: str) -> None:
+def _check_mover(made: PlanTask, name: str) -> None:
     from fieldcal.run.command_mover import CommandMover
 
     mover = made.mover

@@ -31,7 +31,7 @@ NEAR, TILT = np.deg2rad(1.0), np.deg2rad(3.5)
 """Tolerance for the others, rad: of the joints, and of the base for a unit turn."""
 
 NORM = 0.15
-"""How far the norm may be off g before unit or scale must be wrong, relative."""
+"""Relative deviation of the norm from g beyond which unit or scale must be wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +106,13 @@ def check_position(
 
 
 def round_to_tenth(angle: float) -> float:
-    """Round an angle as it is shown, deg; what is rounded to zero has no sign."""
+    """Round an angle for display, deg; zero has no sign."""
     return round(float(angle), 1) + 0.0
 
 
 @lru_cache(maxsize=64)
 def _force(position: Position, gravity: float) -> Array:
-    """Specific force of a position, (3,) m/s^2: asked for with every block."""
+    """Specific force of a position, (3,) m/s^2; cached, since every block needs it."""
     f: Array = forces([position], gravity)[0]
     f.flags.writeable = False
     return f
@@ -134,7 +134,7 @@ def _without_offset(f: Array, gravity: float, held: AcceptedPosition | None) -> 
 def _miss(
     wanted: Position, f: Array, gravity: float, held: AcceptedPosition | None
 ) -> float:
-    """How far the device is off, rad."""
+    """Angle between the device and the wanted position, rad."""
     clean = _without_offset(f, gravity, held)
     return float(np.linalg.norm(clean - _force(wanted, gravity)) / gravity)
 
@@ -146,7 +146,7 @@ def _nearest_slip(
     held: AcceptedPosition | None,
     others: Mapping[str, Position],
 ) -> tuple[str, float]:
-    """The slip that would put the device nearest to where it is, and how near, rad."""
+    """The operator's slip that best explains the position, and its error, rad."""
     before = held.position if held else None
     said, there = _slips(wanted, before, tuple(others.items()), gravity)
     if not said:

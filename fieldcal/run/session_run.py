@@ -37,9 +37,9 @@ from fieldcal.planning.steps import Judge, Plan, Repeat, add, note
 from fieldcal.run.companions import LeadRecorder
 from fieldcal.run.engine import Engine
 from fieldcal.run.interruptions import RepeatPosition
-from fieldcal.run.judging import judged
+from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import Operator
-from fieldcal.run.plan_file import WARM_UP, Task
+from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import with_more
 from fieldcal.session.folder import RESULT, Session
@@ -47,8 +47,8 @@ from fieldcal.session.marks import ADDED, MARKS, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
 
-REMEDIES = 3
-"""Times that what a NO-GO wants is asked for: more is another run."""
+MOST_REMEDIES = 3
+"""Most remedies of a NO-GO in one run."""
 
 RETRY = 0.5
 """Time between two attempts to open the device again, s."""
@@ -73,7 +73,7 @@ class SessionRun:
 
     def __init__(
         self,
-        task: Task,
+        task: PlanTask,
         operator: Operator,
         recorder: Recorder | LeadRecorder,
         opened: Callable[[], Driver],
@@ -107,7 +107,7 @@ class SessionRun:
         while True:
             try:
                 with driver:
-                    return self._with(driver)
+                    return self._run_with_device(driver)
             except (MoverFailed, RecordingEnded):
                 raise  # neither comes back by itself
             except DeviceError as error:
@@ -119,7 +119,7 @@ class SessionRun:
                 since, first = self._lost
                 driver = self._wait_for_device(first, since + self._patience)
 
-    def _with(self, driver: Driver) -> Calibration:
+    def _run_with_device(self, driver: Driver) -> Calibration:
         recorder, task = self._recorder, self._task
         if driver.notes:
             recorder.mark("device", **driver.notes)
@@ -134,7 +134,7 @@ class SessionRun:
             self._taken,
             self._warm_up,
             self._limits.lost_share,
-            self._judged,
+            self._judge,
             self._added,
         )
         while True:
@@ -143,13 +143,13 @@ class SessionRun:
             except RepeatPosition as again:
                 self._taken.pop(again.index, None)
 
-    def _judged(self, quick: bool) -> InterimResult:
-        """What the windows taken so far are good for."""
+    def _judge(self, quick: bool) -> InterimResult:
+        """Judge the windows taken so far."""
         folder, so_far = self._recorder.folder, self._so_far
         windows = [m for m in read_marks(folder / MARKS) if m.get("event") == "window"]
         known = len(windows) == self._judged_windows
         if not so_far or not known or (so_far.incremental and not quick):
-            so_far = judged(folder, self._limits, so_far if quick else None)
+            so_far = judge_session(folder, self._limits, so_far if quick else None)
         self._so_far, self._judged_windows = so_far, len(windows)
         return so_far
 
@@ -163,13 +163,13 @@ class SessionRun:
         about = with_more(task.about, self._added)
         verification = planned_verification(about)
         if verification is not None:
-            yield from self._verified(len(about.positions), verification)
+            yield from self._hold_verification(len(about.positions), verification)
         elif self._until_go:
-            yield from self._remedied()
+            yield from self._take_remedies()
         return found
 
-    def _verified(self, number: int, position: Position) -> Plan[None]:
-        """Hold the position that is not fitted."""
+    def _hold_verification(self, number: int, position: Position) -> Plan[None]:
+        """Hold the verification position, which is not fitted."""
         task = self._task
         if procedures.most(task.about, task.procedure) is not None:
             yield from note("one more position, which is not fitted but predicted")
@@ -178,9 +178,9 @@ class SessionRun:
         except Skipped as skipped:
             yield from note(str(skipped))
 
-    def _remedied(self) -> Plan[None]:
-        """Take what would make a NO-GO a GO, as long as there is such a thing."""
-        while self._remedies < REMEDIES:
+    def _take_remedies(self) -> Plan[None]:
+        """Take the positions that would turn a NO-GO into GO, while there are any."""
+        while self._remedies < MOST_REMEDIES:
             so_far: InterimResult = yield Judge()
             remedy = so_far.remedy
             if remedy is None:
@@ -199,7 +199,7 @@ class SessionRun:
                     return
 
     def _wait_for_device(self, lost: DeviceError, deadline: float) -> Driver:
-        """Open the device again, or give up with the error that it was lost by."""
+        """Open the device again, or raise the error by which it was lost."""
         self._recorder.mark("lost", text=str(lost))
         left = deadline - monotonic()
         if left > 0:
@@ -219,8 +219,8 @@ class SessionRun:
         raise lost
 
 
-def recorded_averages(session: Session, task: Task) -> dict[int, Average]:
-    """Averages of the positions that a session has whole, by number."""
+def recorded_averages(session: Session, task: PlanTask) -> dict[int, Average]:
+    """Averages of the positions with a complete window in a session, by number."""
     from fieldcal.acceptance.assessment import verification_window
 
     marks = list(session.marks())
@@ -234,13 +234,13 @@ def recorded_averages(session: Session, task: Task) -> dict[int, Average]:
         with suppress(FieldcalError):
             taken[last] = average(session.block.between(*window))
     for number in list(taken):
-        if not _stands(marks, number):
+        if not _window_stands(marks, number):
             del taken[number]
     return taken
 
 
-def _stands(marks: list[dict[str, Any]], number: int) -> bool:
-    """Whether the last that was said of a position is that its window was taken."""
+def _window_stands(marks: list[dict[str, Any]], number: int) -> bool:
+    """Whether the last mark of a position is that of its window."""
     said = [
         m["event"]
         for m in marks
@@ -249,7 +249,7 @@ def _stands(marks: list[dict[str, Any]], number: int) -> bool:
     return bool(said) and said[-1] == "window"
 
 
-def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
+def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
     """A session to go on with, its tables, and positions to take once more.
 
     What is finished and NO-GO is gone on with by its remedy: positions besides, or one
@@ -272,22 +272,25 @@ def resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
         )
     marks, again = list(session.marks()), tuple[int, ...]()
     run = dict(tables["run"])
-    if _finished(marks) and (folder / RESULT).exists():
+    if _is_finished(marks) and (folder / RESULT).exists():
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
         last = len(session.positions)
         if remedy["positions"] and verification_window(marks, last) is not None:
             again += (last,)  # what verified goes behind the positions besides, anew
-        tables["position"] = [*tables.get("position", ()), *_besides(remedy, session)]
+        tables["position"] = [
+            *tables.get("position", ()),
+            *_remedy_positions(remedy, session),
+        ]
         run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
     fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
-    if fixed and len(tables.get("position", ())) > _planned(marks, session):
+    if fixed and len(tables.get("position", ())) > _planned_count(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again
 
 
-def _besides(remedy: Mapping[str, Any], session: Session) -> list[Any]:
-    """Positions of a remedy but those left out before, which are asked for anyway."""
+def _remedy_positions(remedy: Mapping[str, Any], session: Session) -> list[Any]:
+    """Positions of a remedy without those left out before, which are asked anyway."""
     known = session.about.positions
     left_out = {known[i].degrees for i in positions_left_out(session)}
     return [
@@ -297,27 +300,27 @@ def _besides(remedy: Mapping[str, Any], session: Session) -> list[Any]:
 
 
 def positions_left_out(session: Session) -> tuple[int, ...]:
-    """Numbers of the positions of which no window stands."""
+    """Numbers of the positions without a valid window."""
     marks = list(session.marks())
     every = range(len(session.about.positions))
-    return tuple(i for i in every if not _stands(marks, i))
+    return tuple(i for i in every if not _window_stands(marks, i))
 
 
-def _planned(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
-    """How many positions a session was begun with."""
+def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
+    """Number of positions that a session was begun with."""
     added = sum(bool(mark.get("event") == ADDED) for mark in marks)
     return len(session.about.positions) - added
 
 
-def _finished(marks: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether nothing was asked for since a run had its result."""
+def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether no position was asked for since a run had its result."""
     told = [m.get("event") for m in marks]
     ends = [i for i, event in enumerate(told) if event == "finished"]
     return bool(ends) and not {ADDED, "repeated", "asked"} & set(told[ends[-1] :])
 
 
 def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
-    """What would make a finished session GO.
+    """The remedy that would make a finished session GO.
 
     Raises
     ------

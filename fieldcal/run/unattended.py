@@ -53,7 +53,7 @@ def recalibrate(
         "run": {"procedure": procedure, "seconds": seconds},
         **tables,
     }
-    task = plan_file.task(whole, procedure)
+    task = plan_file.task_from_tables(whole, procedure)
 
     def once() -> Driver:
         return driver

@@ -1,7 +1,6 @@
-"""Waiting for the device to rest where it was asked to be, block by block.
+"""Waits for the device to rest in the requested position, block by block.
 
-Nothing here reads a device or talks to anybody: the engine feeds it and passes on what
-it says.
+Nothing here reads a device or talks to an operator: the engine does both.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import GAP
-from fieldcal.run.mounting_check import mounted_otherwise
+from fieldcal.run.mounting_check import wrong_mounting_message
 from fieldcal.run.position_check import (
     NEAR,
     NORM,
@@ -28,14 +27,14 @@ from fieldcal.session.description import Description
 from fieldcal.windows import Stillness
 
 SETTLE = 1.5
-"""Rest before a window begins, s: a joint that was just let go of still creeps."""
+"""Rest before a window begins, s: a released joint still creeps."""
 
 SWUNG = 4.0
 """Time in place before a window on a base that sways, s: the end of a small turn is no
 quicker than the swaying."""
 
 PATIENCE = 3.0
-"""Rest at a wrong place before that is said, s: a person stops in between."""
+"""Rest in a wrong position before it is reported, s: a person stops in between."""
 
 REMIND = 60.0
 """Time at the same wrong place after which it is said again, s."""
@@ -83,7 +82,7 @@ class PositionWait:
     ) -> None:
         self._hold, self._about, self._held, self._left = hold, about, held, left
         self._units = units
-        self._others = _others(hold, about)
+        self._others = _other_positions(hold, about)
         self._began: float | None = None
         self._first: Array | None = None
         self._turned = False
@@ -93,7 +92,7 @@ class PositionWait:
 
     def _start(self) -> None:
         self._stillness = Stillness(self._about.sways)
-        self._resting = _Resting()
+        self._resting = _RestSamples()
         self._told = -np.inf
         self._told_of: Array | None = None
         self.arrival: PositionCheck | None = None
@@ -103,7 +102,7 @@ class PositionWait:
 
     @property
     def meter(self) -> float:
-        """Present motion as part of what is allowed."""
+        """Present motion over the allowed motion."""
         return self._stillness.meter
 
     @property
@@ -112,7 +111,7 @@ class PositionWait:
         return self._resting.seconds
 
     def add(self, block: Block, host: float) -> None:
-        """Take in the block that follows; a time without any is no waiting.
+        """Take in the block that follows; time without samples is not counted.
 
         `host` is the time by the host's clock, s.
         """
@@ -131,33 +130,33 @@ class PositionWait:
         if self._stillness.since is not None or np.isnan(self._stirred):
             self._stirred = self._last
         if self._resting.seconds > 0:
-            self.f = force(self._resting.block.acc, self._about)
-            self.where = self.arrival = self._judged(self.f)
+            self.f = measured_force(self._resting.block.acc, self._about)
+            self.where = self.arrival = self._check_position(self.f)
             self._first = self.f if self._first is None else self._first
-            self._turned |= self._elsewhere(self._first)
+            self._turned |= self._has_moved_from(self._first)
         else:
             self.arrival, self.f = None, None
-            now = self._judged(force(block.acc, self._about))
+            now = self._check_position(measured_force(block.acc, self._about))
             self.where = replace(now, ok=False)
         if self.arrival is None or not self.arrival.ok:
             self._there = np.nan
         elif np.isnan(self._there):
             self._there = self._last
 
-    def _judged(self, f: Array) -> PositionCheck:
+    def _check_position(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity
         return check_position(wanted, f, g, self._held, self._others)
 
     @property
     def arrived(self) -> bool:
-        """Whether it rests where it should."""
+        """Whether the device rests in the requested position."""
         there = self.arrival is not None and self.arrival.ok
         swung = not self._about.sways or self._last - self._there >= SWUNG
         return there and swung and self.seconds >= SETTLE
 
     @property
-    def usable(self) -> bool:
-        """Whether it rests, and reads about gravity: a place one may insist on."""
+    def may_insist(self) -> bool:
+        """Whether the operator may insist on the position: at rest, about gravity."""
         if self.f is None or self.seconds < SETTLE:
             return False
         off = abs(float(np.linalg.norm(self.f)) - self._about.gravity)
@@ -165,10 +164,10 @@ class PositionWait:
 
     @property
     def reason(self) -> WaitReason:
-        """What it waits for."""
+        """The present reason for waiting."""
         if self._stillness.since is None:
             units, moving = self._units, self._last - self._stirred
-            if wrong := units and (units.says or units.asks(moving)):
+            if wrong := units and (units.says or units.question(moving)):
                 return WaitReason(WaitState.WRONG_UNIT, wrong)
             measured = np.isfinite(self.meter)
             return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)
@@ -180,45 +179,45 @@ class PositionWait:
 
     @property
     def problem(self) -> str:
-        """What is wrong with the place, in one sentence; empty if nothing is."""
+        """What is wrong with the position, in one sentence; empty if nothing is."""
         if self.arrival is None or self.arrival.ok or self.f is None:
             return ""
         problem = self.arrival.problem
-        if self._held is None and self.usable:
-            problem = self._otherwise() or problem
+        if self._held is None and self.may_insist:
+            problem = self._wrong_mounting() or problem
         number = self._hold.index + 1
         if self._left:
             problem = f"turned too early, position {number} is not done: {problem}"
         return problem
 
-    def _otherwise(self) -> str:
-        """What to say if it stands squarely on another face; empty if it does not."""
+    def _wrong_mounting(self) -> str:
+        """Notice for a device that rests on another face; empty if it does not."""
         if self.f is None or not self._hold.position.oriented:
             return ""
         wanted = forces([self._hold.position], self._about.gravity)[0]
         device = self._about.mounting.T @ self.f
-        said = mounted_otherwise(device, wanted, self._about.axes)
+        said = wrong_mounting_message(device, wanted, self._about.axes)
         problem = self.arrival.problem if self.arrival else ""
         return said and f"{said}; else {problem}"
 
-    def excuse(self) -> None:
-        """Begin to count anew: whoever turns the device is still at work."""
+    def restart_waiting(self) -> None:
+        """Restart the waiting time, while the device is still being turned."""
         self._began = self._last
         self.waited = self.waited_host = 0.0
 
-    def waited_enough(self, give_up: float) -> bool:
-        """Whether it was waited for so many s, and whoever turns it had the time to."""
+    def has_waited_enough(self, give_up: float) -> bool:
+        """Whether the wait exceeds `give_up` s by device and by host time."""
         return self.waited > give_up and self.waited_host > min(give_up, LEAST)
 
-    def alarm(self) -> float | None:
-        """Whether to call the operator now: once for a place, and every minute again.
+    def alarm_due(self) -> float | None:
+        """Whether to call the operator now: once per wrong position, then every minute.
 
-        Returns the time waited if it is a reminder, s, 0 for the first time, and None
-        if there is nothing to say.
+        Returns the time waited, s, for a reminder; 0 for the first call; None for no
+        call.
         """
         if self.reason.state is not WaitState.MISPLACED or self.f is None:
             return None
-        again = not self._elsewhere(self._told_of)
+        again = not self._has_moved_from(self._told_of)
         if again and self._last - self._told < REMIND:
             return None
         if not self._turned and self.waited < UNTURNED:
@@ -226,31 +225,31 @@ class PositionWait:
         self._told, self._told_of = self._last, self.f
         return self.waited if again else 0.0
 
-    def _elsewhere(self, place: Array | None) -> bool:
-        """Whether it rests elsewhere than with that force; no gust turns it so far."""
+    def _has_moved_from(self, place: Array | None) -> bool:
+        """Whether the force differs from `place` by more than a gust could cause."""
         if place is None or self.f is None:
             return True
         away = float(np.linalg.norm(self.f - place))
         return bool(away > NEAR * self._about.gravity)
 
 
-def _others(hold: Hold, about: Description) -> dict[str, Position]:
-    """The plan's other positions, by what is said if the device is in one of them."""
+def _other_positions(hold: Hold, about: Description) -> dict[str, Position]:
+    """The plan's other positions, by the notice if the device is in one of them."""
     others = {}
     for i, position in enumerate(about.positions):
-        if _same(position, hold.position):
+        if _same_angles(position, hold.position):
             continue
         comes = f", position {hold.index + 1} comes first" if i > hold.index else ""
         others[f"this is position {i + 1}{comes}"] = position
     return others
 
 
-def _same(one: Position, other: Position) -> bool:
+def _same_angles(one: Position, other: Position) -> bool:
     angles = [(p.alpha, p.beta, p.gamma) for p in (one, other)]
     return angles[0] == angles[1]
 
 
-def force(acc: Array, about: Description) -> Array:
+def measured_force(acc: Array, about: Description) -> Array:
     """Mean specific force in procedure axes by the nominal calibration, (3,).
 
     `acc` is (n, 3) m/s^2, device axes.
@@ -261,7 +260,7 @@ def force(acc: Array, about: Description) -> Array:
     return turned
 
 
-class _Resting:
+class _RestSamples:
     """The last second of samples since the device came to rest."""
 
     def __init__(self) -> None:

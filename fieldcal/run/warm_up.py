@@ -20,10 +20,10 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 
 SPAN = 60
-"""Seconds that are looked at."""
+"""Seconds over which the slope is taken."""
 
 FEWEST = 5
-"""Seconds before anything is said."""
+"""Least seconds for a slope."""
 
 
 class WarmUpWatch:
@@ -63,7 +63,7 @@ class WarmUpWatch:
         self._last = float(t[-1])
 
     def forget(self) -> None:
-        """Begin anew: the device was off, and no straight line leads through that."""
+        """Begin anew after the device may have been off."""
         self._seconds.clear()
         self._second, self._sum, self._n = -np.inf, 0.0, 0
 
@@ -89,7 +89,7 @@ class WarmUpWatch:
 
     @property
     def says(self) -> str:
-        """What is to be said of it; empty if it is steady, or not known."""
+        """Notice about the change; empty if the temperature is steady or unknown."""
         rate, sigma = self.rate
         if not abs(rate) - 2 * sigma > self._limit:
             return ""
@@ -100,8 +100,8 @@ class WarmUpWatch:
         )
 
     @property
-    def waits(self) -> bool:
-        """Whether a window should not begin yet: it changes, or is not known yet."""
+    def must_wait(self) -> bool:
+        """Whether a window must wait: the temperature changes, or is not known yet."""
         if self.waived or self._until is None or self._last >= self._until:
             return False
         return len(self._seconds) < FEWEST or bool(self.says)

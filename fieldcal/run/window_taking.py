@@ -10,9 +10,9 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.incoming import IncomingSamples
 from fieldcal.run.interruptions import (
     THIN,
-    Disturbed,
+    DeviceChanged,
     SamplesLost,
-    Unlike,
+    WindowDisturbed,
     WindowWatch,
     kept_notice,
 )
@@ -23,11 +23,10 @@ from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, PiecedWindow, StillnessLimits
 
 LOOK = 0.5
-"""Device time from one look at a window that fills to the next, s: all of its cells are
-judged anew each time, and nobody reads faster."""
+"""Device time between two tests of a window that fills, s."""
 
 
-class WindowTaking:
+class WindowTaker:
     """Windows of one device, one after another.
 
     Parameters
@@ -42,7 +41,7 @@ class WindowTaking:
 
     Attributes
     ----------
-    left : index of the position whose window was disturbed last, None before any
+    disturbed_index : index of the position whose window was disturbed last, or None
 
     """
 
@@ -61,10 +60,10 @@ class WindowTaking:
         self._lost_share = lost_share
         self._thin: dict[int, int] = {}
         self._noise: LearnedNoise | None = None
-        self.left: int | None = None
+        self.disturbed_index: int | None = None
 
-    def new(self) -> PiecedWindow:
-        """A window that nothing is in, judged by the noise of the one before."""
+    def new_window(self) -> PiecedWindow:
+        """An empty window, which is judged with the noise of the one before."""
         limits = StillnessLimits.swaying() if self._about.sways else None
         return PiecedWindow(self._noise, self._driver.grain, limits)
 
@@ -74,7 +73,7 @@ class WindowTaking:
         Parameters
         ----------
         hold : the position, where the device rests
-        pieces : what is averaged, what was calm before a disturbance included
+        pieces : window to fill, with the part kept before a disturbance
 
         Returns
         -------
@@ -82,8 +81,8 @@ class WindowTaking:
 
         Raises
         ------
-        Disturbed
-            If the device moved, and what was calm before is kept.
+        WindowDisturbed
+            If the device moved, and the undisturbed part is kept.
         Moved
             If it moved, and nothing is kept.
 
@@ -97,27 +96,31 @@ class WindowTaking:
                     break
                 self._desk.tell(kept_notice(None, 0.0, hold.seconds, pieces.dropped))
         except Moved as moved:
-            self.left = hold.index
+            self.disturbed_index = hold.index
             if isinstance(moved, SamplesLost):
                 self._thin[hold.index] = self._thin.get(hold.index, 0) + 1
             what = {"at_s": moved.at, "axis": moved.axis, "text": str(moved)}
-            kept = 0.0 if isinstance(moved, Unlike) else pieces.keep(moved)
+            kept = (
+                0.0
+                if isinstance(moved, DeviceChanged)
+                else pieces.keep_undisturbed(moved)
+            )
             if kept:
                 self._recorder.mark("kept", position=hold.index, kept_s=kept, **what)
-                raise Disturbed(moved, kept) from moved
+                raise WindowDisturbed(moved, kept) from moved
             self._recorder.mark("rejected", position=hold.index, **what)
             raise
         end = float(np.nextafter(average.end, np.inf))
         where: dict[str, object] = {"start_s": average.start, "end_s": end}
-        if pieces.without:
-            where["without_s"] = pieces.without
+        if pieces.gaps:
+            where["without_s"] = pieces.gaps
         self._recorder.mark("window", position=hold.index, **where)
-        self._noise = pieces.noise and pieces.noise.spectrum
+        self._noise = pieces.noise and pieces.noise.without_wander
         self._display.taken(hold, pieces)
         return average
 
     def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
-        """Take samples until a window is long enough; False if it is to begin again."""
+        """Take samples until a window is long enough; False to begin it again."""
         share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
         watch = WindowWatch(self._driver, hold.seconds, share)
         looked = -np.inf
@@ -127,24 +130,24 @@ class WindowTaking:
             if self._desk.wish(hold) == "repeat":
                 self._recorder.mark("repeated", position=hold.index)
                 return False
-            full, now = pieces.full(hold.seconds), float(block.t[-1])
+            full, now = pieces.is_full(hold.seconds), float(block.t[-1])
             if not full and now < looked + LOOK:
                 continue
             looked = now
-            if moved := pieces.moved:
+            if moved := pieces.disturbance:
                 raise moved
             self._display.averaging(hold, pieces)
-            early = not self._about.sways and pieces.done(hold.sigma)
+            early = not self._about.sways and pieces.reason_to_stop(hold.sigma)
             if full or early:
                 break
         self._confirm(watch)
         return True
 
     def _confirm(self, watch: WindowWatch) -> None:
-        """Have the device say that it did the same to all samples of a window."""
+        """Check that the device did not change its settings during a window."""
         self._driver.read_again()
         if self._driver.read_back.pending:
             for block in self._incoming.pieces:
-                watch.check_same(float(block.t[-1]))
+                watch.check_device_unchanged(float(block.t[-1]))
                 if not self._driver.read_back.pending:
                     return

@@ -12,7 +12,7 @@ import uvicorn
 
 from fieldcal.core.errors import InputError
 from fieldcal.run.page.access import Access, Gate
-from fieldcal.run.page.server import listening
+from fieldcal.run.page.server import listening_socket
 from fieldcal.service import api, openapi
 from fieldcal.service.jobs import Jobs
 from fieldcal.service.queue import JobQueue
@@ -57,7 +57,7 @@ class Service:
             If nothing can listen there.
 
         """
-        there = listening(host, port)
+        there = listening_socket(host, port)
         port = there.getsockname()[1]
         name = f"[{host}]" if ":" in host else host
         local = ("localhost", "127.0.0.1") if host in ("127.0.0.1", "localhost") else ()

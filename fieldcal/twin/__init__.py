@@ -4,7 +4,7 @@
 the session held the real one, `rerun` replays the session on it and compares.
 """
 
-from fieldcal.twin.agreement import Rerun
-from fieldcal.twin.rerun import rerun
+from fieldcal.twin.agreement import ReplayResult
+from fieldcal.twin.rerun import replay_session
 
-__all__ = ["Rerun", "rerun"]
+__all__ = ["ReplayResult", "replay_session"]

@@ -1,4 +1,4 @@
-"""How far replays of a session are from the recording: the figures, and their words."""
+"""How far replays of a session are from the recording, in figures and in sentences."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.findings.agreement import UNITS
-from fieldcal.diagnosis.result import number
+from fieldcal.diagnosis.result import json_number
 from fieldcal.sim_device.profile import Profile
-from fieldcal.twin.ways import WayDifference
+from fieldcal.twin.ways import TurnDifference
 
 
 @dataclass(frozen=True, slots=True)
-class ReplayRun:
-    """How far one device's replay is from the recording.
+class ReplayFigures:
+    """Differences between one device's replay and the recording.
 
     Attributes
     ----------
     rms : (2,) m/s^2 and rad/s, over parts of all windows
     chi2_per_dof : of all windows
     by_position : (p, 2) rms in each window
-    chi2_by_position : (p,) squares a mean of each window, in its white noise
-    lines : (k, 2) rms of what is left of each line, m/s^2 and rad/s
-    ways : on the ways between windows; not known where the gyroscopes lost track
+    chi2_by_position : (p,) chi squared per mean of each window, with its white noise
+    lines : (k, 2) rms of the remainder of each line, m/s^2 and rad/s
+    ways : differences in turns; nan where no turn could be followed
 
     """
 
@@ -35,37 +35,37 @@ class ReplayRun:
     by_position: Array
     chi2_by_position: Array
     lines: Array
-    ways: WayDifference
+    ways: TurnDifference
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of diagnosis.json."""
         return {
             **_pair(self.rms),
-            "chi2_per_dof": number(self.chi2_per_dof),
+            "chi2_per_dof": json_number(self.chi2_per_dof),
             "lines": [_pair(line) for line in self.lines],
-            "rms_turns_rad": number(self.ways.angle),
-            "rms_turns_acceleration": number(self.ways.force),
+            "rms_turns_rad": json_number(self.ways.angle),
+            "rms_turns_acceleration": json_number(self.ways.force),
         }
 
 
 @dataclass(frozen=True, slots=True)
-class Rerun:
+class ReplayResult:
     """A session replayed.
 
     Attributes
     ----------
     profile : the twin
-    runs : by name in simulation (as session.toml has it), refitted, twin
-    positions : of session.toml that were compared
+    runs : figures of the devices "simulation" (of session.toml), "refitted" and "twin"
+    positions : numbers of the compared positions in session.toml
     windows : (p, 2) from and to, s
-    random : effects that the replay leaves to chance
-    triad : that gained most: 0 accelerometers, 1 gyroscopes
-    found : causes of what was recorded
+    random : random effects, which the replay leaves out
+    triad : with the largest improvement: 0 accelerometers, 1 gyroscopes
+    found : names of the causes found
 
     """
 
     profile: Profile
-    runs: Mapping[str, ReplayRun]
+    runs: Mapping[str, ReplayFigures]
     positions: tuple[int, ...]
     windows: Array
     random: tuple[str, ...]
@@ -77,12 +77,12 @@ class Rerun:
         places = [
             {
                 "position": p,
-                "from_s": number(w[0]),
-                "to_s": number(w[1]),
+                "from_s": json_number(w[0]),
+                "to_s": json_number(w[1]),
                 **{
                     n: {
                         **_pair(run.by_position[i]),
-                        "chi2_per_mean": number(run.chi2_by_position[i]),
+                        "chi2_per_mean": json_number(run.chi2_by_position[i]),
                     }
                     for n, run in self.runs.items()
                 },
@@ -98,7 +98,7 @@ class Rerun:
 
     @property
     def says(self) -> str:
-        """A sentence or two for a person."""
+        """The result in a few sentences."""
         old, new = self.runs["refitted"], self.runs["twin"]
         unit = UNITS[self.triad]
         out = [
@@ -121,7 +121,7 @@ class Rerun:
             )
         return " ".join(out)
 
-    def _on_ways(self, old: WayDifference, new: WayDifference) -> Iterator[str]:
+    def _on_ways(self, old: TurnDifference, new: TurnDifference) -> Iterator[str]:
         if {"gyro_scale", "gyro_cross_coupling"} & {*self.found}:
             yield (
                 f"Turns come out {new.angle:.2g} rad off instead of"
@@ -136,6 +136,6 @@ class Rerun:
 
 def _pair(values: Array) -> dict[str, float | None]:
     return {
-        "rms_acceleration": number(float(values[0])),
-        "rms_angular_rate": number(float(values[1])),
+        "rms_acceleration": json_number(float(values[0])),
+        "rms_angular_rate": json_number(float(values[1])),
     }

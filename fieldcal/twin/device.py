@@ -1,12 +1,12 @@
-"""The virtual twin of a device: everything that a diagnosis found, as a device file.
+"""The virtual twin of a device: the result of a diagnosis, as a device file.
 
     truth      bias and scale factor, fitted together with the effects
-    noise      white noise of each axis, as it is in the windows
-    effects    what the simulation had already, and what was found, as fitted
-    climate    the temperature that was recorded
+    noise      white noise of each axis in the windows
+    effects    those of the simulation, and those found, with their fitted values
+    climate    the recorded temperature
 
-Times of a device file count from when the device is switched on; the session's start
-takes the place of that. What the recording cannot tell stays as the session has it.
+Times of a device file count from switching on, which is taken as the session's start.
+Facts that the recording does not determine are those of session.toml.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fieldcal.core.sampling import rate_of
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect
-from fieldcal.diagnosis.signal.line import Tone
+from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.effects import catalogue
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import State, Term
@@ -54,28 +54,33 @@ WORDS = 32_768
 SHOWN_UNITS = ("g", "mg", "deg/s", "mrad/s")
 POINT_S = 20.0
 POINTS = 200
-"""Points of the temperature's course, and how close they may be."""
+"""Least distance and largest number of points of the temperature course."""
 
 VIBRATION = "vibration_rectification"
 
 
-def device_of(explanation: Explanation, found: Diagnosis, known: TwinState) -> Profile:
-    """The device as a diagnosis knows it, with all that was found in it."""
+def twin_profile(
+    explanation: Explanation, found: Diagnosis, known: TwinState
+) -> Profile:
+    """Profile of the twin: the fitted state with all effects that were found."""
     prepared = explanation.prepared
     start = float(prepared.source.block.t[0])
-    effects = [*settled(known.state.terms, start), *of_earth(known.heading)]
+    effects = [
+        *effects_of_terms(known.state.terms, start),
+        *earth_rate_effects(known.heading),
+    ]
     effects += known_random_effects(prepared.source.about)
-    for tone in prepared.tones:
-        effects += of_tone(tone, start)
+    for tone in prepared.spectral_lines:
+        effects += line_effects(tone, start)
     for one in found.effects:
-        effects += of_samples(explanation, one, start)
-    return device(explanation, known.state, _each_once(effects))
+        effects += effects_on_samples(explanation, one, start)
+    return device_profile(explanation, known.state, _without_repeats(effects))
 
 
-def device(
+def device_profile(
     explanation: Explanation, state: State, effects: list[SimulatedEffect]
 ) -> Profile:
-    """The device with some calibration and some effects."""
+    """Profile of a device with the calibration of a state and some effects."""
     source = explanation.prepared.source
     about = source.about
     bias, loud = state.bias.copy(), 0.0
@@ -83,8 +88,8 @@ def device(
     for term in state.terms:
         if term.effect.id == VIBRATION:  # the catalogue's variance has the noise in it
             bias[:3] += term.values * explanation.rows.x.variance.min(axis=0)
-            loud = float(vibration(explanation).max(initial=0.0))
-    effects = [_levelled(e, loud) if e.id == VIBRATION else e for e in effects]
+            loud = float(vibration_by_position(explanation).max(initial=0.0))
+    effects = [_with_level(e, loud) if e.id == VIBRATION else e for e in effects]
     name, serial = (str(about.device.get(k, "")) for k in ("name", "serial"))
     return Profile(
         device=Identity(
@@ -110,13 +115,13 @@ def device(
             _triad(state.scale[3:]),
         ),
         noise=noise,
-        temperature=climate(source.warmth, float(source.block.t[0])),
+        temperature=temperature_course(source.warmth, float(source.block.t[0])),
         effects=tuple(effects),
     )
 
 
-def settled(terms: Sequence[Term], start: float) -> list[SimulatedEffect]:
-    """Effects with an equation, with their values; those of one shape are one."""
+def effects_of_terms(terms: Sequence[Term], start: float) -> list[SimulatedEffect]:
+    """Simulated effects of terms; terms of one effect and shape are added."""
     total: dict[tuple[str, tuple[tuple[str, float], ...]], Term] = {}
     for term in terms:
         key = (term.effect.id, tuple(term.shape.items()))
@@ -124,15 +129,15 @@ def settled(terms: Sequence[Term], start: float) -> list[SimulatedEffect]:
         total[key] = replace(term, values=term.values + more)
     out = []
     for term in total.values():
-        given = _numbers(term.effect, term.values)
+        given = _nonzero_parameters(term.effect, term.values)
         if given or not term.effect.params:
-            given |= _counted(term.shape, start)
+            given |= _since_start(term.shape, start)
             out.append(vocabulary.effect(term.effect.id, given))
     return out
 
 
-def of_earth(heading: float | None) -> Iterator[SimulatedEffect]:
-    """The Earth's rate as a fixture of some heading, rad, feels it, if it does."""
+def earth_rate_effects(heading: float | None) -> Iterator[SimulatedEffect]:
+    """Simulated effects of the Earth's rate at a heading, rad; none without one."""
     if heading is not None:
         yield vocabulary.effect("earth_rate", {})
         if heading:
@@ -141,13 +146,13 @@ def of_earth(heading: float | None) -> Iterator[SimulatedEffect]:
 
 
 def known_random_effects(about: Description) -> Iterator[SimulatedEffect]:
-    """Random effects and those on samples that the simulation has already."""
+    """Random effects, and effects on samples, that the simulation has already."""
     for name, given in about.model.items():
         if isinstance(catalogue()[name], Scatter | Chain):
             yield vocabulary.effect(name, given)
 
 
-def of_tone(tone: Tone, start: float) -> Iterator[SimulatedEffect]:
+def line_effects(tone: SpectralLine, start: float) -> Iterator[SimulatedEffect]:
     """A line, one effect for each of its causes, with its phase at the start.
 
     Re(c exp(2 pi i hz t)) = |c| sin(2 pi hz (t - start) + phase)
@@ -164,10 +169,10 @@ def of_tone(tone: Tone, start: float) -> Iterator[SimulatedEffect]:
         yield vocabulary.effect(tone.effect.id, given)
 
 
-def of_samples(
+def effects_on_samples(
     explanation: Explanation, found: FoundEffect, start: float
 ) -> Iterator[SimulatedEffect]:
-    """What is random, and what happened to samples."""
+    """Simulated effect of a found random effect, or of a found fault of samples."""
     kind = catalogue()[found.id]
     if not isinstance(kind, Scatter | Chain):
         return
@@ -178,11 +183,11 @@ def of_samples(
         channel = CHANNELS.index(str(given["channel"]))
         block = explanation.prepared.source.block
         given["full_scale"] = WORDS * lsb_of(block.six[:, channel])
-    yield vocabulary.effect(found.id, _counted(given, start))
+    yield vocabulary.effect(found.id, _since_start(given, start))
 
 
-def climate(warmth: Thermometer, start: float) -> Climate:
-    """The course of the temperature, in as many points as it is known to."""
+def temperature_course(warmth: Thermometer, start: float) -> Climate:
+    """The recorded course of the temperature, in a limited number of points."""
     if not np.isfinite(warmth.start_c):
         return Climate(self_heating_k=0.0)
     long = np.ptp(warmth.t) > 1.0
@@ -193,7 +198,7 @@ def climate(warmth: Thermometer, start: float) -> Climate:
     return Climate(points=tuple(points), self_heating_k=0.0)
 
 
-def vibration(explanation: Explanation) -> Array:
+def vibration_by_position(explanation: Explanation) -> Array:
     """Vibration in each position beyond the quietest window, (p,) m/s^2 rms."""
     x, scale = explanation.rows.x, explanation.state.scale[:3]
     more = (x.variance - x.variance.min(axis=0)) / scale**2
@@ -222,25 +227,25 @@ def _noise(explanation: Explanation, effects: list[SimulatedEffect]) -> NoiseFig
     )
 
 
-def _numbers(effect: Effect, values: Array) -> dict[str, Any]:
+def _nonzero_parameters(effect: Effect, values: Array) -> dict[str, Any]:
     """Parameters that are not zero."""
     names = [p.name for p in effect.params]
     return {n: float(v) for n, v in zip(names, values, strict=True) if v}
 
 
-def _counted(given: Mapping[str, Any], start: float) -> dict[str, Any]:
-    """With instants counted from the session's start."""
+def _since_start(given: Mapping[str, Any], start: float) -> dict[str, Any]:
+    """Parameters with instants counted from the session's start."""
     return {k: v - start if k in INSTANTS else v for k, v in given.items()}
 
 
-def _levelled(effect: SimulatedEffect, level: float) -> SimulatedEffect:
+def _with_level(effect: SimulatedEffect, level: float) -> SimulatedEffect:
     return vocabulary.effect(effect.id, {**effect.parameters, "level": level})
 
 
-def _each_once(
+def _without_repeats(
     effects: list[SimulatedEffect],
 ) -> list[SimulatedEffect]:
-    """With several of what cannot be there twice put together: the last one counts."""
+    """Keep only the last one of effects that a device cannot have twice."""
     out: dict[object, SimulatedEffect] = {}
     for i, one in enumerate(effects):
         again = one.REPEATS and one.id != "earth_rate"

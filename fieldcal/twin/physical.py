@@ -1,18 +1,19 @@
-"""The fitted state as one that a device can have.
+"""Makes the fitted state one that a device can have.
 
-In the model the rate of the base is three free numbers e. A device feels the Earth's at
-its latitude, turned about the vertical by its heading, or nothing; what else was fitted
-goes along with that,
+In the model the rate of the base is three free parameters e. A device measures the
+Earth's rate at its latitude, rotated about the vertical by its heading, or none. Given
+that rate e', the other estimates become
 
     m' = m + C_e C_ee^-1 (e' - m_e)                                                (1)
 
-m and C being the estimates and their covariance. In the model what settles on one triad
-may count from the end of the motion, and on the other from the start of the window; a
-device settles from one instant, the later of them. What counts from d before it has
+with the estimates m and their covariance C. In the model the settling of one triad may
+count from the end of the motion, and that of the other from the start of the window. A
+device settles from one instant, the later of them. An amplitude that counts from d
+earlier becomes
 
     A' = A exp(-d / tau)                                                           (2)
 
-left then. Source: (1) the mean of a normal distribution, given some of its components.
+Source: (1) the mean of a normal distribution, given some of its components.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ HEADINGS = np.linspace(-np.pi, np.pi, 3601)
 
 @dataclass(frozen=True, slots=True)
 class TwinState:
-    """Where a device stands.
+    """State of the twin.
 
     Attributes
     ----------
     state : its calibration and effects
-    heading : of the fixture, rad, if the Earth's rate is felt beyond what is known
+    heading : of the fixture, rad; None if no Earth's rate was fitted
 
     """
 
@@ -51,26 +52,26 @@ class TwinState:
     heading: float | None = None
 
 
-def fitted_device(explanation: Explanation) -> TwinState:
-    """The device with all that was found."""
+def physical_twin_state(explanation: Explanation) -> TwinState:
+    """State of the twin with all causes that were found."""
     best, heading, rate = explanation.best, None, np.zeros(3)
-    if explanation.shows_earth:
-        heading = _heading(best)
-        rate = _turned(best.rows.x, np.array([heading]))[0]
-    state = _given(explanation, best, rate)
+    if explanation.shows_earth_rate:
+        heading = _best_heading(best)
+        rate = _earth_rates_by_heading(best.rows.x, np.array([heading]))[0]
+    state = _state_given_rate(explanation, best, rate)
     return TwinState(from_one_instant(state, best.dictionary.since), heading)
 
 
-def without(explanation: Explanation, fitted: Fitted) -> State:
-    """What was fitted, the Earth's rate being none beyond what is known."""
-    return _given(explanation, fitted, np.zeros(3))
+def state_without_earth_rate(explanation: Explanation, fitted: Fitted) -> State:
+    """The fitted state, given that the fitted rate of the base is zero."""
+    return _state_given_rate(explanation, fitted, np.zeros(3))
 
 
-def _given(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
-    """What was fitted, given the rate of the base, (3,) rad/s (1)."""
+def _state_given_rate(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
+    """The fitted state, given the rate of the base, (3,) rad/s (1)."""
     nominal = explanation.inferred.inference.nominal
     inference = Inference(WindowSystem(fitted.rows, fitted.dictionary), nominal)
-    found, at = fitted.set.state, _columns(fitted)
+    found, at = fitted.set.state, _base_rate_columns(fitted)
     if len(at):
         shared = found.inverse[:, at]
         off = np.linalg.solve(shared[at], rate - found.estimate[at])
@@ -79,9 +80,9 @@ def _given(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
 
 
 def from_one_instant(state: State, since: Array) -> State:
-    """With all that settles counted from the same instants (2).
+    """Count all settling from the same instant (2).
 
-    `since` (o, n) is the time since the turn in each row, by origin.
+    `since` (o, n) is the time since the turn in each row, for each origin.
     """
     last, terms = max((t.origin for t in state.terms), default=0), []
     for term in state.terms:
@@ -95,18 +96,18 @@ def from_one_instant(state: State, since: Array) -> State:
     return replace(state, terms=tuple(terms))
 
 
-def _columns(fitted: Fitted) -> Index:
-    """Where the rate of the base is among what was fitted, (3,) or (0,)."""
+def _base_rate_columns(fitted: Fitted) -> Index:
+    """Indices of the rate of the base among the estimates, (3,) or (0,)."""
     first = fitted.dictionary.earth
     if first < 0:
         return np.zeros(0, dtype=np.intp)
     return np.flatnonzero(np.isin(fitted.set.state.columns, first + np.arange(3)))
 
 
-def _heading(fitted: Fitted) -> float:
-    """Heading that suits the rate that was fitted best, rad; 0 if that suits it."""
-    found, at = fitted.set.state, _columns(fitted)
-    off = _turned(fitted.rows.x, HEADINGS) - found.estimate[at]
+def _best_heading(fitted: Fitted) -> float:
+    """Heading that best agrees with the fitted rate, rad; 0 if north agrees with it."""
+    found, at = fitted.set.state, _base_rate_columns(fitted)
+    off = _earth_rates_by_heading(fitted.rows.x, HEADINGS) - found.estimate[at]
     known = np.linalg.inv(found.inverse[np.ix_(at, at)])
     square = np.einsum("ni,ij,nj->n", off, known, off)
     north = float(np.interp(0.0, HEADINGS, square))
@@ -114,8 +115,8 @@ def _heading(fitted: Fitted) -> float:
     return float(HEADINGS[best]) if north - square[best] > STANDS**2 else 0.0
 
 
-def _turned(x: Experience, headings: Array) -> Array:
-    """The Earth's rate in base axes by heading, (n, 3) rad/s."""
+def _earth_rates_by_heading(x: Experience, headings: Array) -> Array:
+    """The Earth's rate in base axes for each heading, (n, 3) rad/s."""
     east, down, north = earth_rate_home(x.latitude) + x.transport
     c, s = np.cos(headings), np.sin(headings)
     return np.column_stack(

@@ -1,19 +1,18 @@
 """Replays the session on the virtual device with its own physics.
 
-The device is held where the session's windows held it, at the session's own times, in
-the temperature that was recorded, without noise, and its outputs are compared with the
-recorded ones over the same stretches: rms over parts of windows, and
+The device is held in the session's positions, at the session's times, at the recorded
+temperature, without noise. Its outputs are compared with the recorded ones over the
+same stretches: rms over parts of windows, and
 
     chi^2 = sum |L^-1 (y - y_replayed)|^2
 
-with the covariance L L^T of white noise and of the instability that the diagnosis has
-for the windows. Three devices are compared: the one session.toml describes, the same
-with bias and scale factor refitted, and the twin. What is random is drawn anew in every
-run of a device, so it is left out of the replay, and so is what no effect makes: what
-the diagnosis estimates of both is taken from the twin's differences. Angles that were
-set otherwise are set so. What happened to samples has been undone in the recording.
-A line is compared by its amplitude. From window to window each device is carried along
-the way that it reads from the recorded gyroscopes itself (`ways`).
+with the covariance L L^T of white noise and of the instability that the diagnosis found
+for the windows. Three devices are compared: the one that session.toml describes, the
+same with bias and scale factor refitted, and the twin. Random effects and causes that
+are no effects are left out of the replay, and their estimates are subtracted from the
+twin's differences. Angles are those that were found. Faults of samples have been
+corrected in the recording. Lines are compared by their amplitude. From window to window
+each device is moved along the turn that it reads from the recorded gyroscopes (`ways`).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import Fitted
@@ -36,29 +35,31 @@ from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.twin import device as twin
 from fieldcal.twin import physical, schedule
-from fieldcal.twin.agreement import ReplayRun, Rerun
-from fieldcal.twin.ways import apart
+from fieldcal.twin.agreement import ReplayFigures, ReplayResult
+from fieldcal.twin.ways import turn_difference
 
 RANDOM = ("random_walk", "angle_setting")
 SAMPLES = (
     *("quantisation", "saturation", "stuck", "dropped", "clock_skew", "bump"),
     *("decode_fault", "noise_level", "mounting"),
 )
-"""Left out of the replay: see above."""
+"""Effects that are left out of the replay."""
 
 LINES = ("hum", "sway")
 
-SHAKEN = 64
-"""Replays that are averaged where the device vibrates, which is random."""
+VIBRATED_REPLAYS = 64
+"""Replays that are averaged if the device vibrates, since vibration is random."""
 
 
-def rerun(explanation: Explanation, found: Diagnosis, raw: Fitted) -> Rerun:
+def replay_session(
+    explanation: Explanation, found: Diagnosis, raw: Fitted
+) -> ReplayResult:
     """Replay a session on the twin and on the devices that it is compared with.
 
     Parameters
     ----------
     explanation, found : of the session
-    raw : bias and scale factor alone, on the samples as they came
+    raw : fit of bias and scale factor alone to the samples as recorded
 
     Raises
     ------
@@ -66,22 +67,22 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Fitted) -> Rerun:
         If the session's windows overlap, so that no device could go through them.
 
     """
-    known = physical.fitted_device(explanation)
-    profile = twin.device_of(explanation, found, known)
-    cases = _cases(explanation, profile, known.state, raw)
+    known = physical.physical_twin_state(explanation)
+    profile = twin.twin_profile(explanation, found, known)
+    cases = _replay_cases(explanation, profile, known.state, raw)
     followed = [{t.positions for t in cases[n].turns} for n in ("refitted", "twin")]
     runs = {
-        name: _run(explanation, case.only(set.intersection(*followed)))
+        name: _replay(explanation, case.with_turns_between(set.intersection(*followed)))
         for name, case in cases.items()
     }
     held = np.unique(raw.rows.x.position)
     old, new = runs["refitted"].rms ** 2, runs["twin"].rms ** 2
     gain = np.nan_to_num((old - new) / np.where(new > 0, new, np.inf), nan=-1.0)
-    return Rerun(
+    return ReplayResult(
         profile,
         runs,
         explanation.prepared.source.about.numbered(held),
-        np.array([_stretch(raw.rows, p) for p in held]),
+        np.array([_time_span(raw.rows, p) for p in held]),
         tuple(e.id for e in profile.effects if e.id in RANDOM),
         int(np.argmax(gain)),
         tuple(cause.name for cause, _ in explanation.best.set.members),
@@ -89,65 +90,67 @@ def rerun(explanation: Explanation, found: Diagnosis, raw: Fitted) -> Rerun:
 
 
 @dataclass(frozen=True, slots=True)
-class _Case:
-    """A device that is compared: what it is, and where it was by its own lights.
+class _ReplayCase:
+    """A device to be compared, and its orientations.
 
     Attributes
     ----------
-    device : without anything random
-    fitted : rows, and how they are weighed
-    state : what says where the device was
-    apart : (n, 6) what of the rows is not the device's to replay
-    turns : as the gyroscopes tell them by that state
+    device : without random effects
+    fitted : rows and their weights
+    state : from which the orientations follow
+    not_replayed : (n, 6) part of the rows that the replay leaves out
+    turns : integrated from the gyroscopes with that state
 
     """
 
     device: Profile
     fitted: Fitted
     state: State
-    apart: Array
+    not_replayed: Array
     turns: tuple[Turn, ...]
 
-    def only(self, pairs: Set[tuple[int, int]]) -> _Case:
-        """Without the turns that not every device can follow."""
+    def with_turns_between(self, pairs: Set[tuple[int, int]]) -> _ReplayCase:
+        """Keep the turns between some pairs of positions only."""
         return replace(self, turns=tuple(t for t in self.turns if t.positions in pairs))
 
 
-def _cases(
+def _replay_cases(
     explanation: Explanation, profile: Profile, found: State, raw: Fitted
-) -> dict[str, _Case]:
-    """The devices, by name, their differences weighed alike."""
+) -> dict[str, _ReplayCase]:
+    """The three devices, by name, with equal weights of their differences."""
     best, nominal = explanation.best, explanation.inferred.inference.nominal
     start = float(explanation.prepared.source.block.t[0])
-    effects = twin.settled(nominal.terms, start)
+    effects = twin.effects_of_terms(nominal.terms, start)
     sizes = replace(raw.set.sizes, instability=best.set.sizes.instability)
     raw = replace(raw, set=replace(raw.set, sizes=sizes))
-    refitted = physical.without(explanation, raw)
+    refitted = physical.state_without_earth_rate(explanation, raw)
 
-    def simulated(state: State) -> _Case:
-        device = twin.device(explanation, state, effects)
-        return _case(explanation, device, raw, state, np.zeros(raw.rows.y.shape))
+    def simulated(state: State) -> _ReplayCase:
+        device = twin.device_profile(explanation, state, effects)
+        return _replay_case(explanation, device, raw, state, np.zeros(raw.rows.y.shape))
 
     return {
         "simulation": simulated(nominal),
         "refitted": simulated(refitted),
-        "twin": _case(explanation, profile, best, found, _no_effect(best)),
+        "twin": _replay_case(
+            explanation, profile, best, found, _outputs_of_no_effect(best)
+        ),
     }
 
 
-def _case(
+def _replay_case(
     explanation: Explanation, device: Profile, fitted: Fitted, state: State, off: Array
-) -> _Case:
-    """A device with its turns, where the diagnosis looks at turns."""
+) -> _ReplayCase:
+    """A device with its turns, if the diagnosis uses turns."""
     made: tuple[Turn, ...] = ()
     if explanation.inferred.inference.turns is not None:
         source, since = explanation.prepared.source, fitted.dictionary.since
         made = tuple(Turning(source, fitted.rows, since).turns(state))
-    return _Case(_certain(device), fitted, state, off, made)
+    return _ReplayCase(_without_random_effects(device), fitted, state, off, made)
 
 
-def _no_effect(fitted: Fitted) -> Array:
-    """What is laid to chance, and to what no effect makes, in each row, (n, 6)."""
+def _outputs_of_no_effect(fitted: Fitted) -> Array:
+    """Outputs by random effects and by causes that are no effects, (n, 6)."""
     taken = fitted.values.copy()
     for _, group in fitted.set.members:
         if not group.in_state:
@@ -156,68 +159,76 @@ def _no_effect(fitted: Fitted) -> Array:
     return np.nan_to_num(out)
 
 
-def _certain(profile: Profile) -> Profile:
-    """The device without what is random and what happens to its samples."""
+def _without_random_effects(profile: Profile) -> Profile:
+    """The device without random effects and effects on samples."""
     kept = (e for e in profile.effects if e.id not in (*RANDOM, *SAMPLES))
     return replace(profile, effects=tuple(kept))
 
 
-def _run(explanation: Explanation, case: _Case) -> ReplayRun:
-    """How far a device's replay is from the recording."""
+def _replay(explanation: Explanation, case: _ReplayCase) -> ReplayFigures:
+    """Replay the session on a device, and compare it with the recording."""
     device, rows, turns = case.device, case.fitted.rows, case.turns
     source = explanation.prepared.source
     start = float(source.block.t[0])
     shaken = bool(device.every(twin.VIBRATION))
-    level = twin.vibration(explanation) * shaken
-    windows = schedule.windows(explanation, case.state, case.fitted, level, turns)
-    t = schedule.instants(source.block.t, rows.span, schedule.ENOUGH, turns)
+    level = twin.vibration_by_position(explanation) * shaken
+    windows = schedule.replay_windows(
+        explanation, case.state, case.fitted, level, turns
+    )
+    t = schedule.replay_instants(source.block.t, rows.span, schedule.ENOUGH, turns)
     plain = [e for e in device.effects if e.id not in LINES]
     blocks = [
         simulate(
             replace(device, effects=tuple(plain)), windows, t - start, None, k, False
         )
-        for k in range(SHAKEN if shaken else 1)
+        for k in range(VIBRATED_REPLAYS if shaken else 1)
     ]
     block = replace(blocks[0], t=t)
     replayed = np.mean([_means(b, t, rows.span) for b in blocks], axis=0)
-    off = np.where(rows.used, rows.y - replayed - case.apart, np.nan)
+    off = np.where(rows.used, rows.y - replayed - case.not_replayed, np.nan)
     total = float(case.fitted.squares_of(off).sum())
-    return ReplayRun(
-        _triads(rms(rows, off)),
+    return ReplayFigures(
+        _rms_by_triad(rms_over_parts(rows, off)),
         total / max(case.fitted.dof, 1),
         *_by_position(case.fitted, off),
-        _lines(explanation, device, windows, rows),
-        apart(turns, source.block, block),
+        _line_remainders(explanation, device, windows, rows),
+        turn_difference(turns, source.block, block),
     )
 
 
 def _by_position(fitted: Fitted, off: Array) -> tuple[Array, Array]:
-    """Rms of each window, (p, 2), and its squares a mean, (p,)."""
+    """Rms of each window, (p, 2), and its chi squared per mean, (p,)."""
     rows, places, chi2 = fitted.rows, [], []
     for p in np.unique(rows.x.position):
         at: NDArray[np.bool_] = rows.x.position == p
-        places.append(_triads(rms(rows, np.where(at[:, None], off, np.nan))))
+        places.append(
+            _rms_by_triad(rms_over_parts(rows, np.where(at[:, None], off, np.nan)))
+        )
         count = rows.used[at].sum()
         squares = fitted.squares_of(np.where(at[:, None], off, 0.0)).sum()
         chi2.append(float(squares / count) if count else np.nan)
     return np.array(places), np.array(chi2)
 
 
-def _lines(
+def _line_remainders(
     explanation: Explanation, device: Profile, windows: Sequence[HeldWindow], rows: Rows
 ) -> Array:
-    """What is left of each line, (k, 2)."""
-    tones, t = explanation.prepared.tones, explanation.prepared.source.block.t
+    """Rms of the remainder of each line, (k, 2)."""
+    tones, t = explanation.prepared.spectral_lines, explanation.prepared.source.block.t
     if not tones:
         return np.empty((0, 2))
-    inside = schedule.instants(t, rows.span, len(t), [])
+    inside = schedule.replay_instants(t, rows.span, len(t), [])
     block = simulate(device, windows, inside - t[0], noise=False)
     block = replace(block, t=inside)
-    return np.array([_line(explanation, block, rows, tone.hz) for tone in tones])
+    return np.array(
+        [_line_remainder(explanation, block, rows, tone.hz) for tone in tones]
+    )
 
 
-def _line(explanation: Explanation, replayed: Block, rows: Rows, hz: float) -> Array:
-    """Root mean square of what the replay leaves of a line, (2,)."""
+def _line_remainder(
+    explanation: Explanation, replayed: Block, rows: Rows, hz: float
+) -> Array:
+    """Rms of recording less replay at the frequency of a line, (2,)."""
     checked = explanation.prepared.checked
     squares, count = np.zeros(6), 0
     for p in np.unique(rows.x.position):
@@ -233,7 +244,9 @@ def _line(explanation: Explanation, replayed: Block, rows: Rows, hz: float) -> A
         wave = np.exp(-2j * np.pi * hz * checked.block.t[cut])
         squares += np.abs(2 * (wave @ apart) / len(wave)) ** 2 / 2
         count += 1
-    return _triads(np.where(rows.used.any(axis=0), np.sqrt(squares / count), np.nan))
+    return _rms_by_triad(
+        np.where(rows.used.any(axis=0), np.sqrt(squares / count), np.nan)
+    )
 
 
 def _means(block: Block, t: Array, span: Array) -> Array:
@@ -243,7 +256,7 @@ def _means(block: Block, t: Array, span: Array) -> Array:
     return np.array([six[a:b].mean(axis=0) for a, b in zip(first, last, strict=True)])
 
 
-def _triads(six: Array) -> Array:
+def _rms_by_triad(six: Array) -> Array:
     """Root mean squares of the channels, triad by triad, (2,); nan where unknown."""
     out = np.full(2, np.nan)
     for i in (0, 1):
@@ -254,6 +267,6 @@ def _triads(six: Array) -> Array:
     return out
 
 
-def _stretch(rows: Rows, position: int) -> tuple[float, float]:
+def _time_span(rows: Rows, position: int) -> tuple[float, float]:
     span = rows.span[rows.x.position == position]
     return float(span[0, 0]), float(span[-1, 1])

@@ -1,9 +1,8 @@
-"""Commands that take the virtual device through a session again.
+"""Positions and turns that take the virtual device through a session again.
 
-It is held where the windows held it, as far as a fit knows that: at the angles of
-session.toml with the turns aside that were found, or, where none are known, at those
-that bring about the force that was felt. From one to the next it is carried as the
-gyroscopes tell; where they do not, a turn ends when the device came to rest.
+It is held at the angles of session.toml with the errors that were found, or, where no
+angles are known, at those that give the measured force. From one position to the next
+it moves as the gyroscopes measured; otherwise a turn ends when the device came to rest.
 """
 
 from __future__ import annotations
@@ -21,19 +20,19 @@ from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.turns.turn import Turn, only
 from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.replay import HeldWindow
-from fieldcal.twin.ways import way_of
+from fieldcal.twin.ways import manoeuvre_of_turn
 
 ENOUGH = 24
-"""Samples of a row that give its mean, where nothing oscillates."""
+"""Samples of a row that are simulated for its mean, without oscillations."""
 
 TURN_S = 4.0
-"""A turn takes at most so long."""
+"""Longest turn, s."""
 
 PUT_S = 60.0
-"""The device had stood somewhere for so long before the first window, s."""
+"""Time at rest before the turn to the first window, s."""
 
 
-def windows(
+def replay_windows(
     explanation: Explanation,
     state: State,
     fitted: Fitted,
@@ -42,18 +41,18 @@ def windows(
 ) -> list[HeldWindow]:
     """The session's windows in time order, from its start, with their turns.
 
-    `state` says where the device was in each, `shaken` (p,) is its vibration there,
-    m/s^2; `turns` are those that the gyroscopes have followed.
+    `state` gives the orientation in each, `shaken` (p,) the vibration there, m/s^2;
+    `turns` are those that the gyroscopes measured.
     """
     source, x = explanation.prepared.source, fitted.rows.x
     start, t = float(source.block.t[0]), source.block.t
-    felt, arrived = state.experienced(x).f, _arrived(state, fitted)
+    felt, arrived = state.experienced(x).f, _rest_onsets(state, fitted)
     out: list[HeldWindow] = []
     bounds = spans(source.block, source.about)
-    ways = {turn.positions[1]: way_of(turn, start) for turn in turns}
+    ways = {turn.positions[1]: manoeuvre_of_turn(turn, start) for turn in turns}
     for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
         row = int(np.argmax(x.position == p))
-        alpha, beta = _angles(state, only(x, [row]), felt[row])
+        alpha, beta = _joint_angles(state, only(x, [row]), felt[row])
         begin, end = (float(v) - start for v in (t[bounds[p, 0]], t[bounds[p, 1] - 1]))
         if not out and np.isfinite(arrived[row]):  # put there not long before
             out.append(HeldWindow(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
@@ -76,11 +75,11 @@ def windows(
     return out
 
 
-def _angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
-    """Angles, rad, that the joints are asked for in a position.
+def _joint_angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
+    """Angles, rad, to which the joints are set in a position.
 
-    Where none are known, or three, those that bring about the force felt there, (3,)
-    m/s^2, with all that is amiss with the base and the gauges of the joints.
+    Where no angles are known, or three, they are those that give the measured force
+    `felt` (3,), m/s^2, with the errors of the base and of the joints' gauges.
     """
     if x.oriented[0] and not x.gamma[0]:
         small = state.small_rotation[x.position[0]]
@@ -88,14 +87,14 @@ def _angles(state: State, x: Experience, felt: Array) -> tuple[float, float]:
     state = replace(state, small_rotation=np.zeros_like(state.small_rotation))
     asked = np.array([0.0, 1.0])
     gauged = state.experienced(only(x, [0, 0]).turned(alpha=asked, beta=asked))
-    there = _joints(gauged.base_force, x.mounting @ felt)
+    there = _angles_for_force(gauged.base_force, x.mounting @ felt)
     out = []
     for angle, read in zip(there, (gauged.alpha, gauged.beta), strict=True):
         out.append(float((angle - read[0]) / (read[1] - read[0])))
     return out[0], out[1]
 
 
-def _joints(base: Array, seen: Array) -> tuple[float, float]:
+def _angles_for_force(base: Array, seen: Array) -> tuple[float, float]:
     """Angles alpha, beta, rad, that turn a force in base axes to that seen, (3,) each.
 
     With v = (., b_y cos a - b_x sin a, b_z) after the first joint, in unit vectors,
@@ -114,15 +113,15 @@ def _joints(base: Array, seen: Array) -> tuple[float, float]:
     return alpha, beta
 
 
-def _arrived(state: State, fitted: Fitted) -> Array:
-    """When the device came to rest for what settles afterwards, (n,) s by row."""
+def _rest_onsets(state: State, fitted: Fitted) -> Array:
+    """Instant by row, (n,) s, at which the device came to rest, for settling."""
     x, since = fitted.rows.x, fitted.dictionary.since
     arrived: Array = x.t - since[max((t.origin for t in state.terms), default=0)]
     return arrived
 
 
-def instants(t: Array, span: Array, most: int, turns: Sequence[Turn]) -> Array:
-    """Sample times: in each row `most` evenly spread at most, and edges of turns."""
+def replay_instants(t: Array, span: Array, most: int, turns: Sequence[Turn]) -> Array:
+    """Times of simulated samples: at most `most` in each row, and those of turns."""
     first = np.searchsorted(t, span[:, 0], side="left")
     last = np.searchsorted(t, span[:, 1], side="right")
     some = [np.searchsorted(t, turn.t) for turn in turns]

@@ -1,15 +1,15 @@
-"""The ways between windows: as the gyroscopes tell them, and how they come out again.
+"""Turns between windows: as the gyroscopes measured them, and their replay.
 
-The course of a turn was the hand's. The virtual device is carried along it by the
-angles that a model of the device reads from the recorded gyroscopes, taken straight to
-where the next window holds it:
+A turn was made by hand. The virtual device is moved along the rotation that the model
+of the device reads from the recorded gyroscopes, corrected linearly by the closure so
+that it ends in the next position:
 
     a_k = log(R_k R_{k-1}^T) - R_k phi (u_k - u_{k-1})
 
-with attitude R, closure phi and the part u of the turn that is done, as in
-`model.turn`. What the sensors put out on it is the virtual device's own physics,
-and is compared with what they did put out: the accelerometers' means over parts of the
-way, and the gyroscopes' integrals from its start to its end.
+with attitude R, closure phi and the completed part u of the turn, as in `model.turn`.
+The outputs during the turn come from the virtual device's own physics. Compared with
+the recording are the accelerometers' means over parts of the turn, and the gyroscopes'
+integrals over the whole turn.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from fieldcal.sim_device.way import Manoeuvre
 
 
 @dataclass(frozen=True, slots=True)
-class WayDifference:
-    """Recorded less replayed on the ways.
+class TurnDifference:
+    """Recorded less replayed outputs in turns.
 
     Attributes
     ----------
-    force : rms of the accelerometers' means, m/s^2; nan without a way
-    angle : rms of the gyroscopes' integrals, rad; nan without a way
+    force : rms of the accelerometers' means, m/s^2; nan without a turn
+    angle : rms of the gyroscopes' integrals, rad; nan without a turn
 
     """
 
@@ -40,8 +40,8 @@ class WayDifference:
     angle: float
 
 
-def way_of(turn: Turn, start: float) -> Manoeuvre:
-    """The way of a turn, in procedure axes and s since `start`."""
+def manoeuvre_of_turn(turn: Turn, start: float) -> Manoeuvre:
+    """The rotation of a turn, in procedure axes, as a function of s since `start`."""
     steps = turn.attitude[1:] @ np.swapaxes(turn.attitude[:-1], 1, 2)
     sine = -vee(steps)
     size = np.linalg.norm(sine, axis=1)
@@ -52,8 +52,10 @@ def way_of(turn: Turn, start: float) -> Manoeuvre:
     return Manoeuvre(turn.t - start, turn.x.mounting @ total.T)
 
 
-def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> WayDifference:
-    """How far a replay is from the recording on the ways.
+def turn_difference(
+    turns: Sequence[Turn], recorded: Block, replayed: Block
+) -> TurnDifference:
+    """Differences between replay and recording in turns.
 
     `replayed` has samples at the edges of every turn, `recorded` all there are.
     """
@@ -68,12 +70,12 @@ def apart(turns: Sequence[Turn], recorded: Block, replayed: Block) -> WayDiffere
         forces.append((turn.acc - turn.means(again.acc)).ravel())
         angles.append(trapezoid(there.gyr, there.t) - trapezoid(again.gyr, again.t))
     if not forces:
-        return WayDifference(np.nan, np.nan)
-    return WayDifference(_rms(np.concatenate(forces)), _rms(np.concatenate(angles)))
+        return TurnDifference(np.nan, np.nan)
+    return TurnDifference(_rms(np.concatenate(forces)), _rms(np.concatenate(angles)))
 
 
 def trapezoid(values: Array, t: Array) -> Array:
-    """Integral of a course (n, 3) by the trapezoid rule, (3,)."""
+    """Integral of values (n, 3) over t (n,) by the trapezoid rule, (3,)."""
     middle = (values[1:] + values[:-1]) / 2
     out: Array = np.diff(t) @ middle
     return out

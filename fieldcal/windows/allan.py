@@ -19,14 +19,14 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.windows.cells import resolution
-from fieldcal.windows.noise import SHOWN, short_lag, steps_of
-from fieldcal.windows.rounding import of_mean
+from fieldcal.windows.noise import STEP_SAMPLES, short_lag_noise, smallest_steps
+from fieldcal.windows.rounding import variance_of_mean
 
 SHORTEST = 60.0
-"""Shortest recording that says anything about windows, s."""
+"""Shortest recording that is evaluated, s."""
 
 GAP = 1.0
-"""Longest stretch without samples that does not matter, s."""
+"""Longest gap that is tolerated, s."""
 
 AVERAGES = 4
 """Fewest means a deviation is taken from: the longest tau is a fourth of the record."""
@@ -68,7 +68,7 @@ class AllanDeviation:
             )
         logs = np.log(np.where(self.deviation > 0, self.deviation, np.nan))
         at = [np.interp(np.log(seconds), np.log(self.tau), column) for column in logs.T]
-        # one mean is off by its rounding as the next is: no difference shows it
+        # neighbouring means have the same rounding error: their difference hides it
         sigma: Array = np.hypot(np.nan_to_num(np.exp(at)), self.rounding)
         return np.where(sigma > 0, sigma, np.nan)
 
@@ -95,7 +95,7 @@ def allan_deviation(block: Block) -> AllanDeviation:
         If the recording is too short or has a gap, or allantools is not installed.
 
     """
-    _check(block)
+    _check_recording(block)
     tools = _allantools()
     six = np.where(np.isfinite(block.six), block.six, np.nan)
     rate = (len(block) - 1) / float(block.t[-1] - block.t[0])
@@ -106,15 +106,17 @@ def allan_deviation(block: Block) -> AllanDeviation:
     for channel in range(6):
         x = six[:, channel]
         if np.isnan(x).mean() < 0.5:
-            table[:, :, channel] = _of_channel(tools, _filled(x), rate, m)
-    pieces = [six[first : first + SHOWN] for first in range(0, len(six), SHOWN)]
-    steps = steps_of(pieces)
+            table[:, :, channel] = _channel_deviation(tools, _interpolated(x), rate, m)
+    pieces = [
+        six[first : first + STEP_SAMPLES] for first in range(0, len(six), STEP_SAMPLES)
+    ]
+    steps = smallest_steps(pieces)
     step = resolution(np.where(steps > 0, steps, np.inf))
-    rounding = np.sqrt(of_mean(step, np.nan_to_num(short_lag(six))))
+    rounding = np.sqrt(variance_of_mean(step, np.nan_to_num(short_lag_noise(six))))
     return AllanDeviation(m / rate, table[0], table[1], table[2], rounding)
 
 
-def _of_channel(tools: Any, x: Array, rate: float, m: Array) -> Array:
+def _channel_deviation(tools: Any, x: Array, rate: float, m: Array) -> Array:
     """Deviation with its interval, (3, k), at m samples (k,)."""
     _, deviation, _, n = tools.oadev(x - x.mean(), rate, "freq", m / rate)
     if len(deviation) != len(m):
@@ -126,15 +128,15 @@ def _of_channel(tools: Any, x: Array, rate: float, m: Array) -> Array:
     return np.array([deviation, low, high])
 
 
-def _filled(x: Array) -> Array:
-    """Values with missing ones laid on a line between their neighbours."""
+def _interpolated(x: Array) -> Array:
+    """Values (n,) with missing ones interpolated linearly."""
     known = np.isfinite(x)
     rows = np.arange(len(x))
     filled: Array = np.interp(rows, rows[known], x[known])
     return filled
 
 
-def _check(block: Block) -> None:
+def _check_recording(block: Block) -> None:
     seconds = float(block.t[-1] - block.t[0]) if len(block) else 0.0
     if seconds < SHORTEST:
         raise InputError(

@@ -22,20 +22,20 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows.rounding import visible_steps
-from fieldcal.windows.sums import channels, finest, warmth
-from fieldcal.windows.trend import lines
+from fieldcal.windows.sums import channel_sums, smallest_changes, temperature_sums
+from fieldcal.windows.trend import robust_lines
 
 CELL = 0.1
 """Length of a cell, s."""
 
 _CHUNK = 8192
-"""Samples summed at a time, so that what is in hand stays in the processor's cache."""
+"""Samples summed at a time, so that they stay in the processor's cache."""
 
 _GRACE = 1e-5
 """Part of a cell by which a time may miss its edge through rounding."""
 
 
-Between = Callable[[float, float], Iterable[Block]]
+SamplesBetween = Callable[[float, float], Iterable[Block]]
 """Samples from a time up to another, s, in order, in blocks."""
 
 
@@ -57,9 +57,9 @@ class CellTable:
     ----------
     times : (m,) start of each cell, s of device time
     sums : (m, 34) n, S, D, m of the six channels, sum and number of the temperatures,
-        the smallest change from one value to the next but none, and the first and the
-        last instant, this negative
-    origin : (6,) what the sums are taken about: the first value of each channel
+        the smallest nonzero change between successive values, the first instant, and
+        the last instant with negative sign
+    origin : (6,) reference of the sums: the first value of each channel
 
     """
 
@@ -71,8 +71,8 @@ class CellTable:
         return len(self.times)
 
     @property
-    def heard(self) -> CellTable:
-        """Those that hold a value: samples that were left out are no part of a mean."""
+    def with_values(self) -> CellTable:
+        """The cells that hold a value."""
         some = self.counts.any(axis=1)
         if some.all():
             return self
@@ -89,37 +89,37 @@ class CellTable:
         return _ratio(self.sums[:, 6:12], self.counts)
 
     @property
-    def short(self) -> Array:
+    def short_lag_variance(self) -> Array:
         """Variance of the short-lag noise in each cell, (m, 6); nan where unknown."""
         return _ratio(self.sums[:, 12:18], 2 * self.sums[:, 18:24])
 
     @property
-    def steady(self) -> Array:
-        """Means as `means`, (m, 6), alike in variance and with none missing.
+    def steady_means(self) -> Array:
+        """Means (m, 6) of equal variance, with none missing.
 
-        The mean of a cell with fewer values than usual is drawn towards a line through
-        the others as far as it varies more; where none is, it lies on the line.
+        The mean of a cell with fewer values than usual is moved towards a line through
+        the others, so that its variance is as usual; a missing mean is on the line.
         """
         counts, means = self.counts, self.means
         usual = np.median(counts, axis=0)
         trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
         if (trust == 1.0).all():
             return means
-        laid = lines(hold_last(means))
+        laid = robust_lines(hold_last(means))
         steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
         return steady
 
     @property
-    def whole(self) -> int:
-        """Cells that are complete: all, or all but the last while it fills."""
+    def complete_count(self) -> int:
+        """Number of complete cells: all, or all but the last while it fills."""
         if len(self) < 2:
             return len(self)
         filled = self.counts[-1].max() >= 0.9 * np.median(self.counts.max(axis=1))
         return len(self) if filled else len(self) - 1
 
     @property
-    def steps(self) -> Array:
-        """Successive differences in each cell, (m, 6)."""
+    def step_counts(self) -> Array:
+        """Number of successive differences in each cell, (m, 6)."""
         return self.sums[:, 18:24]
 
     @property
@@ -135,8 +135,8 @@ class CellTable:
 
     @property
     def resolution(self) -> Array:
-        """Finest change seen on any axis of the same sensor, (6,); 0 where none."""
-        return resolution(self.finest.min(axis=0, initial=np.inf))
+        """Smallest nonzero change on any axis of the same sensor, (6,); 0 if none."""
+        return resolution(self.smallest_changes.min(axis=0, initial=np.inf))
 
     @property
     def mean(self) -> Array:
@@ -152,8 +152,8 @@ class CellTable:
         return float(_ratio(total[24:25], total[25:26])[0])
 
     @property
-    def finest(self) -> Array:
-        """Smallest change from one value to the next but none in each cell, (m, 6)."""
+    def smallest_changes(self) -> Array:
+        """Smallest nonzero change of successive values in each cell, (m, 6)."""
         return self.sums[:, 26:32]
 
     @property
@@ -162,7 +162,7 @@ class CellTable:
         return float(self.sums[0, 32]), float(-self.sums[-1, 33])
 
     @property
-    def on_edge(self) -> bool:
+    def starts_on_edge(self) -> bool:
         """Whether its first sample lies where its first cell begins.
 
         Then cells that are summed from that sample on are the same.
@@ -175,8 +175,8 @@ class CellTable:
         return visible_steps(self.resolution, self.noise)
 
 
-class Cells:
-    """Sums up a stream of samples.
+class CellAccumulator:
+    """Sums a stream of samples into cells.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class Cells:
         return self._table(self._size)
 
     def take_complete(self) -> CellTable:
-        """Hand over the cells that no sample can come to any more, and forget them."""
+        """Return the cells that are complete, and remove them."""
         done = max(0, self._size - 1)
         taken = self._table(done)
         self._index = self._index[done:].copy()
@@ -208,8 +208,8 @@ class Cells:
         self._size -= done
         return taken
 
-    def cut(self, at: float) -> None:
-        """Forget what is not wholly before an instant, s of device time."""
+    def truncate(self, at: float) -> None:
+        """Remove the cells that end after an instant, s of device time."""
         edges = self.start + CELL * (self._index[: self._size] + 1)
         self._size = int(np.count_nonzero(edges <= at + _GRACE * CELL))
         kept = self._sums[: self._size]
@@ -236,9 +236,9 @@ class Cells:
         index = np.floor((block.t - self.start) / CELL + _GRACE).astype(np.int64)
         first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
         sums = np.empty((len(first), 34))
-        sums[:, :24] = channels(x[:, 1:], step, first, whole).reshape(-1, 24)
-        sums[:, 24:26] = warmth(block.temperature, first)
-        sums[:, 26:32] = finest(step, first)
+        sums[:, :24] = channel_sums(x[:, 1:], step, first, whole).reshape(-1, 24)
+        sums[:, 24:26] = temperature_sums(block.temperature, first)
+        sums[:, 26:32] = smallest_changes(step, first)
         sums[:, 32] = block.t[first]
         sums[:, 33] = -block.t[np.append(first[1:], len(block)) - 1]
         self._append(index[first], sums)
@@ -279,7 +279,7 @@ class Cells:
         return CellTable(times, self._sums[:size], self._origin)
 
 
-def joined(first: CellTable, later: CellTable) -> CellTable:
+def join_cells(first: CellTable, later: CellTable) -> CellTable:
     """Cells of two pieces of one recording as one table, about the first's origin."""
     origin = np.where(np.isfinite(first.origin), first.origin, later.origin)
     sums = [first.sums.copy(), later.sums.copy()]

@@ -14,16 +14,16 @@ import numpy as np
 
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
 from fieldcal.core.sentences import join
-from fieldcal.windows.cells import Between, CellRows
+from fieldcal.windows.cells import CellRows, SamplesBetween
 
 OFTEN = 0.5
-"""Part of the samples that differ from the one before where noise exceeds a step."""
+"""Part of samples that differ from the previous one if noise exceeds the step."""
 
 _PART = 1 << 12
 """Cells looked through at a time."""
 
 _SUMS, _FINEST = (1, 7, 13, 19), slice(27, 33)
-"""Where a row of `CellRows` has what a channel sums to, and its smallest change."""
+"""Columns of `CellRows` with the sums of a channel, and with its smallest change."""
 
 
 class DeadSensor(NamedTuple):
@@ -48,10 +48,11 @@ class DeadSensor(NamedTuple):
 
 
 def dead_sensors(six: Array) -> list[DeadSensor]:
-    """Sensors with an axis without a signal; not those that were not recorded.
+    """Recorded sensors that have an axis without a signal.
 
     Such an axis is missing, or it never changes while the other axes are noisier than
-    their steps. If these are as coarse, it may just never have been turned.
+    their steps. If the other axes are coarse as well, the axis may be intact and just
+    never have been turned.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
     """
     found = []
     for sensor, channels in (("accelerometers", ACC), ("gyroscopes", GYR)):
-        axes = _dead(six[:, channels])
+        axes = _dead_axes(six[:, channels])
         if not axes:
             continue
         names = [CHANNELS[channels][axis] for axis in axes]
@@ -73,7 +74,7 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
     return found
 
 
-def broken(six: Array) -> list[str]:
+def broken_axis_messages(six: Array) -> list[str]:
     """Sentences about recorded axes that never change while the other axes do.
 
     A missing column may be intended. A value that never changes means that a wire or a
@@ -98,9 +99,9 @@ def broken(six: Array) -> list[str]:
     return said
 
 
-def _dead(triad: Array) -> list[int]:
+def _dead_axes(triad: Array) -> list[int]:
     """Axes of a sensor without a signal; none if the sensor was not recorded."""
-    shares = np.array([_changes(axis) for axis in triad.T])
+    shares = np.array([_share_of_changes(axis) for axis in triad.T])
     if np.isnan(shares).all():
         return []
     still = ~(shares > 0)
@@ -110,18 +111,18 @@ def _dead(triad: Array) -> list[int]:
     return [int(axis) for axis in np.flatnonzero(dead)]
 
 
-def _changes(values: Array) -> float:
-    """Part of the values (n,) that differ from the one before; nan where none is."""
+def _share_of_changes(values: Array) -> float:
+    """Part of the values (n,) that differ from the previous one; nan without values."""
     known = values[np.isfinite(values)]
     if not len(known):
         return np.nan
     return float(np.mean(known[1:] != known[:-1])) if len(known) > 1 else 0.0
 
 
-def without_dead(six: Array) -> Array:
-    """Samples (n, 6) with nan in place of axes without a signal.
+def without_dead_axes(six: Array) -> Array:
+    """Samples (n, 6) with nan for axes without a signal.
 
-    The other axes of their sensor still show whether the device is at rest.
+    The other axes of the sensor still show whether the device is at rest.
     """
     dead = [axis for sensor in dead_sensors(six) for axis in sensor.axes]
     if not dead:
@@ -131,8 +132,8 @@ def without_dead(six: Array) -> Array:
     return told
 
 
-class LivingRows:
-    """Rows of all cells in which axes that never change are as if not recorded.
+class LiveAxisRows:
+    """Rows of all cells, with axes that never change treated as not recorded.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ class LivingRows:
             part = rows[first : first + _PART]
             changed |= np.isfinite(part[:, _FINEST]).any(axis=0)
         self._rows = rows
-        # where nothing changes at all, that is all there is to judge by
+        # if no axis ever changes, all are kept
         self._dead = np.flatnonzero(~changed) if changed.any() else np.arange(0)
 
     def __len__(self) -> int:
@@ -161,7 +162,7 @@ class LivingRows:
             rows[:, [first + c for c in self._dead for first in _SUMS]] = 0.0
         return rows
 
-    def of(self, between: Between) -> Between:
+    def samples_without_dead_axes(self, between: SamplesBetween) -> SamplesBetween:
         """Samples of the recording without these axes."""
 
         def living(start: float, end: float) -> Iterator[Block]:

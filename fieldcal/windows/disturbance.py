@@ -25,7 +25,7 @@ import numpy as np
 
 from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
-from fieldcal.windows.quiet import QuietNoise, running
+from fieldcal.windows.quiet import QuietNoise, running_means
 
 Kind = Literal["push", "step", "shake"]
 
@@ -40,15 +40,15 @@ STUCK_CELLS, STUCK_VALUES = 10, 20
 
 
 @dataclass(frozen=True, slots=True)
-class Statistic:
+class DisturbanceStatistic:
     """One kind of disturbance at one duration, at n instants on c channels.
 
     Attributes
     ----------
-    kind : what is looked for
+    kind : kind of disturbance
     cells : its duration
-    size : (n, c) what is seen, SI
-    noise : (c,) its usual size, SI
+    size : (n, c) measured departure, SI
+    noise : (c,) its standard deviation by noise, SI
     z : (n, c) departure over spread, (1) to (3)
 
     """
@@ -61,8 +61,8 @@ class Statistic:
 
 
 @dataclass(frozen=True, slots=True)
-class Least:
-    """The least that spreads of c channels can be, whatever the window shows.
+class LeastSpread:
+    """Lower bounds of the spreads of c channels, whatever the window shows.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Least:
         return least
 
     def of_changes(self, cells: int) -> Array:
-        """Least spread of what two such means side by side differ by, (c,)."""
+        """Least spread of the difference of two such neighbouring means, (c,)."""
         least: Array = np.maximum(self.always, np.sqrt(2.0) * self._random_error(cells))
         return least
 
@@ -97,30 +97,40 @@ class Least:
         return drawn
 
 
-def pushes(about: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
+def pushes(
+    about: Array, noise: QuietNoise, least: LeastSpread
+) -> list[DisturbanceStatistic]:
     """Deviations of cell means from their line, `about` (m, c), (1)."""
-    levels = zip(running(about), noise.spread, strict=False)
+    levels = zip(running_means(about), noise.spread, strict=False)
     return [
-        Statistic("push", 2**k, u, s, np.abs(u) / _zero_as_inf(s, least.of_means(2**k)))
+        DisturbanceStatistic(
+            "push", 2**k, u, s, np.abs(u) / _zero_as_inf(s, least.of_means(2**k))
+        )
         for k, (u, s) in enumerate(levels)
     ]
 
 
-def steps(means: Array, noise: QuietNoise, least: Least) -> list[Statistic]:
+def steps(
+    means: Array, noise: QuietNoise, least: LeastSpread
+) -> list[DisturbanceStatistic]:
     """Changes between neighbouring running means of `means` (m, c), (2)."""
-    levels = zip(running(means), np.sqrt(2.0) * noise.allan, strict=False)
+    levels = zip(running_means(means), np.sqrt(2.0) * noise.allan, strict=False)
     tests = []
     for k, (u, s) in enumerate(levels):
         change = u[2**k :] - u[: -(2**k)]
         spread = _zero_as_inf(s, least.of_changes(2**k))
-        tests.append(Statistic("step", 2**k, change, s, np.abs(change) / spread))
+        tests.append(
+            DisturbanceStatistic("step", 2**k, change, s, np.abs(change) / spread)
+        )
     return tests
 
 
-def shakes(short: Array, number: Array, least: Least) -> list[Statistic]:
+def shakes(
+    short: Array, number: Array, least: LeastSpread
+) -> list[DisturbanceStatistic]:
     """Excess of the short-lag noise (m, c), a variance, over its usual size, (3).
 
-    `number` (m, c) tells from how many differences each is; few of them count less.
+    `number` (m, c) is the number of differences of each; few of them count less.
     """
     root = np.cbrt(short)
     most = np.maximum(np.median(number, axis=0), 1.0)
@@ -129,10 +139,12 @@ def shakes(short: Array, number: Array, least: Least) -> list[Statistic]:
     spread = _zero_as_inf(usual, least.of_roots())
     noise = np.sqrt(np.median(short, axis=0))
     levels = zip(
-        running(centred, SHAKE_LEVELS), running(short, SHAKE_LEVELS), strict=True
+        running_means(centred, SHAKE_LEVELS),
+        running_means(short, SHAKE_LEVELS),
+        strict=True,
     )
     return [
-        Statistic(
+        DisturbanceStatistic(
             "shake",
             2**k,
             np.sqrt(np.maximum(q, 0.0)),

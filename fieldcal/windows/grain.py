@@ -38,32 +38,32 @@ WIDE = 1.5
 """Noise, in steps, below which single steps show around zero."""
 
 
-def variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
+def rounding_variance(grain: Grain, mean: Array, sampled: Array, seen: Array) -> Array:
     """Variance that rounding leaves in a mean, (6,).
 
     Parameters
     ----------
-    grain : what the device says
+    grain : rounding that the device states
     mean : (6,) of the values
     sampled : (6,) standard deviation of the values at short lags
-    seen : (6,) steps as the values show them, for what is not known here
+    seen : (6,) steps as the values show them, where the device states none
 
     """
     q = np.where(grain.step > 0, grain.step, seen)
-    few = rounding.of_few(grain.step, sampled)
-    rounded = np.maximum(rounding.of_mean(q, sampled), few)
+    few = rounding.variance_of_few_values(grain.step, sampled)
+    rounded = np.maximum(rounding.variance_of_mean(q, sampled), few)
     if not grain.cut:
         return rounded
     per = np.where(grain.step > 0, grain.step, 1.0)
     own = rounding.noise_before_rounding(sampled, q)
-    zone = _around_zero(np.nan_to_num(mean) / per, own / per)
+    zone = _variance_around_zero(np.nan_to_num(mean) / per, own / per)
     return rounded + np.where(grain.step > 0, grain.step**2 * zone, 0.0)
 
 
 def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
     """Largest jump between neighbouring values that noise does not hide, (6,).
 
-    0 if noise hides it, or if the steps are not known; arguments as for `variance`.
+    0 if noise hides it, or if the steps are unknown. Arguments as `rounding_variance`.
     """
     q = grain.step
     fine = rounding.visible_steps(q, sampled)
@@ -73,7 +73,7 @@ def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
     return np.where(around, 2 * q, fine)
 
 
-def _around_zero(mean: Array, noise: Array) -> Array:
+def _variance_around_zero(mean: Array, noise: Array) -> Array:
     """Variance from the wide step around zero, (3), in steps, (c,)."""
     found = np.zeros(len(mean))
     for i in np.flatnonzero(np.abs(mean) < ZERO + 3 * noise):

@@ -27,24 +27,24 @@ FAR = 8.0
 """Times the noise of a row that a jump is at least."""
 
 FEWEST_ROWS, FEWEST = 20, 3
-"""Rows of a position, and positions, that tell such a recording from another."""
+"""Fewest rows of a position, and fewest positions, of such a recording."""
 
 ALIKE = 5.0
-"""Times by which rows of one position differ more than those of another, at most."""
+"""Largest ratio of the scatter of rows in one position to that in another."""
 
 MOSTLY = 0.95
-"""Part of the changes that are jumps, and of the positions that rest: a hand errs."""
+"""Least part of the changes that are jumps, and of the positions that are at rest."""
 
 
 class JumpRows(NamedTuple):
-    """Rows where (1) holds, one after another.
+    """Rows where (1) holds, in order.
 
     Attributes
     ----------
     row, time : of each, (k,)
-    before, after : the medians about it, (k, 3) m/s^2
-    steps : sum of what rows before it differ from the next, a jump at most, (k,)
-        m/s^2
+    before, after : medians before and after it, (k, 3) m/s^2
+    steps : sum of the successive differences of all rows up to it, each limited to a
+        jump, (k,) m/s^2
 
     """
 
@@ -55,7 +55,7 @@ class JumpRows(NamedTuple):
     steps: Array
 
 
-class Jumps:
+class JumpFinder:
     """Finds where the rows of a recording jump, block by block."""
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class Jumps:
 
     @property
     def positions(self) -> list[tuple[float, float]]:
-        """Start and end of each position, s; none if the rows do not rest and jump."""
+        """Start and end of each position, s; empty for a recording of another kind."""
         if not self._changes:
             return []
         some = JumpRows(*map(np.concatenate, zip(*self._changes, strict=True)))
@@ -117,7 +117,7 @@ class Jumps:
     def _spans(
         self, some: JumpRows, rests: NDArray[np.bool_]
     ) -> list[tuple[float, float]]:
-        """Start and end of each position, s, of which the next begin there."""
+        """Start and end of each position, s, given the rows at which they begin."""
         time = some.time
         rows = np.diff(np.concatenate([[0], some.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
@@ -135,13 +135,13 @@ class Jumps:
 
 
 def _least_jump(step: Array) -> Array:
-    """Least step that is one, (3,); inf where there is none."""
+    """Least nonzero step, (3,); inf where there is none."""
     found: Array = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
     return found
 
 
 def _noise(step: Array) -> Array:
-    """Standard deviation of a row by steps (n, 3); of coarse rows a step."""
+    """Standard deviation of a row, from steps (n, 3); at least the resolution."""
     if not len(step):
         return np.full(3, np.nan)
     usual = DEVIATION * np.median(step, axis=0) / np.sqrt(2)

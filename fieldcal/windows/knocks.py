@@ -1,14 +1,14 @@
-"""Whether the device lies after a disturbance as it lay before.
+"""Whether the device has the same attitude after a disturbance as before.
 
 Somebody bumps the table, or a door slams: two still stretches with a gap of g seconds
-between them. theta is what the device was turned by for good, b what the biases of the
-accelerometers jumped by. Of the two stretches and the gap one sees
+between them. theta is the lasting rotation of the device, b the jump of the biases of
+the accelerometers. Measured are
 
     d = mean f after - mean f before = f x theta + b + e,   phi = theta + e'        (1)
 
-phi is what the gyroscopes, less their mean beside the gap, turned in it. Either theta
-is 0, or it is a chance, N(0, TURNED^2); and b is 0, or with a small probability a jump,
-N(0, JUMPED^2). By Bayes' rule over these four
+phi is the integral of the gyroscopes over the gap, less their mean beside it. Either
+theta is 0, or it is random, N(0, TURNED^2); and b is 0, or with a small probability a
+jump, N(0, JUMPED^2). By Bayes' rule over these four cases
 
     P(as before) = sum over b of P(b) N(d, phi | theta = 0, b) / sum over all       (2)
 
@@ -17,17 +17,17 @@ Means over T s, g s apart, of noise of the Allan deviation a(T) differ by
     var e = 2 a^2 B(1 + g/T),                                                       (3)
     B(r) = ((r+1)^2 ln(r+1) + (r-1)^2 ln(r-1) - 2 r^2 ln r) / (4 ln 2)
 
-and by v (T + g), v their common slope, which is as uncertain as it is large; T is that
-at which both are least. B is that of flicker, and too large for white noise.
-The sum of the n samples in the gap is as uncertain as what is quick in them, noise or a
-swing that they do not follow, and as the mean beside it:
+and by v (T + g), v their common slope, which counts as an uncertainty of its own size.
+T is chosen so that the sum is least. B is that of flicker, and too large for white
+noise. The sum of the n samples in the gap has the errors of their fast part (noise, or
+a swing that they do not resolve) and of the mean beside it:
 
     var e' = n dt^2 q + g^2 (var e_w / 4 + d_w^2 / 12) + (s^2 / 2)^2,               (4)
     q = mean of (k-th differences of w)^2 / (2k over k),   k = 4 if there are so many
 
-q is the variance of white noise; of a swing at a fifth of the sampling rate it leaves a
-fortieth, for the sum of what is sampled often enough is right. s is the largest angle
-on the way: sums of rates are angles to first order.
+q is the variance of white noise. Of a swing at a fifth of the sampling rate it contains
+a fortieth, since a swing that is sampled often enough is integrated correctly. s is the
+largest angle within the gap: sums of rates are angles to first order only.
 Device axes; m/s^2, rad/s, rad, s. Sources: Barnes 1969, NBS TN 375 (bias function B2);
 IEEE 952 (Allan variance).
 """
@@ -43,71 +43,72 @@ from numpy.typing import NDArray
 
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.windows.cells import CELL, Between, CellRows, CellTable, hold_last
-from fieldcal.windows.dead_axis import LivingRows
-from fieldcal.windows.quiet import ENOUGH, LEVELS, quiet
-from fieldcal.windows.rests import PAUSES, SPAN, cell_of, table_of
+from fieldcal.windows.cells import CELL, CellRows, CellTable, SamplesBetween, hold_last
+from fieldcal.windows.dead_axis import LiveAxisRows
+from fieldcal.windows.quiet import ENOUGH, LEVELS, estimate_quiet_noise
+from fieldcal.windows.rests import PAUSES, SPAN, cell_index, cell_table
 
 TURNED = 5e-3
-"""A device that a bump turned for good lies so much otherwise, rad about each axis:
-some tenths of a degree, of feet that slip and cushions that give way."""
+"""Typical lasting rotation by a bump, rad about each axis: some tenths of a degree, as
+feet slip and cushions give way."""
 
 AS_BEFORE = 0.5
-"""Chance that a bump leaves a device as it lay."""
+"""Prior probability that a bump leaves the attitude unchanged."""
 
 JUMP, JUMPED = 0.01, 5e-2
-"""Chance that a bump makes the biases jump, and by how much, m/s^2: as `bias_step`."""
+"""Prior probability that a bump makes the biases jump, and the typical jump, m/s^2; as
+in the effect `bias_step`."""
 
 SURE = 0.99
-"""Probability from which the device lies as before; else it is a position of its own,
-and the turn between both says what is known."""
+"""Probability from which the attitude counts as unchanged; otherwise a new position
+begins, and the rotation is determined by the turn between both."""
 
 SMALL = 0.1
-"""Angle on the way, rad, up to which the device was bumped and not taken elsewhere."""
+"""Largest angle within the gap, rad; beyond it the device was carried elsewhere."""
 
 LONGEST_S = 60.0
-"""Gap beyond which nobody knows what went on, s: that of a turn that is followed."""
+"""Longest gap that is judged, s: the longest turn that is integrated."""
 
 BESIDE = 6000
-"""Cells on either side that tell the noise: ten minutes."""
+"""Cells on either side from which the noise is estimated: ten minutes."""
 
 LONGER = 2
-"""Levels of noise beyond the usual ones, where they are measured: up to 51 s."""
+"""Noise levels beyond the usual ones, where they are measured: up to 51 s."""
 
 DRIFT = 4
-"""Means of that many times T tell the slope."""
+"""Length of the stretch that gives the slope, as a multiple of T."""
 
 CHANCE = 1e-3
-"""Chance of more scatter in a gap than noise makes, below which something was there."""
+"""Probability of the scatter in a gap by noise alone, below which it was disturbed."""
 
 CLOSE = 20
-"""Cells beside a gap by which samples in it are known: two seconds."""
+"""Cells beside a gap that predict the samples in it: two seconds."""
 
 QUICK = 4
-"""Order of the differences of rates that tell what is too quick for the samples."""
+"""Order of the differences of rates that give their fast part."""
 
 
-class Rest(NamedTuple):
-    """A stretch of rest, s of device time, and the gaps that are no part of it."""
+class RestPeriod(NamedTuple):
+    """A stretch at rest, s of device time, with the gaps that are left out of it."""
 
     start: float
     end: float
-    without: tuple[tuple[float, float], ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
 
     @property
     def pieces(self) -> list[tuple[float, float]]:
-        """Start and end of what is part of it, in order, s."""
-        starts = [self.start, *(end for _, end in self.without)]
-        return list(zip(starts, [*(s for s, _ in self.without), self.end], strict=True))
+        """Start and end of each part between the gaps, in order, s."""
+        starts = [self.start, *(end for _, end in self.gaps)]
+        return list(zip(starts, [*(s for s, _ in self.gaps), self.end], strict=True))
 
 
-def joined_rests(
+def join_rests(
     rows: CellRows,
     origin: Array,
-    between: Between,
+    between: SamplesBetween,
     spans: Sequence[tuple[float, float]],
-) -> list[Rest]:
-    """Still stretches, those that only bumps divide as one.
+) -> list[RestPeriod]:
+    """Join still stretches that are divided only by bumps.
 
     Parameters
     ----------
@@ -115,48 +116,54 @@ def joined_rests(
     spans : start and end of each stretch, s of device time, in order
 
     """
-    living = LivingRows(rows)
-    out: list[Rest] = []
+    living = LiveAxisRows(rows)
+    out: list[RestPeriod] = []
     for start, end in spans:
         last = out[-1] if out else None
-        gaps = last and _gaps(
-            living, origin, living.of(between), last.pieces[-1], (start, end)
+        gaps = last and _gaps_to_leave_out(
+            living,
+            origin,
+            living.samples_without_dead_axes(between),
+            last.pieces[-1],
+            (start, end),
         )
         if last is None or gaps is None:
-            out.append(Rest(start, end))
+            out.append(RestPeriod(start, end))
         else:
-            out[-1] = Rest(last.start, end, (*last.without, *gaps))
+            out[-1] = RestPeriod(last.start, end, (*last.gaps, *gaps))
     return out
 
 
-def _gaps(
+def _gaps_to_leave_out(
     rows: CellRows,
     origin: Array,
-    between: Between,
+    between: SamplesBetween,
     first: tuple[float, float],
     later: tuple[float, float],
 ) -> list[tuple[float, float]] | None:
-    """What to leave out between two stretches in which the device lies alike, or None.
+    """Gaps to leave out if two stretches can be joined; None if they cannot.
 
-    Nothing where a bias jumped and nobody touched the device.
+    The list is empty where a bias jumped and nobody touched the device.
     """
     gap = (first[1], later[0])
     if gap[1] - gap[0] > LONGEST_S:
         return None
-    began, ended, begins, ends = (cell_of(rows, t) for t in (*first, *later))
-    before = table_of(rows[max(began, ended - BESIDE) : ended], origin)
-    after = table_of(rows[begins + 1 : min(ends, begins + 1 + BESIDE)], origin)
+    began, ended, begins, ends = (cell_index(rows, t) for t in (*first, *later))
+    before = cell_table(rows[max(began, ended - BESIDE) : ended], origin)
+    after = cell_table(rows[begins + 1 : min(ends, begins + 1 + BESIDE)], origin)
     way = concat(list(between(gap[0] - CELL, gap[1] + CELL)))
     if min(len(before), len(after)) < 2 or _paused(way.t):
         return None
-    if not as_before(before, way, after, gap) > SURE:
+    if not probability_unmoved(before, way, after, gap) > SURE:
         return None
     return [] if _untouched(before, way.between(*gap), after) else [gap]
 
 
 def _untouched(before: CellTable, way: Block, after: CellTable) -> bool:
-    """Whether samples are as before up to some instant, and from it on as after."""
-    noise = hold_last(np.vstack([before.short, after.short])).mean(axis=0)
+    """Whether samples agree with `before` up to some instant, and then with `after`."""
+    noise = hold_last(
+        np.vstack([before.short_lag_variance, after.short_lag_variance])
+    ).mean(axis=0)
     noise = noise + np.maximum(before.rounding, after.rounding) ** 2
     one = before.origin + hold_last(before.means)[-CLOSE:].mean(axis=0)
     other = after.origin + hold_last(after.means)[:CLOSE].mean(axis=0)
@@ -179,10 +186,10 @@ def _paused(t: Array) -> bool:
     return bool(step.max() > max(SPAN * CELL, PAUSES * float(np.median(step))))
 
 
-def as_before(
+def probability_unmoved(
     before: CellTable, way: Block, after: CellTable, gap: tuple[float, float]
 ) -> float:
-    """Probability that the device lies as before, (2); 0 if it was taken elsewhere.
+    """Probability of an unchanged attitude, (2); 0 if the device was carried elsewhere.
 
     Parameters
     ----------
@@ -191,11 +198,11 @@ def as_before(
     gap : its start and end, s of device time
 
     """
-    level, change, spread = _compared(before, after, gap[1] - gap[0])
+    level, change, spread = _compare_means(before, after, gap[1] - gap[0])
     inside = way.between(*gap)
-    turned, unsure, most = _turned(inside, level[3:], change[3:], spread[3:])
+    turned, unsure, most = _turn_in_gap(inside, level[3:], change[3:], spread[3:])
     if np.isnan(most):  # gravity leans as far as the device
-        most = _leant(inside, level[:3])
+        most = _largest_lean(inside, level[:3])
     if not most < SMALL:
         return 0.0
     seen = np.concatenate([change[:3], turned])
@@ -204,7 +211,7 @@ def as_before(
     known[:3] &= known[:3].all()
     if not known[0] and not known[3:].all():
         return 0.0
-    lean = np.vstack([_crossed(np.nan_to_num(level[:3])), np.eye(3)])  # (1)
+    lean = np.vstack([_cross_matrix(np.nan_to_num(level[:3])), np.eye(3)])  # (1)
     jump = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * JUMPED**2
     logs = np.array(
         [
@@ -220,24 +227,25 @@ def as_before(
     return float(weight[:2].sum() / weight.sum())  # (2)
 
 
-def _compared(
+def _compare_means(
     before: CellTable, after: CellTable, gap: float
 ) -> tuple[Array, Array, Array]:
-    """Mean beside a gap of so many s, what it changes by, and the variance of that.
+    """Mean beside a gap of `gap` s, its change, and the variance of the change.
 
-    (6,) each, SI; of each channel over the time at which that is least, (3).
+    (6,) each, SI. The means of each channel are over the time with the least
+    variance (3).
     """
     left, right = hold_last(before.means)[::-1], hold_last(after.means)
     fewest = min(len(left), len(right))
     both = np.vstack([left[::-1], right])
     longer = LONGER * (len(both) > ENOUGH * 2 ** (LEVELS + LONGER - 1))
-    allan = quiet(both, levels=LEVELS + longer).allan
+    allan = estimate_quiet_noise(both, levels=LEVELS + longer).allan
     found = []
     for k, a in enumerate(allan[: fewest.bit_length()]):
         n = 2**k
         apart = gap + n * CELL
         drift = (_slope(right[: DRIFT * n]) - _slope(left[: DRIFT * n])) / 2
-        spread = 2 * a**2 * bias_of_flicker(1 + gap / (n * CELL))  # (3)
+        spread = 2 * a**2 * flicker_bias_function(1 + gap / (n * CELL))  # (3)
         means = left[:n].mean(axis=0), right[:n].mean(axis=0)
         found.append((*means, spread + (drift * apart) ** 2))
     table = np.array(found)
@@ -254,27 +262,27 @@ def _slope(means: Array) -> Array:
     return slope
 
 
-def bias_of_flicker(r: float) -> float:
+def flicker_bias_function(r: float) -> float:
     """B of (3), r > 1.
 
-    >>> round(bias_of_flicker(2.0), 3)
+    >>> round(flicker_bias_function(2.0), 3)
     1.566
     """
     terms = (r + 1) ** 2 * log(r + 1) - 2 * r**2 * log(r)
     return (terms + (r - 1) ** 2 * log(max(r - 1, 1e-9))) / (4 * log(2))
 
 
-def _turned(
+def _turn_in_gap(
     way: Block, level: Array, change: Array, spread: Array
 ) -> tuple[Array, Array, float]:
-    """What the gyroscopes turned by, (3,) rad, its variance, and the most on the way.
+    """Rotation in the gap by the gyroscopes, (3,) rad, its variance, and its maximum.
 
-    nan where they are missing.
+    nan if the gyroscopes are missing.
 
     Parameters
     ----------
     way : samples of the gap
-    level, change, spread : of the rates beside it, as `_compared` gives them
+    level, change, spread : of the rates beside it, as `_compare_means` returns them
 
     """
     nothing = np.full(3, np.nan)
@@ -291,8 +299,8 @@ def _turned(
     return angle[-1], drawn + bias + (most**2 / 2) ** 2, most  # (4)
 
 
-def _leant(way: Block, force: Array) -> float:
-    """Largest angle on the way as gravity shows it, rad, by means over cells."""
+def _largest_lean(way: Block, force: Array) -> float:
+    """Largest angle from `force` within the gap, rad, by means over cells."""
     whole = way.acc[np.isfinite(way.acc).all(axis=1)]
     if not len(whole):
         return np.nan
@@ -302,14 +310,14 @@ def _leant(way: Block, force: Array) -> float:
     return float(np.linalg.norm(off, axis=1).max() / np.linalg.norm(force))
 
 
-def _crossed(v: Array) -> Array:
-    """[v]x, by which v x u = [v]x u."""
+def _cross_matrix(v: Array) -> Array:
+    """Matrix [v]x with v x u = [v]x u."""
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _log_density(seen: Array, covariance: Array, known: NDArray[np.bool_]) -> float:
-    """Log of the normal density of what is known of some values."""
+    """Log of the normal density of the known ones among some values."""
     part = covariance[np.ix_(known, known)]
     root = np.linalg.cholesky(part)
     white = np.linalg.solve(root, seen[known])

@@ -14,15 +14,16 @@ SWINGS = 16.0
 
 @dataclass(frozen=True, slots=True)
 class StillnessLimits:
-    """Bounds of sanity; stillness itself is judged against the device's own noise.
+    """Absolute bounds; stillness itself is judged against the device's own noise.
 
     Attributes
     ----------
-    acc, gyr : m/s^2, rad/s: largest standard deviation of 0.1 s means at rest, which a
-        device on a running vehicle or in a hand stays below
-    acc_drift, gyr_drift : m/s^2, rad/s: largest steady change over a window, which a
-        device that warms up stays below
-    settled : s of a window that are not judged yet, for want of what is usual in it
+    acc, gyr : m/s^2, rad/s: largest standard deviation of 0.1 s means at rest; it is
+        less on a running vehicle and in a hand
+    acc_drift, gyr_drift : m/s^2, rad/s: largest steady change over a window; it is less
+        while a device warms up
+    unjudged_s : length of a window from which it is judged; its usual noise is not
+        known earlier
 
     """
 
@@ -30,13 +31,13 @@ class StillnessLimits:
     gyr: float = 0.1
     acc_drift: float = 0.1
     gyr_drift: float = 0.01
-    settled: float = 3.0
+    unjudged_s: float = 3.0
 
     @classmethod
     def swaying(cls) -> StillnessLimits:
-        """On a base that sways: what goes to and fro in many seconds goes on in few."""
+        """Limits for a base that sways: a slow oscillation looks like a drift."""
         still = cls()
-        return cls(acc_drift=2 * still.acc, gyr_drift=2 * still.gyr, settled=SWINGS)
+        return cls(acc_drift=2 * still.acc, gyr_drift=2 * still.gyr, unjudged_s=SWINGS)
 
     @property
     def noise(self) -> Array:

@@ -51,11 +51,11 @@ WALKS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 PRIOR_LOWPASS = 0.08
 PRIOR_FLICKER = 0.03
 PRIOR_WALK = 0.002
-"""What is expected of a device nothing is known of; the rest is white noise."""
+"""Prior probabilities for an unknown device; the rest is white noise."""
 
 
 @dataclass(frozen=True, slots=True)
-class Shapes:
+class SpectrumShapes:
     """The family of spectra: (s,) corner, knee and walk of each, Hz, and log prior."""
 
     corner: Array
@@ -63,7 +63,7 @@ class Shapes:
     walk: Array
     log_prior: Array
 
-    def at(self, f: Array) -> Array:
+    def spectra(self, f: Array) -> Array:
         """Spectra over white noise at the frequencies f (n,), Hz: (s, n), (1)."""
         low = 1 / (1 + (f / self.corner[:, None]) ** 2)
         g: Array = low + self.knee[:, None] / f + (self.walk[:, None] / f) ** 2  # (1)
@@ -81,7 +81,7 @@ class Shapes:
         return total
 
 
-def _family() -> Shapes:
+def _shape_family() -> SpectrumShapes:
     rows = []
     for (a, c), (b, k) in product(enumerate(CORNERS), enumerate(KNEES)):
         low = PRIOR_LOWPASS / (len(CORNERS) - 1) if a else 1 - PRIOR_LOWPASS
@@ -89,10 +89,10 @@ def _family() -> Shapes:
         rows.append((c, k, 0.0, (1 - PRIOR_WALK) * low * slow))
     rows += [(np.inf, 0.0, r, PRIOR_WALK / len(WALKS)) for r in WALKS]
     corner, knee, walk, prior = np.array(rows).T
-    return Shapes(corner, knee, walk, np.log(prior))
+    return SpectrumShapes(corner, knee, walk, np.log(prior))
 
 
-SHAPES = _family()
+SHAPES = _shape_family()
 
 
 def log_likelihood(power: Array, shape: Array) -> tuple[Array, Array]:
@@ -103,7 +103,7 @@ def log_likelihood(power: Array, shape: Array) -> tuple[Array, Array]:
     return log_likelihood, q  # (2)
 
 
-def transform(means: Array, spacing: float) -> tuple[Array, Array]:
+def fourier_sums(means: Array, spacing: float) -> tuple[Array, Array]:
     """Frequencies (n,), Hz, and Fourier sums (n, c) over sqrt(m) of cells (m, c)."""
     m = len(means)
     top = max(BAND * spacing * m, _FEWEST)
@@ -134,14 +134,14 @@ class MeanError:
     Attributes
     ----------
     covariance : (c, c) of the mean, SI squared
-    doubled : (c,) standard error that a window twice as long would have
-    seen : (s, c) log likelihood of the shapes, earlier windows included
+    sigma_of_doubled : (c,) standard error that a window twice as long would have
+    shape_likelihood : (s, c) log likelihood of the shapes, with earlier windows
 
     """
 
     covariance: Array
-    doubled: Array
-    seen: Array
+    sigma_of_doubled: Array
+    shape_likelihood: Array
 
 
 def error_of_mean(
@@ -149,15 +149,15 @@ def error_of_mean(
 ) -> MeanError:
     """Error of the mean of cell means (m, c), m >= 3, no nan.
 
-    `spacing` is the device time from cell to cell, s; `before` the `seen` (s, c) of
-    earlier windows. Correlations are those of the whitened noise in the band.
+    `spacing` is the device time from cell to cell, s; `before` the `shape_likelihood`
+    (s, c) of earlier windows. Correlations are those of the whitened noise in the band.
     """
     m = len(means)
-    f, sums = transform(means - means.mean(axis=0), spacing)
-    shape = SHAPES.at(f)
+    f, sums = fourier_sums(means - means.mean(axis=0), spacing)
+    shape = SHAPES.spectra(f)
     seen, q = log_likelihood(without_lines(np.abs(sums) ** 2), shape)
     seen = seen if before is None else seen + before
-    weight = np.exp(_relative(seen + SHAPES.log_prior[:, None]))
+    weight = np.exp(_relative_to_largest(seen + SHAPES.log_prior[:, None]))
     weight = weight / weight.sum(axis=0)
     level = weight * q / max(1, len(f) - 1)
     once, twice = (
@@ -167,9 +167,9 @@ def error_of_mean(
     cross = (white.T @ white.conj()).real
     size = np.sqrt(np.diag(cross))
     scale = once / np.where(size > 0, size, 1.0)
-    return MeanError(cross * np.outer(scale, scale), twice, _relative(seen))
+    return MeanError(cross * np.outer(scale, scale), twice, _relative_to_largest(seen))
 
 
-def _relative(log_likelihood: Array) -> Array:
+def _relative_to_largest(log_likelihood: Array) -> Array:
     relative: Array = log_likelihood - log_likelihood.max(axis=0)
     return relative

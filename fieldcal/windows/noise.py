@@ -35,21 +35,21 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.windows import rounding
-from fieldcal.windows.sums import finest
+from fieldcal.windows.sums import smallest_changes
 
 KEEP = 0.9
 KEPT = 0.62302
 """Second moment of a unit normal inside its central nine tenths."""
 
 MOST = 200_000
-"""Differences that give a level to a third of a percent; more would only take time."""
+"""Most differences that are used: they give a level to a third of a percent."""
 
-SHOWN = 2000
-"""Samples of a window in which the step of coarse outputs shows."""
+STEP_SAMPLES = 2000
+"""Samples of a window from which the step of coarse outputs is taken."""
 
 RISES, FALLS = 2.0, 2.0
-"""By how much s^2(m) exceeds that of one sample to the next, and its last value, where
-something goes to and fro."""
+"""Factors by which the maximum of s^2(m) exceeds its first and its last value where a
+motion goes to and fro."""
 
 AGREE = 3.0
 ANCHOR_S = 1.0
@@ -61,8 +61,8 @@ class ChannelNoise:
 
     Attributes
     ----------
-    white : as means over a second obey it
-    quick : as one sample differs from the next
+    white : white noise that means over a second obey
+    quick : noise from one sample to the next
 
     """
 
@@ -70,7 +70,7 @@ class ChannelNoise:
     quick: Array
 
 
-def noise_of(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
+def measure_noise(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
     """Measure the noise of a sensor.
 
     Parameters
@@ -86,15 +86,15 @@ def noise_of(pieces: Sequence[Array], rate_hz: float) -> ChannelNoise:
         lengths.append(max(1, lengths[-1] // 4))
     found = [_level(pieces, m) for m in lengths]
     levels, spreads = (np.array(both).T for both in zip(*found, strict=True))
-    white = [_pooled(lengths, v, s) for v, s in zip(levels, spreads, strict=True)]
+    white = [_agreed_level(lengths, v, s) for v, s in zip(levels, spreads, strict=True)]
     # outputs coarser than their noise may not change at all while the device is held
-    least = rounding.least(steps_of(pieces))
+    least = rounding.least_deviation(smallest_steps(pieces))
     quick = np.maximum(np.sqrt(levels[:, -1]), least)
     return ChannelNoise(np.maximum(white, least), quick)
 
 
-def to_and_fro(pieces: Sequence[Array]) -> bool:
-    """Whether what a triad shows beyond its quickest noise comes back.
+def is_to_and_fro(pieces: Sequence[Array]) -> bool:
+    """Whether a triad shows a motion to and fro beyond its fastest noise.
 
     Parameters
     ----------
@@ -111,8 +111,8 @@ def to_and_fro(pieces: Sequence[Array]) -> bool:
     return bool(top > RISES * levels[0] and top > FALLS * levels[-1])
 
 
-def quickest(pieces: Sequence[Array]) -> Array:
-    """Deviation of one sample (c,) beside whatever is slower, (3).
+def quickest_noise(pieces: Sequence[Array]) -> Array:
+    """Deviation of one sample (c,) without any slower motion, (3).
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def quickest(pieces: Sequence[Array]) -> Array:
     return np.sqrt(square)
 
 
-def short_lag(values: Array) -> Array:
+def short_lag_noise(values: Array) -> Array:
     """Deviation of one sample (c,) from the next, of samples (n, c), (2)."""
     steps = np.diff(values, axis=0)
     count = np.full(values.shape[1], len(steps))
@@ -137,23 +137,23 @@ def short_lag(values: Array) -> Array:
     return np.sqrt(np.where(count > 0, total / np.maximum(2 * count, 1), np.nan))
 
 
-def steps_of(pieces: Sequence[Array]) -> Array:
+def smallest_steps(pieces: Sequence[Array]) -> Array:
     """Smallest change of each channel from one sample to the next, (c,); 0 if none."""
-    each = [_least_change(p[:SHOWN]) for p in pieces if len(p) > 1]
+    each = [_least_change(p[:STEP_SAMPLES]) for p in pieces if len(p) > 1]
     least: Array = np.min(each, axis=0) if each else np.full(pieces[0].shape[1], np.inf)
     return np.where(np.isfinite(least), least, 0.0)
 
 
 def _least_change(values: Array) -> Array:
     steps = np.nan_to_num(np.diff(values, axis=0))
-    change: Array = finest(steps.T, np.zeros(1, dtype=np.int64))[0]
+    change: Array = smallest_changes(steps.T, np.zeros(1, dtype=np.int64))[0]
     return change
 
 
 def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     """s^2(m) of each channel and its relative standard error, (1)."""
     most = max(MOST // len(pieces), 1)
-    steps = [_steps(p, m, most) for p in pieces if len(p) >= 3 * m]
+    steps = [_second_differences(p, m, most) for p in pieces if len(p) >= 3 * m]
     if not steps:
         nothing = np.full(pieces[0].shape[1], np.nan)
         return nothing, nothing
@@ -167,8 +167,8 @@ def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     return level, np.sqrt(6.0 / np.maximum(count, 1))
 
 
-def _steps(piece: Array, m: int, most: int) -> Array:
-    """Bends over means of m samples in turn; of many, `most` evenly spread."""
+def _second_differences(piece: Array, m: int, most: int) -> Array:
+    """Second differences of means over m samples; of many, about `most` of them."""
     triples, channels = len(piece) // (3 * m), piece.shape[1]
     if triples > most:
         some = piece[: 3 * m * triples].reshape(triples, -1)[:: triples // most]
@@ -188,23 +188,23 @@ def _means(rows: Array) -> Array:
     return np.asarray(each @ rows if np.isnan(means).any() else means)
 
 
-def _pooled(lengths: Sequence[int], levels: Array, spreads: Array) -> float:
+def _agreed_level(lengths: Sequence[int], levels: Array, spreads: Array) -> float:
     """Level at the shortest m that all longer ones agree with."""
-    under = _under_a_walk(lengths, levels, spreads)
+    under = _white_under_walk(lengths, levels, spreads)
     if under is not None:
         return under
     best, spread = levels[0], spreads[0]
     for level, finer in zip(levels[1:], spreads[1:], strict=True):
         if not np.isfinite(best):
             best, spread = level, finer
-        elif not _agree(level, best, spread, finer):
+        elif not _levels_agree(level, best, spread, finer):
             break
         else:
             best, spread = level, finer
     return float(np.sqrt(best))
 
 
-def _under_a_walk(
+def _white_under_walk(
     lengths: Sequence[int], levels: Array, spreads: Array
 ) -> float | None:
     """White noise a of s^2(m) = a + b m^2, if that is what the levels obey."""
@@ -213,15 +213,15 @@ def _under_a_walk(
     square = np.square(lengths, dtype=float)
     slope = (levels[0] - levels[1]) / (square[0] - square[1])
     least = levels[1] - slope * square[1]
-    if slope <= 0 or least <= 0 or _agree(levels[1], levels[0], *spreads[:2]):
+    if slope <= 0 or least <= 0 or _levels_agree(levels[1], levels[0], *spreads[:2]):
         return None
     rest = zip(square[2:], levels[2:], spreads[2:], strict=True)
-    if all(_agree(v, least + slope * m, spreads[1], s) for m, v, s in rest):
+    if all(_levels_agree(v, least + slope * m, spreads[1], s) for m, v, s in rest):
         return float(np.sqrt(least))
     return None
 
 
-def _agree(one: float, other: float, spread: float, finer: float) -> bool:
-    """Whether two levels are the same but for their relative errors."""
+def _levels_agree(one: float, other: float, spread: float, finer: float) -> bool:
+    """Whether two levels agree within their relative errors."""
     error = np.hypot(spread, finer) * max(one, other)
     return bool(abs(one - other) <= AGREE * error)

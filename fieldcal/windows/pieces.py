@@ -21,27 +21,27 @@ from fieldcal.windows.mean import Average
 from fieldcal.windows.window import LearnedNoise, Window
 
 SHORTEST = 3.0
-"""Length of a piece whose calm can be judged, s."""
+"""Shortest piece that can be tested for rest, s."""
 
 MARGIN = 0.5
-"""What a disturbance may have spoilt at least before it showed, s."""
+"""Least time before a disturbance that is discarded with it, s."""
 
 AGREES = 4.0
-"""Standard errors within which means agree; those of short pieces are known roughly."""
+"""Standard errors within which means agree; errors of short pieces are rough."""
 
 
 class PiecedWindow:
-    """A window that is made of clean pieces, the last of which fills.
+    """A window made of undisturbed pieces, the last of which is being filled.
 
     Parameters
     ----------
-    noise : learned in windows before
-    grain : what the device rounds to
+    noise : learned in earlier windows
+    grain : rounding that the device states
     limits : bounds of rest, the usual ones if not given
 
     Attributes
     ----------
-    dropped : seconds that were given up because the device lay otherwise afterwards
+    dropped : seconds that were discarded because the attitude differed afterwards
 
     """
 
@@ -62,14 +62,14 @@ class PiecedWindow:
         self._now.add(block)
 
     @property
-    def moved(self) -> Moved | None:
-        """The disturbance of the piece that fills, if there was one."""
-        return self._now.moved
+    def disturbance(self) -> Moved | None:
+        """The disturbance of the present piece, if there was one."""
+        return self._now.disturbance
 
     @property
-    def meter(self) -> float:
-        """Motion in the last second as part of what is allowed: above 1 it moves."""
-        return self._now.meter
+    def motion_now(self) -> float:
+        """Motion in the last second over the allowed motion; above 1 it moves."""
+        return self._now.motion_now
 
     @property
     def elapsed(self) -> float:
@@ -88,48 +88,48 @@ class PiecedWindow:
 
     @property
     def noise(self) -> LearnedNoise | None:
-        """What is known of the noise for the window after this one, if anything."""
+        """Noise learned for the next window, if any."""
         return self._now.noise
 
     @property
-    def without(self) -> list[tuple[float, float]]:
+    def gaps(self) -> list[tuple[float, float]]:
         """Stretches between the pieces, s of device time."""
         return list(self._gaps)
 
-    def done(self, target: float | None = None) -> str | None:
-        """As `Window.done`, of all pieces."""
+    def reason_to_stop(self, target: float | None = None) -> str | None:
+        """As `Window.reason_to_stop`, for all pieces together."""
         if self._kept is None:
-            return self._now.done(target)
+            return self._now.reason_to_stop(target)
         if target is None or not np.nanmax(self.sigma[:3]) <= target:
             return None
-        return self._whole(self._kept, self._now).done(target)
+        return self._whole(self._kept, self._now).reason_to_stop(target)
 
-    def keep(self, moved: Moved) -> float:
-        """Keep what was calm before a disturbance; the seconds there are now.
+    def keep_undisturbed(self, moved: Moved) -> float:
+        """Keep the undisturbed part before a disturbance; returns the seconds kept.
 
-        Another piece begins with the next block.
+        A new piece begins with the next block.
         """
-        piece, end = self._now, _before(moved)
+        piece, end = self._now, _undisturbed_until(moved)
         self.dropped = 0.0
         while piece.seconds > 0:
-            piece.cut(end)
-            again = piece.moved if piece.seconds >= SHORTEST else None
+            piece.truncate(end)
+            again = piece.disturbance if piece.seconds >= SHORTEST else None
             if again is None:
                 break
-            end = min(_before(again), end - MARGIN)
+            end = min(_undisturbed_until(again), end - MARGIN)
         learned = piece.noise if piece.seconds >= SHORTEST else self._noise
         if piece.seconds >= SHORTEST:
             self._join(piece)
         self._now = Window(self._limits, learned, self._grain)
         return self._kept.seconds if self._kept else 0.0
 
-    def full(self, seconds: float) -> bool:
-        """Whether there are so many s, the last piece long enough to be judged."""
+    def is_full(self, seconds: float) -> bool:
+        """Whether there are `seconds` s, and the last piece is long enough to test."""
         short = self._kept is not None and self._now.elapsed < SHORTEST
         return self.elapsed >= seconds and not short
 
     def average(self) -> Average | None:
-        """Mean of all pieces; None if those before lie otherwise and are given up.
+        """Mean of all pieces; None if earlier pieces disagree and were discarded.
 
         Raises
         ------
@@ -150,7 +150,7 @@ class PiecedWindow:
         return None
 
     def _join(self, piece: Window) -> None:
-        """Add a piece; what was before it is given up if it does not agree."""
+        """Add a piece; earlier ones are discarded if they do not agree with it."""
         before = self._kept
         whole = self._together(before, piece) if before else None
         if before is not None and whole is not None:
@@ -161,9 +161,11 @@ class PiecedWindow:
         self._kept, self._gaps = piece, []
 
     def _together(self, before: Window, after: Window) -> Window | None:
-        """Two pieces as one window; None if they are none."""
+        """Two pieces as one window; None if they do not agree."""
         whole = self._whole(before, after)
-        return whole if self._agree(before, after) and whole.moved is None else None
+        return (
+            whole if self._agree(before, after) and whole.disturbance is None else None
+        )
 
     def _whole(self, before: Window, after: Window) -> Window:
         return Window(self._limits, self._noise, self._grain, (before, after))
@@ -177,10 +179,10 @@ class PiecedWindow:
 
 
 def _gap_between(before: Window, after: Window) -> tuple[float, float]:
-    """From behind the last sample of a piece to the first of the next, s."""
+    """Gap from after the last sample of a piece to the first of the next, s."""
     return float(np.nextafter(before.end, np.inf)), after.start
 
 
-def _before(moved: Moved) -> float:
-    """Instant up to which a disturbance has spoilt nothing, s."""
+def _undisturbed_until(moved: Moved) -> float:
+    """Instant up to which a window is unaffected by a disturbance, s."""
     return moved.at - max(MARGIN, moved.seconds)

@@ -27,13 +27,13 @@ LEVELS = 8
 """Durations: 0.1 s to 12.8 s, each twice the one before."""
 
 KNEE = 0.05
-"""Flicker that any device may have though a window is too short to show it, Hz."""
+"""Knee of the flicker that any device may have, unseen in a short window, Hz."""
 
 _MORE = 2.0
-"""Times by which the noise of a device may grow from one window to the next."""
+"""Largest factor by which noise may grow from one window to the next."""
 
 ENOUGH = 16
-"""Durations a window must hold for the noise of that duration to be measured."""
+"""Multiple of a duration that a window must last to measure the noise at it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class QuietNoise:
     Attributes
     ----------
     allan : (levels, c) a_k, SI
-    cells : m, those of the windows before included
+    cells : m, including earlier windows
 
     """
 
@@ -58,18 +58,21 @@ class QuietNoise:
         return np.sqrt(np.cumsum(closed[::-1], axis=0)[::-1][:-1])
 
 
-def running(values: Array, levels: int = LEVELS) -> list[Array]:
+def running_means(values: Array, levels: int = LEVELS) -> list[Array]:
     """Running means of `values` (m, c) over 2^k cells for each level k that fits."""
     sums = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     fit = [k for k in range(levels) if 2**k <= max(1, len(values) // 2)]
     return [(sums[2**k :] - sums[: -(2**k)]) / 2**k for k in fit]
 
 
-def quiet(
+def estimate_quiet_noise(
     means: Array, before: QuietNoise | None = None, levels: int = LEVELS
 ) -> QuietNoise:
-    """Noise of cell means (m, c), no nan, m >= 2; with that of the windows before."""
-    averaged = running(means, levels)
+    """Estimate the noise of cell means (m, c), no nan, m >= 2.
+
+    It is pooled with `before`, the noise of earlier windows.
+    """
+    averaged = running_means(means, levels)
     measured: list[Array] = []
     for k, u in enumerate(averaged):
         if k and len(u) < ENOUGH * 2**k:
@@ -80,11 +83,11 @@ def quiet(
     white, flat = _white_and_flat(known)
     tau = 2.0 ** np.arange(len(known), len(averaged))[:, None]
     own = QuietNoise(np.vstack([known, np.sqrt(white / tau + flat)]), len(means))  # (2)
-    return own if before is None else _pooled(own, before)
+    return own if before is None else _pool_noise(own, before)
 
 
-def _pooled(own: QuietNoise, before: QuietNoise) -> QuietNoise:
-    """Noise of a window with what was known before, which bounds what it can be."""
+def _pool_noise(own: QuietNoise, before: QuietNoise) -> QuietNoise:
+    """Pool the noise of a window with that of earlier ones, which limits its growth."""
     common = min(len(own.allan), len(before.allan))
     known = before.allan[:common]
     new = np.where(

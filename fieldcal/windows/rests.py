@@ -22,30 +22,31 @@ SPAN = 10
 """Cells whose spread tells rest from motion: 1 s."""
 
 _LEAST, _MOST = 4.0, 64.0
-"""Bounds on the valley, in multiples of the quietest: a recording may have no turn."""
+"""Bounds of the threshold, in multiples of the quietest spread: a recording may have
+no turn."""
 
 _OWN = 4.0
-"""Spread, in multiples of what is usual in a stretch, that still belongs to it."""
+"""Largest spread within a stretch, in multiples of its usual one."""
 
 _FLIPS = 0.6
-"""Part of a step of a coarse output that means of cells spread by when it flips."""
+"""Spread of cell means, in steps of a coarse output, when it flips between two."""
 
 _LONGEST = 36_000
-"""Cells of the longest run, an hour: a longer rest is looked at in several."""
+"""Cells of the longest run, an hour: a longer rest is evaluated in several parts."""
 
 _PART = 4096
-"""Spans looked at together: all of them at once would take ten times their memory."""
+"""Spans evaluated together, to limit memory."""
 
 _SAMPLE = 1 << 15
-"""Spans by which the usual is judged: of a longer recording, evenly spread ones."""
+"""Most spans from which usual values are taken, evenly spread over the recording."""
 
 PAUSES = 5.0
-"""Usual distances from one cell to the next that are a pause, if they make a span."""
+"""Least length of a pause, in usual distances between cells, and at least a span."""
 
 _RATE = 0.02
-"""Difference from the level of the gyroscopes at rest that is a rotation, rad/s."""
+"""Least difference from the gyroscopes' rate at rest that is a rotation, rad/s."""
 
-Spans = tuple[int, Array, Array]
+SpanSpreads = tuple[int, Array, Array]
 """First of some spans, the spread and the mean of each, (k, 6)."""
 
 
@@ -57,13 +58,13 @@ class RestRun(NamedTuple):
     rate: Array
 
 
-def table_of(rows: Array, origin: Array) -> CellTable:
-    """Cells of rows of `summary`."""
+def cell_table(rows: Array, origin: Array) -> CellTable:
+    """Cells from the rows of `stretches.cell_rows`."""
     return CellTable(rows[:, 0], rows[:, 1:], origin)
 
 
-def cell_of(rows: CellRows, t: float) -> int:
-    """Which cell an instant lies in: the last that begins no later."""
+def cell_index(rows: CellRows, t: float) -> int:
+    """Index of the cell that contains an instant: the last that begins no later."""
     low, high = 0, len(rows) - 1
     while low < high:
         middle = (low + high + 1) // 2
@@ -75,13 +76,13 @@ def cell_of(rows: CellRows, t: float) -> int:
 
 
 class _Typical(NamedTuple):
-    """What is usual of cells.
+    """Usual values of the cells of a recording.
 
     Attributes
     ----------
-    counts : (6,) values in one
-    pause : shortest time that is a pause, s
-    flips : (6,) spread that an output makes which flips between two steps
+    counts : (6,) values in a cell
+    pause : shortest time between cells that is a pause, s
+    flips : (6,) spread of an output that flips between two steps
 
     """
 
@@ -90,17 +91,17 @@ class _Typical(NamedTuple):
     flips: Array
 
 
-def _spans(rows: CellRows, usual: _Typical) -> Iterator[Spans]:
-    """First span of a part, the spread and the mean of each of them, (k, 6).
+def _spans(rows: CellRows, usual: _Typical) -> Iterator[SpanSpreads]:
+    """Spread and mean of the spans of each part, with the index of its first span.
 
-    The mean of a cell with few values is that of the cell before: unlike
-    `CellTable.steady`, that is true of a device that was turned meanwhile, for no line
-    goes through all of its positions. The spread over a pause is infinite.
+    The mean of a cell with few values is replaced by that of the cell before. Unlike
+    `CellTable.steady_means` this is correct for a device that is turned, since no line
+    passes through all of its positions. The spread over a pause is infinite.
     """
     before: Array = np.zeros((1, 6))
     for first in range(0, len(rows) - SPAN + 1, _PART):
         part = rows[first : first + _PART + SPAN - 1]
-        cells = table_of(part, np.zeros(6))
+        cells = cell_table(part, np.zeros(6))
         means = hold_last(
             np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
         )
@@ -113,7 +114,7 @@ def _spans(rows: CellRows, usual: _Typical) -> Iterator[Spans]:
 
 
 def _typical(rows: CellRows) -> _Typical:
-    """What is usual of the cells, by their medians."""
+    """Usual values of the cells, by their medians."""
     every = -(-len(rows) // _SAMPLE)
     counts, steps = [], []
     finest = np.full(6, np.inf)
@@ -127,14 +128,14 @@ def _typical(rows: CellRows) -> _Typical:
     return _Typical(np.median(np.concatenate(counts), axis=0), pause, flips)
 
 
-def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
-    """Runs of spans at rest by (1), by their own noise and rate.
+def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
+    """Runs of spans that are at rest by (1), by their own noise and by their rate.
 
-    `bound` (6,) is what no spread at rest exceeds.
+    `bound` (6,) is the largest spread at rest of any device.
     """
     usual = _typical(rows)
     every = -(-len(rows) // _SAMPLE)
-    # all spans of a long recording would not fit into memory: they are made twice
+    # all spans of a long recording do not fit into memory: they are calculated twice
     short = list(_spans(rows, usual)) if len(rows) <= _PART else []
     some = np.concatenate(
         [
@@ -151,7 +152,7 @@ def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
     kept: list[RestRun] = []
     spans = short or _spans(rows, usual)
     least = np.maximum(np.minimum(valley * scale, bound), usual.flips)
-    for first, spread, level in _calm(spans, least):
+    for first, spread, level in _calm_runs(spans, least):
         own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
         own = np.maximum(own, usual.flips / _OWN)
         own = np.where(own > 0, own, np.inf)
@@ -166,10 +167,10 @@ def at_rest(rows: CellRows, bound: Array) -> list[RestRun]:
     return [run for run, turns in zip(kept, turning, strict=True) if not turns]
 
 
-def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
-    """Runs of spans whose spread is below `bound` (6,), `_LONGEST` at most.
+def _calm_runs(spans: Iterable[SpanSpreads], bound: Array) -> Iterator[SpanSpreads]:
+    """Runs of at most `_LONGEST` spans whose spread is below `bound` (6,).
 
-    Gives the first span of each, with the spread and the mean of all, (k, 6).
+    Yields the first span of each run, and spread and mean of its spans, (k, 6).
     """
     waiting: list[tuple[Array, Array]] = []
     began = length = 0
@@ -177,17 +178,17 @@ def _calm(spans: Iterable[Spans], bound: Array) -> Iterator[Spans]:
         for a, b in runs(np.all(spread < bound, axis=1)):
             goes_on = began + length == first + a and length + b - a <= _LONGEST
             if waiting and not goes_on:
-                yield began, *_joined(waiting)
+                yield began, *_concatenate(waiting)
                 waiting = []
             if not waiting:
                 began, length = first + a, 0
             waiting.append((spread[a:b], level[a:b]))
             length += b - a
     if waiting:
-        yield began, *_joined(waiting)
+        yield began, *_concatenate(waiting)
 
 
-def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+def _concatenate(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     spreads, levels = zip(*parts, strict=True)
     return np.concatenate(spreads), np.concatenate(levels)
 
@@ -203,7 +204,7 @@ def _weighted_median(values: Array, weights: Any) -> Array:
 
 
 def _splitting_threshold(ratio: Array) -> float:
-    """Threshold that splits the logarithms of `ratio` into two heaps best."""
+    """Threshold that best splits the logarithms of `ratio` into two clusters."""
     logs = np.sort(np.log(np.maximum(ratio, 1e-3)))
     n = np.arange(1, len(logs))
     below = np.cumsum(logs)[:-1] / n

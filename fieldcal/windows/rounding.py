@@ -42,61 +42,61 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 WAVES = 5
-"""Terms of (2); those beyond are taken to fade as the next does."""
+"""Terms of (2); the remaining ones are assumed to decrease as the next one does."""
 
 UNSURE = 3.6
-"""In place of the 4 of (3), for what a window does not tell of p (1 - p)."""
+"""Replaces the 4 of (3), to allow for the error of p (1 - p) in one window."""
 
 FINE = 0.6
 """Noise of samples, in steps, below which single steps show."""
 
 
-def least(step: Array) -> Array:
-    """Least deviation that a sample is known to, (c,), of outputs with these steps."""
+def least_deviation(step: Array) -> Array:
+    """Least standard error of a sample, (c,), of outputs with these steps."""
     deviation: Array = np.asarray(step, dtype=float) / np.sqrt(12.0)
     return deviation
 
 
 def noise_before_rounding(sampled: Array, step: Array) -> Array:
-    """Noise before rounding, (c,), as far as that of the samples tells it, (1)."""
-    return np.sqrt(np.maximum(sampled**2 - least(step) ** 2, 0.0))
+    """Noise before rounding, (c,), from the noise of the samples by (1)."""
+    return np.sqrt(np.maximum(sampled**2 - least_deviation(step) ** 2, 0.0))
 
 
-def of_mean(step: Array, sampled: Array) -> Array:
+def variance_of_mean(step: Array, sampled: Array) -> Array:
     """Variance, (..., c), that rounding leaves in a mean of many values, (2).
 
     `sampled` is the deviation of the values at short lags.
 
-    >>> still = of_mean(np.array([1.0]), np.array([0.0]))
-    >>> noisy = of_mean(np.array([1.0]), np.array([0.5]))
+    >>> still = variance_of_mean(np.array([1.0]), np.array([0.0]))
+    >>> noisy = variance_of_mean(np.array([1.0]), np.array([0.5]))
     >>> np.sqrt([still[0], noisy[0]]).round(4)
     array([0.2887, 0.0084])
     """
-    variance: Array = step**2 * _waves(step, sampled)[0].sum(axis=-1)  # (2)
+    variance: Array = step**2 * _harmonics(step, sampled)[0].sum(axis=-1)  # (2)
     return variance
 
 
-def of_two_means(step: float, sampled: float, apart: Array) -> Array:
-    """Covariance, (...), of the errors of two means that are some `apart`, (5).
+def covariance_of_two_means(step: float, sampled: float, apart: Array) -> Array:
+    """Covariance, (...), of rounding errors of two means that differ by `apart`, (5).
 
-    >>> of_two_means(1.0, 0.0, np.array([0.0, 0.5, 1.0])).round(3)
+    >>> covariance_of_two_means(1.0, 0.0, np.array([0.0, 0.5, 1.0])).round(3)
     array([ 0.083, -0.042,  0.083])
     """
     share = apart / step
     h = np.arange(1.0, WAVES + 1)
     cosines = np.cos(2 * np.pi * np.multiply.outer(share, h))
     whole = share - np.floor(share)
-    waves, size = _waves(np.asarray(step), np.asarray(sampled))
-    sawtooth = (whole**2 - whole + 1 / 6) / 2  # what all waves add up to if none fades
+    waves, size = _harmonics(np.asarray(step), np.asarray(sampled))
+    sawtooth = (whole**2 - whole + 1 / 6) / 2  # sum of all waves without noise
     rest = (sawtooth - cosines @ size[:-1]) * waves[-1] / size[-1]
     covariance: Array = step**2 * (cosines @ waves[:-1] + rest)  # (5)
     return covariance
 
 
-def _waves(step: Array, sampled: Array) -> tuple[Array, Array]:
-    """Terms of (2) of a step of one, (..., h), and their sizes (h,) if none fades.
+def _harmonics(step: Array, sampled: Array) -> tuple[Array, Array]:
+    """Terms of (2) for a step of one, (..., h), and their sizes (h,) without noise.
 
-    The last of them is all the rest.
+    The last term stands for all remaining ones.
     """
     h = np.arange(1.0, WAVES + 2)
     size = 1 / (2 * (np.pi * h) ** 2)
@@ -105,20 +105,20 @@ def _waves(step: Array, sampled: Array) -> tuple[Array, Array]:
     return size * np.exp(-((2 * np.pi * h * s[..., None]) ** 2)), size
 
 
-def of_few(step: Array, sampled: Array) -> Array:
-    """Least variance, (..., c), of a mean of values that may be but two, (3)."""
+def variance_of_few_values(step: Array, sampled: Array) -> Array:
+    """Least variance, (..., c), of a mean if only two values may occur, (3)."""
     share = sampled / np.where(step > 0, step, 1.0)
     variance: Array = step**2 * np.maximum(0.0, 1 - UNSURE * share**2) / 12
     return variance
 
 
-def most_scatter(step: Array, changed: Array) -> Array:
-    """Deviation of samples, (c,), of which a share `changed` differs, at most (4).
+def largest_deviation(step: Array, changed: Array) -> Array:
+    """Largest deviation of samples, (c,), of which a share `changed` differs, (4).
 
-    It is told by how many differ, not by how much, so that one which is far off counts
-    as one. Where two of three differ, single steps no longer show.
+    It depends on how many samples differ, not on how much, so that an outlier counts
+    once only. Where two of three differ, single steps no longer show.
 
-    >>> most_scatter(np.array([2.0]), np.array([0.0, 0.185, 1.0])).round(3)
+    >>> largest_deviation(np.array([2.0]), np.array([0.0, 0.185, 1.0])).round(3)
     array([0.   , 0.632, 1.633])
     """
     p = (2 - np.sqrt(np.maximum(4 - 6 * changed, 0.0))) / 3

@@ -16,14 +16,14 @@ from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array, Block
 
 WILD = 12.0
-"""Usual differences that no noise jumps by."""
+"""Least jump, in usual differences; no noise reaches it."""
 
 BACK = 0.3
-"""Part of the jump that samples before and after it differ by at most."""
+"""Largest difference of the samples before and after it, as part of the jump."""
 
 
 def without_spikes(block: Block) -> Block:
-    """Samples with nan in place of single ones that jump by (1); else the block."""
+    """The block with nan in place of single samples that jump by (1)."""
     acc, gyr = _limited_steps(block.acc), _limited_steps(block.gyr)
     if acc is block.acc and gyr is block.gyr:
         return block
@@ -35,7 +35,7 @@ def _limited_steps(triad: Array) -> Array:
         return triad
     step = np.abs(np.diff(triad, axis=0))
     usual = DEVIATION * _median(step)
-    # of outputs that are coarse most differences are 0
+    # most differences of coarse outputs are 0
     least = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
     usual = np.where(usual > 0, usual, least)
     first, second = step[:-1], step[1:]

@@ -23,12 +23,12 @@ from collections import deque
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Cells, resolution
+from fieldcal.windows.cells import CELL, CellAccumulator, resolution
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rounding import visible_steps
 
 SPAN = 8
-"""Cells that are looked at together: 0.8 s."""
+"""Cells that are evaluated together: 0.8 s."""
 
 MEMORY = 200
 """Cells the noise is remembered for: 20 s."""
@@ -40,7 +40,7 @@ RATE = 0.006
 """Change of a gyroscope's bias from one rest to the next, rad/s: more is a turn."""
 
 EVEN = 30
-"""Cells after which a rate that does not change is no turn by hand but a bias: 3 s."""
+"""Cells after which a constant rate is a bias and not a turn by hand: 3 s."""
 
 _SMALLEST = 1.6
 """Noise over the smallest tenth of its estimates (1) in 20 s."""
@@ -54,24 +54,24 @@ _SLOPE = SPAN * _TIME / (_TIME @ _TIME)
 
 
 class Stillness:
-    """Watch a stream and say whether the device is at rest.
+    """Watches a stream of samples and detects whether the device is at rest.
 
-    What it says does not depend on how the samples were cut into blocks.
+    The result does not depend on how the samples were cut into blocks.
 
     Parameters
     ----------
-    sways : whether the base is said to sway
+    sways : whether the session states that the base sways
 
     Attributes
     ----------
-    meter : present motion as part of what is allowed; below 1 is rest
+    meter : present motion over the allowed motion; below 1 is rest
     since : device time from which on it has been at rest, s; None while it moves
 
     """
 
     def __init__(self, sways: bool = False) -> None:
         self._limits, self._sways = StillnessLimits(), sways
-        self._cells = Cells()
+        self._cells = CellAccumulator()
         self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
         self._finest = np.full(6, np.inf)
         self._noises: deque[Array] = deque(maxlen=MEMORY)
@@ -92,8 +92,8 @@ class Stillness:
         for time, mean, short, finest in zip(
             complete.times,
             complete.means,
-            complete.short,
-            complete.finest,
+            complete.short_lag_variance,
+            complete.smallest_changes,
             strict=True,
         ):
             self._recent.append((np.nan_to_num(mean), np.nan_to_num(short)))
@@ -126,7 +126,7 @@ class Stillness:
         return noise
 
     def _motion_ratio(self, y: Array, noise: Array) -> float:
-        """(2) and (3) over what the noise allows, within the limits of sanity."""
+        """Ratio of (2) and (3) to the bounds by noise, within the absolute limits."""
         slope = _SLOPE @ y
         about = y - y.mean(axis=0) - np.outer(_TIME, slope) / SPAN
         spread = np.sqrt((about**2).sum(axis=0) / (SPAN - 2))
@@ -139,11 +139,11 @@ class Stillness:
         return float(ratio.max())
 
     def _swinging(self, y: Array) -> float:
-        """How far a base that sways goes to and fro, over what it may."""
+        """Ratio of the scatter to the limits, for a base that sways."""
         return float(np.max(y.std(axis=0) / self._limits.noise))
 
     def _turning(self, rates: Array, noise: Array) -> float:
-        """(4) over what a bias may change by; an even rate that lasts is a bias."""
+        """Ratio of (4) to the allowed change of a bias; a lasting even rate is one."""
         if self._rest is None:
             return 0.0
         off = np.abs(rates.mean(axis=0) - self._rest) / (RATE + SPREAD * noise)

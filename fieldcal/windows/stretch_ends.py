@@ -12,10 +12,10 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.windows.cells import CELL, CellRows, CellTable
-from fieldcal.windows.rests import cell_of
+from fieldcal.windows.rests import cell_index
 
 BEYOND = 1.0
-"""Time beyond a stretch that is looked at, s."""
+"""Time beyond a stretch that is evaluated, s."""
 
 PAUSE = 1.0
 """Time without a cell that is a pause, s."""
@@ -27,10 +27,10 @@ APART = 4.0
 """Spreads of a stretch's own means that are a departure."""
 
 
-def reasons(
+def stretch_end_reasons(
     rows: CellRows, origin: Array, spans: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str]]:
-    """Say before what each stretch begins, and by what it ends.
+    """Say what precedes each stretch, and what ends it.
 
     Parameters
     ----------
@@ -40,19 +40,22 @@ def reasons(
     """
     out = []
     for start, end in spans:
-        first, last = cell_of(rows, start), cell_of(rows, end - 1e-9)
+        first, last = cell_index(rows, start), cell_index(rows, end - 1e-9)
         inside = CellTable(rows[first : last + 1][:, 0], rows[first : last + 1][:, 1:],
                            origin)  # fmt: skip
         k = round(BEYOND / CELL)
         before, after = rows[max(0, first - k) : first], rows[last + 1 : last + 1 + k]
         out.append(
-            (_why(before[::-1], inside, origin, -1), _why(after, inside, origin, 1))
+            (
+                _reason(before[::-1], inside, origin, -1),
+                _reason(after, inside, origin, 1),
+            )
         )
     return out
 
 
-def _why(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
-    """What lies beyond one end; cells of it come nearest first."""
+def _reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
+    """What lies beyond one end; `beyond` are the cells there, nearest first."""
     edge = inside.times[-1 if side > 0 else 0]
     steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - CELL
     paused = np.flatnonzero(steps > PAUSE)

@@ -11,21 +11,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import CELL, Between, CellRows, Cells, CellTable
-from fieldcal.windows.dead_axis import LivingRows
+from fieldcal.windows.cells import (
+    CELL,
+    CellAccumulator,
+    CellRows,
+    CellTable,
+    SamplesBetween,
+)
+from fieldcal.windows.dead_axis import LiveAxisRows
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.rests import SPAN, at_rest, table_of
+from fieldcal.windows.rests import SPAN, cell_table, find_rest_runs
 from fieldcal.windows.spikes import without_spikes
-from fieldcal.windows.verdict import judge
+from fieldcal.windows.verdict import judge_window
 
 FEWEST = 3
-"""Stretches below which rests may all have been too short for the usual margin."""
+"""Number of stretches below which rests may be too short for the usual margin."""
 
 SEAM = 2 * CELL
-"""Time that two parts of one rest are apart, s, if nothing was cut off them."""
+"""Largest gap between two parts of one rest that are evaluated separately, s."""
 
 _CLEARLY = 0.98
-"""Ratio of departure to what is allowed that the sums of a recording must keep."""
+"""Largest ratio of departure to the allowed one for a pass without reading samples."""
 
 
 def still_stretches(
@@ -39,19 +45,19 @@ def still_stretches(
     def between(start: float, end: float) -> list[Block]:
         return [block.between(start, end)]
 
-    block, cells = without_spikes(block), Cells()
+    block, cells = without_spikes(block), CellAccumulator()
     cells.add(block)
     table = cells.table
-    return still_stretches_of_file(summary(table), table.origin, between, min_seconds)
+    return still_stretches_of_file(cell_rows(table), table.origin, between, min_seconds)
 
 
-def summary(cells: CellTable) -> Array:
+def cell_rows(cells: CellTable) -> Array:
     """Start of each cell, s, and its sums: (m, 35)."""
     return np.column_stack([cells.times, cells.sums])
 
 
 def still_stretches_of_file(
-    rows: CellRows, origin: Array, between: Between, min_seconds: float
+    rows: CellRows, origin: Array, between: SamplesBetween, min_seconds: float
 ) -> list[tuple[float, float]]:
     """`still_stretches` of a recording that does not fit into memory.
 
@@ -65,53 +71,57 @@ def still_stretches_of_file(
     """
     if len(rows) < 2 * SPAN:
         return []
-    living = LivingRows(rows)
-    rows, between = living, living.of(between)
+    living = LiveAxisRows(rows)
+    rows, between = living, living.samples_without_dead_axes(between)
     shortest = max(1.0, min_seconds)
-    runs = at_rest(rows, StillnessLimits().noise)
+    runs = find_rest_runs(rows, StillnessLimits().noise)
     middles = [(r.first + SPAN // 2, r.last - 1 + SPAN // 2) for r in runs]
     goes_on = [i > 0 and runs[i - 1].last == r.first for i, r in enumerate(runs)]
-    found = _joined(_passing_of(rows, origin, between, middles, shortest), goes_on)
+    found = _join_at_seams(
+        _passing_parts_of_stretches(rows, origin, between, middles, shortest), goes_on
+    )
     if len(found) >= FEWEST or len(runs) < FEWEST:
         return found
-    # rests may all be short: then all that their spans saw, less a cell at each end
+    # rests may all be short: use the whole of their spans, less a cell at each end
     ends = [run.last + SPAN - 2 for run in runs]
     nexts = [*(run.first for run in runs[1:]), len(rows)]
     whole = [
         (r.first + 1, min(e, n)) for r, e, n in zip(runs, ends, nexts, strict=True)
     ]
-    short = _joined(_passing_of(rows, origin, between, whole, shortest), goes_on)
+    short = _join_at_seams(
+        _passing_parts_of_stretches(rows, origin, between, whole, shortest), goes_on
+    )
     return short if len(short) >= FEWEST else found
 
 
-def _passing_of(
+def _passing_parts_of_stretches(
     rows: CellRows,
     origin: Array,
-    between: Between,
+    between: SamplesBetween,
     stretches: Sequence[tuple[int, int]],
     shortest: float,
 ) -> list[list[tuple[float, float]]]:
-    """What passes of each stretch of cells [first, last)."""
+    """Parts of each stretch of cells [first, last) that pass the test of a window."""
     found: list[list[tuple[float, float]]] = []
     for first, last in stretches:
-        cells = table_of(rows[first : last + 1], origin)
-        if clear := _clear(table_of(rows[first:last], origin), shortest):
+        cells = cell_table(rows[first : last + 1], origin)
+        if clear := _passes_clearly(cell_table(rows[first:last], origin), shortest):
             found.append([clear])
         elif len(cells):
             start, end = float(cells.times[0]), float(cells.times[-1])
-            found.append(_passing(between, start, end, shortest))
+            found.append(_passing_parts(between, start, end, shortest))
         else:
             found.append([])
     return found
 
 
-def _joined(
+def _join_at_seams(
     found: Sequence[Sequence[tuple[float, float]]], goes_on: Sequence[bool]
 ) -> list[tuple[float, float]]:
-    """Stretches in order, those that only a seam divides as one.
+    """Stretches in order; those divided only by a seam are joined.
 
-    `goes_on` tells of each part of the recording whether the rest of the part before
-    does: a long one is looked at in parts.
+    A long rest is evaluated in parts. `goes_on` says of each part whether it continues
+    the rest of the part before.
     """
     out: list[tuple[float, float]] = []
     for some, same in zip(found, goes_on, strict=True):
@@ -122,8 +132,8 @@ def _joined(
     return out
 
 
-def why_none(rows: CellRows, origin: Array) -> str:
-    """Say why the calmest part of a recording without still stretches is none.
+def explain_no_stretch(rows: CellRows, origin: Array) -> str:
+    """Say why the calmest part of a recording is no still stretch.
 
     Parameters
     ----------
@@ -132,39 +142,40 @@ def why_none(rows: CellRows, origin: Array) -> str:
     """
     if len(rows) < 2 * SPAN:
         return f"it lasts less than {2 * SPAN * CELL:g} s"
-    rows = LivingRows(rows)
-    runs = at_rest(rows, StillnessLimits().noise)
+    rows = LiveAxisRows(rows)
+    runs = find_rest_runs(rows, StillnessLimits().noise)
     if not runs:
         return "nowhere is it calmer than elsewhere, or it turns all the time"
     longest = max(runs, key=lambda run: run.last - run.first)
-    cells = table_of(rows[longest.first : longest.last + 1], origin)
+    cells = cell_table(rows[longest.first : longest.last + 1], origin)
     start, end = float(cells.times[0]), float(cells.times[-1])
-    worst = judge(cells, StillnessLimits()).worst
+    worst = judge_window(cells, StillnessLimits()).worst
     text = f"its calmest part, {start:.1f} to {end:.1f} s, "
-    return text + (str(worst.error(start)) if worst.ratio > 1 else "is too short")
+    return text + (str(worst.as_error(start)) if worst.ratio > 1 else "is too short")
 
 
-def _clear(cells: CellTable, shortest: float) -> tuple[float, float] | None:
-    """Take a stretch by the sums of the recording, if its own would be the same.
+def _passes_clearly(cells: CellTable, shortest: float) -> tuple[float, float] | None:
+    """Test a stretch by the cell sums of the recording; None if that is not possible.
 
-    They are but for the step into its first sample; so it must pass clearly.
+    These differ from sums of the stretch alone by the step into its first sample, so
+    the test must be passed clearly.
     """
-    if not len(cells) or not cells.on_edge:
+    if not len(cells) or not cells.starts_on_edge:
         return None
     first, last = cells.span
     if (
         last - first < shortest
-        or judge(cells, StillnessLimits()).worst.ratio > _CLEARLY
+        or judge_window(cells, StillnessLimits()).worst.ratio > _CLEARLY
     ):
         return None
     return first, float(np.nextafter(last, np.inf))
 
 
-def _passing(
-    between: Between, start: float, end: float, shortest: float
+def _passing_parts(
+    between: SamplesBetween, start: float, end: float, shortest: float
 ) -> list[tuple[float, float]]:
     """Parts of a stretch that pass as windows: it is cut where it was disturbed."""
-    sums, times = Cells(), [np.nan, np.nan]
+    sums, times = CellAccumulator(), [np.nan, np.nan]
     for block in between(start, end):
         if len(block):
             sums.add(without_spikes(block))
@@ -172,12 +183,12 @@ def _passing(
     first, last = float(times[0]), float(times[1])
     if not last - first >= shortest:
         return []
-    worst = judge(sums.table, StillnessLimits()).worst
+    worst = judge_window(sums.table, StillnessLimits()).worst
     if worst.ratio <= 1:
         return [(first, float(np.nextafter(last, np.inf)))]
-    # at an end of the stretch it is the last or the first sample that goes
+    # at an end of the stretch the last or the first sample is removed
     after = max(worst.at + worst.seconds, first + CELL)
     return [
-        *_passing(between, start, min(worst.at, last), shortest),
-        *_passing(between, max(after, start), end, shortest),
+        *_passing_parts(between, start, min(worst.at, last), shortest),
+        *_passing_parts(between, max(after, start), end, shortest),
     ]

@@ -15,23 +15,23 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 
 
-def channels(x: Array, step: Array, first: NDArray[np.int64], whole: bool) -> Array:
+def channel_sums(x: Array, step: Array, first: NDArray[np.int64], whole: bool) -> Array:
     """n, S, D, m of cells, (m, 4, 6), of samples and their changes, (6, n) each.
 
-    `whole` says whether no change is missing, so none of the samples.
+    `whole` says that no change, and therefore no sample, is missing.
     """
     if whole:
-        return _all(x, step, first)
+        return _sums_of_all(x, step, first)
     sums = np.zeros((len(first), 4, 6))
     for sensor in (slice(0, 3), slice(3, 6)):
         if np.isfinite(step[sensor]).all():
-            sums[..., sensor] = _all(x[sensor], step[sensor], first)
+            sums[..., sensor] = _sums_of_all(x[sensor], step[sensor], first)
         elif np.isfinite(x[sensor]).any():
-            sums[..., sensor] = _known(x[sensor], step[sensor], first)
+            sums[..., sensor] = _sums_of_known(x[sensor], step[sensor], first)
     return sums
 
 
-def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+def _sums_of_all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
     """n, S, D, m of cells, (m, 4, c), of c channels of which no value is missing."""
     sums = np.empty((len(first), 4, len(x)))
     sums[:, ::3] = np.diff(first, append=x.shape[1])[:, None, None]
@@ -40,7 +40,7 @@ def _all(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
     return sums
 
 
-def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
+def _sums_of_known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
     """n, S, D, m of cells, (m, 4, c), of the values of c channels that are there."""
     known, moved = np.isfinite(x), np.isfinite(step)
     squares = np.where(moved, step, 0.0) ** 2
@@ -49,8 +49,8 @@ def _known(x: Array, step: Array, first: NDArray[np.int64]) -> Array:
     return sums.reshape(-1, 4, len(x))
 
 
-def finest(step: Array, first: NDArray[np.int64]) -> Array:
-    """Smallest change but none in each cell, (m, 6), of changes (6, n)."""
+def smallest_changes(step: Array, first: NDArray[np.int64]) -> Array:
+    """Smallest nonzero change in each cell, (m, 6), of changes (6, n)."""
     size = np.abs(step)
     changed = size > 0
     if not changed.all():
@@ -59,7 +59,7 @@ def finest(step: Array, first: NDArray[np.int64]) -> Array:
     return least
 
 
-def warmth(temperature: Array, first: NDArray[np.int64]) -> Array:
+def temperature_sums(temperature: Array, first: NDArray[np.int64]) -> Array:
     """Sum and number of the temperatures of cells, (m, 2)."""
     warm = np.isfinite(temperature)
     if not warm.any():

@@ -23,40 +23,39 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.windows.cells import CELL
-from fieldcal.windows.sway_by_force import leaning, turning
-from fieldcal.windows.sway_process import fitted, flattened, frequencies
-from fieldcal.windows.sway_waves import PERIODS, POINTS, Waves
+from fieldcal.windows.sway_by_force import lean_angles, with_turn_rates
+from fieldcal.windows.sway_process import fit_waves, wave_frequencies, without_waves
+from fieldcal.windows.sway_waves import PERIODS, POINTS, SwayWaves
 
 LOWEST, HIGHEST = 0.06, 1.5
 """Frequencies at which bases sway, Hz: a long swell, a stiff tripod."""
 
 WIDEST = 40.0
-"""Seconds that are looked at together: longer windows are cut."""
+"""Seconds that are evaluated together: longer windows are divided."""
 
 LEAST = 16
-"""Cells below which nothing is looked for."""
+"""Fewest cells that are evaluated."""
 
 ARM, GAUGE, LONGEST = 3.0, 0.02, 30.0
-"""What is expected of the arm r, m, and of what scale factors may be off by; and the
-longest arm: on that of a pendulum of the same period gravity's part does not show."""
+"""Typical arm r, m; typical error of scale factors; and the longest arm, m: at the
+length of a pendulum of the same period the part of gravity does not show."""
 
 WEAK = 0.01
-"""Part of the strongest wave's power below which one is left to the noise."""
+"""Part of the strongest wave's power below which a wave counts as noise."""
 
 SMALLEST = float(np.deg2rad(0.1))
-"""Turning below which nothing is looked for, rad: it moves gravity by less than 1e-5
-m/s^2 in the mean."""
+"""Least rotation that is evaluated, rad: a smaller one changes the mean of gravity by
+less than 1e-5 m/s^2."""
 
 ALIKE, MISSED, TINY = 0.3, 1e-4, 1e-12
-"""Part of the power that gravity makes of the turning of which accelerometers across it
-may show something else, and of which they do so at least where it turns; and the least
-power, m^2/s^4."""
+"""Largest and least unexplained power of the accelerometers across gravity, as parts of
+the power that gravity has there by the rotation; and the least power, m^2/s^4."""
 
 ROUNDS = 4
-"""Fits of the arm, each with what the one before misses."""
+"""Fits of the arm, each with the noise left by the one before."""
 
 
-def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
+def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
     """Look for swaying in a window.
 
     Parameters
@@ -68,7 +67,7 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
 
     Returns
     -------
-    One for each stretch of up to a minute; none where nothing sways.
+    Waves of each stretch of up to `WIDEST` seconds; empty where nothing sways.
 
     """
     seen = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
@@ -85,8 +84,8 @@ def waves_of(t: Array, six: Array, scale: Array) -> list[Waves]:
     return out if len(out) == parts else []
 
 
-def _waves_of_stretch(t: Array, six: Array, scale: Array) -> Waves | None:
-    """Waves of one stretch; None if there are none, or they are no turning."""
+def _waves_of_stretch(t: Array, six: Array, scale: Array) -> SwayWaves | None:
+    """Waves of one stretch; None if there are none, or if they are no rotation."""
     cells = _cells(t, six)
     if cells is None:
         return None
@@ -96,27 +95,29 @@ def _waves_of_stretch(t: Array, six: Array, scale: Array) -> Waves | None:
     hz = hz[hz >= max(LOWEST, 1 / span)]
     force, ends = y[:, :3].mean(axis=0), (float(t[0]), float(t[-1]))
     alone = y.shape[1] == 3
-    if not _oscillates(leaning(y, force) if alone else _turned(y, scale, length)):
+    if not _oscillates(
+        lean_angles(y, force) if alone else _turn_angle(y, scale, length)
+    ):
         return None
     none = np.zeros(y.shape[1])
-    plain = Waves(
+    plain = SwayWaves(
         hz[:0], float(at.mean()), y[:0], y[:0], force, none[:3], none, none, length,
         ends, scale,
     )  # fmt: skip
-    hz = frequencies(at, y, hz, 1 / (8 * span))
-    whole = turning if alone else _with_arm
-    first = fitted(at, y, hz, plain)
+    hz = wave_frequencies(at, y, hz, 1 / (8 * span))
+    whole = with_turn_rates if alone else _fit_arm
+    first = fit_waves(at, y, hz, plain)
     if first is None or not (found := whole(first)):
         return None
-    # squares have waves of their own, of which the first fit took some for sway
-    again = fitted(at, y - found.squares(at)[:, : y.shape[1]], hz, found)
+    # the squares contain waves, part of which the first fit took for sway
+    again = fit_waves(at, y - found.second_order(at)[:, : y.shape[1]], hz, found)
     if again is not None:
-        found = turning(again) if alone else again
+        found = with_turn_rates(again) if alone else again
     return found if found.periods > PERIODS else None
 
 
 def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
-    """Middles and means (m, c) of cells in which nothing is missing, and how long."""
+    """Middles and means (m, c) of complete cells, and their length, s."""
     if len(t) < LEAST:
         return None
     step = float(np.median(np.diff(t)))
@@ -130,31 +131,31 @@ def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     return own.mean(axis=1)[whole], y[whole], each * step
 
 
-def _turned(y: Array, scale: Array, length: float) -> Array:
-    """What the gyroscopes of cells (m, 6) sum up to, (m, 3) rad, without their bias."""
+def _turn_angle(y: Array, scale: Array, length: float) -> Array:
+    """Integral of the gyroscopes of cells (m, 6) less their mean, (m, 3) rad."""
     rate = y[:, 3:] / scale
     angle: Array = np.cumsum((rate - rate.mean(axis=0)) * length, axis=0)
     return angle
 
 
 def _oscillates(angle: Array) -> bool:
-    """Whether the device leans to and fro, (m, 3) rad, enough to be looked at."""
-    about = flattened(np.arange(float(len(angle))), angle, ())
+    """Whether the rotation (m, 3), rad, oscillates enough to be evaluated."""
+    about = without_waves(np.arange(float(len(angle))), angle, ())
     return float((about**2).sum(axis=1).mean()) > SMALLEST**2 / 2
 
 
-def _with_arm(found: Waves) -> Waves | None:
-    """The waves with r of (1); None if accelerometers do not show that it turns."""
+def _fit_arm(found: SwayWaves) -> SwayWaves | None:
+    """The waves with r of (1); None if accelerometers do not confirm the rotation."""
     t, strong = np.linspace(*found.span, POINTS), _significant(found)
-    made = np.cross(found.force, strong.turn(t))
-    speeding = strong.turn(t, 2)
+    made = np.cross(found.force, strong.turn_angle(t))
+    speeding = strong.turn_angle(t, 2)
     design = np.stack([np.cross(speeding, e) for e in np.eye(3)] + [made], axis=2)
     design = design.reshape(-1, 4) * np.array([ARM, ARM, ARM, GAUGE])
     power = float((made**2).sum())
     rest = (strong.linear(t)[:, :3] - made).ravel()
     known, amplitudes = np.zeros(4), 6 * len(strong.hz)
     for _ in range(ROUNDS):
-        # what is missed is as smooth as the waves: it has as many values as they
+        # the unexplained part is as smooth as the waves: count as many values
         missed = float(((rest - design @ known) ** 2).sum())
         noise = max(missed, MISSED * power, TINY) / amplitudes
         known = np.linalg.solve(
@@ -167,8 +168,8 @@ def _with_arm(found: Waves) -> Waves | None:
     return replace(found, arm=arm) if alike and np.abs(arm).max() < LONGEST else None
 
 
-def _significant(found: Waves) -> Waves:
-    """The waves that are no noise: of a quick one twice derived little is left else."""
+def _significant(found: SwayWaves) -> SwayWaves:
+    """The waves above noise: second derivatives of fast noise would dominate."""
     pulse = 2 * np.pi * found.hz
     power = (found.cos[:, 3:] ** 2 + found.sin[:, 3:] ** 2).sum(axis=1) / pulse**2
     kept = power > WEAK * power.max()

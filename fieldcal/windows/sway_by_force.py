@@ -20,20 +20,20 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.sway_waves import Waves
+from fieldcal.windows.sway_waves import SwayWaves
 
 
-def leaning(y: Array, force: Array) -> Array:
-    """Phi (m, 3) of forces (m, 3) by (1), rad, its mean being none."""
+def lean_angles(y: Array, force: Array) -> Array:
+    """Angles phi (m, 3) from forces (m, 3) by (1), rad, with zero mean."""
     angle: Array = -np.cross(force, y - y.mean(axis=0)) / float(force @ force)
     return angle
 
 
-def turning(waves: Waves) -> Waves:
-    """The waves (k, 3) of accelerometers with those of gyroscopes beside, (k, 6).
+def with_turn_rates(waves: SwayWaves) -> SwayWaves:
+    """Waves (k, 3) of accelerometers, extended by those of gyroscopes, (k, 6).
 
-    The rate is what (1) makes of them: phi = c cos wt + s sin wt turns with w s cos wt
-    - w c sin wt.
+    The rates follow from (1): phi = c cos wt + s sin wt has the derivative
+    w s cos wt - w c sin wt.
     """
     force, pulse = waves.force, 2 * np.pi * waves.hz[:, None] * waves.scale
     cos, sin = (
@@ -43,6 +43,6 @@ def turning(waves: Waves) -> Waves:
         waves,
         cos=np.hstack([waves.cos, pulse * sin]),
         sin=np.hstack([waves.sin, -pulse * cos]),
-        left=np.concatenate([waves.left, np.zeros(3)]),
+        excess_variance=np.concatenate([waves.excess_variance, np.zeros(3)]),
         noise=np.concatenate([waves.noise, np.full(3, np.nan)]),
     )

@@ -19,30 +19,30 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.sway_waves import PERIODS, Waves
+from fieldcal.windows.sway_waves import PERIODS, SwayWaves
 
 ROUNDS, KEPT = 20, 1.0
-"""Steps towards the greatest evidence, and the power that a line must have in some
-output, in that of its noise, to be looked at any longer."""
+"""Steps towards the greatest evidence; and the least power of a wave in some output, in
+that output's noise, for it to be kept."""
 
 LINES, FINER = 4, 16
-"""Lines whose frequencies are sought, and points of the first grid in 1 / T."""
+"""Lines whose frequencies are refined, and grid points of their search per 1 / T."""
 
 DRIFT = (2e-4, 2e-4, 2e-4, 2e-5, 2e-5, 2e-5)
-"""What the biases of a device that has warmed up drift by in half a stretch, 1 sigma,
-m/s^2 and rad/s. What drifts more is taken for a part of a slow wave."""
+"""Drift of the biases of a warm device in half a stretch, 1 sigma, m/s^2 and rad/s. A
+larger drift counts as part of a slow wave."""
 
 STEP_S, TINY = 0.25, 1e-15
-"""Step of a window that is only thought of, s, and the least size of a wave in it."""
+"""Time step of a planned window, s, and the least size of a wave in it."""
 
 WORSE = 1.5
-"""How many times as uncertain as on firm ground a window may be on a swaying base."""
+"""Largest uncertainty of a window on a swaying base, relative to firm ground."""
 
 LADDER = (10, 15, 20, 30, 45, 60, 90, 120, 180, 300, 600)
-"""Seconds that a window may be given."""
+"""Window lengths that are considered, s."""
 
 
-def fitted(t: Array, y: Array, hz: Array, known: Waves) -> Waves | None:
+def fit_waves(t: Array, y: Array, hz: Array, known: SwayWaves) -> SwayWaves | None:
     """Waves of greatest evidence in cells (m, 6), or (m, 3) of accelerometers alone.
 
     None where there are none.
@@ -51,29 +51,29 @@ def fitted(t: Array, y: Array, hz: Array, known: Waves) -> Waves | None:
     ----------
     t : (m,) s, middles of the cells
     hz : (k,) frequencies
-    known : what is known of the stretch, its waves not among it
+    known : force, scale factors and times of the stretch; its waves are replaced
 
     """
-    return _Fitted(t, y, hz, known).waves()
+    return _WaveProcess(t, y, hz, known).waves()
 
 
-def frequencies(t: Array, y: Array, hz: Array, near: float) -> Array:
-    """Frequencies, and those of the strongest lines for any so `near` to them, Hz."""
-    return _with_lines(hz, _lines(t, y, hz), near)
+def wave_frequencies(t: Array, y: Array, hz: Array, near: float) -> Array:
+    """Frequencies, Hz, of which those within `near` of a strong line are replaced."""
+    return _with_lines(hz, _line_frequencies(t, y, hz), near)
 
 
-class _Fitted:
-    """The process (1) of the outputs of one stretch, by its evidence.
+class _WaveProcess:
+    """The process (1) of the outputs of one stretch, fitted by its evidence.
 
     Parameters
     ----------
     t, y : (m,), (m, c) cells
     hz : (k,) frequencies
-    known : what is known of the stretch
+    known : force, scale factors and times of the stretch
 
     """
 
-    def __init__(self, t: Array, y: Array, hz: Array, known: Waves) -> None:
+    def __init__(self, t: Array, y: Array, hz: Array, known: SwayWaves) -> None:
         self.hz, self.count, self.known = hz, len(t), known
         t = t - known.middle
         wave = np.multiply.outer(t, 2 * np.pi * hz)
@@ -87,7 +87,7 @@ class _Fitted:
         self.drift = np.array(DRIFT)[: y.shape[1]]
         self.size = np.tile(np.hstack([size, rate])[:, : y.shape[1]], (2, 1))
 
-    def waves(self) -> Waves | None:
+    def waves(self) -> SwayWaves | None:
         """Waves of greatest evidence; None where there is none beyond noise."""
         gram, pull = self.free.T @ self.free, self.free.T @ self.off
         bent = np.diff(self.off, n=2, axis=0)
@@ -121,15 +121,15 @@ class _Fitted:
         left = np.einsum("i,cij,j->c", off, cov, off)
         half = len(at)
         return replace(
-            self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:-1], left=left,
-            noise=noise,
+            self.known, hz=self.hz[at], cos=mean[:half], sin=mean[half:-1],
+            excess_variance=left, noise=noise,
         )  # fmt: skip
 
 
 def _posterior(
     gram: Array, pull: Array, wide: Array, noise: Array
 ) -> tuple[Array, Array]:
-    """Amplitudes (k, 6) of columns as wide as `wide` (k, 6), covariances (6, k, k)."""
+    """Amplitudes (k, 6), covariances (6, k, k) for prior deviations `wide` (k, 6)."""
     sizes = wide.T
     scaled = sizes[:, :, None] * gram * sizes[:, None, :] / noise[:, None, None]
     inverse = np.linalg.inv(scaled + np.eye(len(gram)))
@@ -138,11 +138,11 @@ def _posterior(
     return mean, cov
 
 
-def needed(waves: Waves) -> float:
+def needed_seconds(waves: SwayWaves) -> float:
     """Seconds that a window needs to be nearly as good as on firm ground.
 
-    With waves of these sizes and unknown phases, none of its means is `WORSE` times as
-    uncertain as by its noise; and it has waves enough to tell their frequency.
+    With waves of these sizes and unknown phases, no mean has more than `WORSE` times
+    its uncertainty by noise, and the window has periods enough to find the frequency.
     """
     seen = np.isfinite(waves.noise)
     power = ((waves.cos**2 + waves.sin**2) / 2)[:, seen]
@@ -165,7 +165,7 @@ def needed(waves: Waves) -> float:
 
 
 def _with_lines(hz: Array, lines: Array, near: float) -> Array:
-    """Frequencies with lines among them, but for those that are nearly the same."""
+    """Frequencies and lines, without frequencies that nearly coincide with a line."""
     kept: list[float] = []
     for line in lines.tolist():
         if all(abs(line - other) > near for other in kept):
@@ -174,15 +174,15 @@ def _with_lines(hz: Array, lines: Array, near: float) -> Array:
     return np.sort(np.concatenate([hz[apart], kept]))
 
 
-def _lines(t: Array, y: Array, hz: Array) -> Array:
-    """Frequencies of the strongest lines, (l,) Hz, one found in what others leave."""
+def _line_frequencies(t: Array, y: Array, hz: Array) -> Array:
+    """Frequencies of the strongest lines, (l,) Hz, each in the others' residual."""
     noise = np.maximum(np.diff(y, n=2, axis=0).std(axis=0) / np.sqrt(6), 1e-12)
     white = y / noise
     step = float(hz[1] - hz[0]) / 2 if len(hz) > 1 else float(hz[0]) / 2
     grid = np.arange(hz[0], hz[-1], 2 * step / (FINER / 4))
     found: list[float] = []
     for _ in range(LINES):
-        rest = flattened(t, white, found)
+        rest = without_waves(t, white, found)
         power = np.abs(np.exp(-2j * np.pi * np.outer(grid, t)) @ rest) ** 2
         at = float(grid[int(np.argmax(power.sum(axis=1)))])
         found.append(at)
@@ -190,13 +190,15 @@ def _lines(t: Array, y: Array, hz: Array) -> Array:
             for i in range(len(found)):
                 near = found[i] + width * np.array([-1.0, 0.0, 1.0])
                 others = [*found[:i], *found[i + 1 :]]
-                left = [(flattened(t, white, [*others, f]) ** 2).sum() for f in near]
+                left = [
+                    (without_waves(t, white, [*others, f]) ** 2).sum() for f in near
+                ]
                 found[i] = float(near[int(np.argmin(left))])
     return np.array(found)
 
 
-def flattened(t: Array, y: Array, hz: Sequence[float]) -> Array:
-    """What a constant, a drift and some waves leave of outputs, (m, c)."""
+def without_waves(t: Array, y: Array, hz: Sequence[float]) -> Array:
+    """Outputs (m, c) less a constant, a drift and waves at the frequencies `hz`."""
     wave = np.multiply.outer(t - t.mean(), 2 * np.pi * np.array(hz))
     s = (t - t.mean()) / np.ptp(t)
     design = np.column_stack([np.ones_like(s), s, np.cos(wave), np.sin(wave)])

@@ -9,28 +9,28 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 POINTS = 400
-"""Instants at which the turning of a stretch is looked at."""
+"""Instants at which the rotation of a stretch is evaluated."""
 
 PERIODS = 1.2
-"""Waves below which a stretch does not tell their frequency from what drifts: means
-are then up to twenty times as far off as the fit has it."""
+"""Fewest periods in a stretch: with less, waves are confused with drift, and means are
+up to twenty times as far off as the fit states."""
 
 
 @dataclass(frozen=True, slots=True)
-class Waves:
-    """What sways in a stretch of a window.
+class SwayWaves:
+    """Swaying in a stretch of a window, as waves of the outputs.
 
     Attributes
     ----------
     hz : (k,) frequencies
-    middle : s, where their phases count from
+    middle : s, origin of the phases
     cos, sin : (k, 6) amplitudes of the outputs
-    force, arm : (3,) m/s^2 and m, force at rest and arm from the turning centre
-    left : (6,) variance of the means at rest beyond that of white noise
+    force, arm : (3,) m/s^2 and m, force at rest and arm from the centre of rotation
+    excess_variance : (6,) variance of the means at rest beyond that of white noise
     noise : (6,) variance of a mean over a cell of `length` s; nan without gyroscopes
-    length : s
-    span : s, the stretch that was looked at
-    scale : (3,) outputs of the gyroscopes in a rad/s
+    length : length of a cell, s
+    span : first and last instant of the stretch, s
+    scale : (3,) outputs of the gyroscopes per rad/s
 
     """
 
@@ -40,32 +40,34 @@ class Waves:
     sin: Array
     force: Array
     arm: Array
-    left: Array
+    excess_variance: Array
     noise: Array
     length: float
     span: tuple[float, float]
     scale: Array
 
     @property
-    def size(self) -> tuple[float, float]:
-        """Mean squares of the turning, rad^2, and of its rate, rad^2/s^2."""
+    def mean_squares(self) -> tuple[float, float]:
+        """Mean squares of the rotation, rad^2, and of its rate, rad^2/s^2."""
         t = np.linspace(*self.span, POINTS)
-        squares = [float((self.turn(t, i) ** 2).sum(axis=1).mean()) for i in (0, 1)]
+        squares = [
+            float((self.turn_angle(t, i) ** 2).sum(axis=1).mean()) for i in (0, 1)
+        ]
         return squares[0], squares[1]
 
     @property
     def mean_hz(self) -> float:
-        """Frequency of one wave with all their power, Hz."""
-        turned, rate = self.size
+        """Frequency of one wave with the same mean squares, Hz."""
+        turned, rate = self.mean_squares
         return float(np.sqrt(rate / turned) / (2 * np.pi))
 
     @property
     def periods(self) -> float:
-        """Waves in the stretch."""
+        """Number of periods in the stretch."""
         return self.mean_hz * (self.span[1] - self.span[0])
 
-    def turn(self, t: Array, order: int = 0) -> Array:
-        """Phi at some instants, or its derivative of some order, (n, 3) rad."""
+    def turn_angle(self, t: Array, order: int = 0) -> Array:
+        """Rotation phi at instants t (n,), or its derivative, (n, 3) rad / s^order."""
         pulse = 2 * np.pi * self.hz[:, None]
         size = pulse ** (order - 1) / self.scale
         wave = self._angle(t) + np.pi / 2 * (order - 1)
@@ -73,19 +75,19 @@ class Waves:
         out += np.sin(wave) @ (size * self.sin[:, 3:])
         return out
 
-    def of(self, t: Array) -> Array:
-        """What swaying adds to the outputs at some instants, (n, 6)."""
-        return self.linear(t) + self.squares(t)
+    def outputs(self, t: Array) -> Array:
+        """Outputs (n, 6) by swaying, at instants t (n,)."""
+        return self.linear(t) + self.second_order(t)
 
     def linear(self, t: Array) -> Array:
-        """What is linear in the turning, (n, 6)."""
+        """Part of the outputs that is linear in the rotation, (n, 6)."""
         wave = self._angle(t)
         out: Array = np.cos(wave) @ self.cos + np.sin(wave) @ self.sin
         return out
 
-    def squares(self, t: Array) -> Array:
-        """Its squares: (1) and (2) of `sway` less what is linear, (n, 6)."""
-        phi, rate = self.turn(t), self.turn(t, 1)
+    def second_order(self, t: Array) -> Array:
+        """Part of second order: (1) and (2) of `sway` less the linear part, (n, 6)."""
+        phi, rate = self.turn_angle(t), self.turn_angle(t, 1)
         out = np.empty((len(t), 6))
         out[:, :3] = np.cross(phi, np.cross(phi, self.force)) / 2
         out[:, :3] += np.cross(rate, np.cross(rate, self.arm))  # (1)

@@ -11,7 +11,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 _PIECES = 12
-"""Pieces of a window whose medians the line is laid through."""
+"""Pieces of a window through whose medians the line is drawn."""
 
 
 SECTION = 1200
@@ -19,37 +19,37 @@ SECTION = 1200
 minutes is a few hundredths of its drift from a straight line."""
 
 
-def lines(values: Array, step: Array | None = None) -> Array:
+def robust_lines(values: Array, step: Array | None = None) -> Array:
     """Robust straight lines (m, c) through equal sections of `values` (m, c).
 
-    `step` (c,) is what the values are rounded to; they are not where it is None.
+    `step` (c,) is the step to which values are rounded; None if they are not.
     """
     step = np.zeros(values.shape[1]) if step is None else step
     sections = np.array_split(values, max(1, -(-len(values) // SECTION)))
-    return np.concatenate([_line(section, step) for section in sections])
+    return np.concatenate([_robust_line(section, step) for section in sections])
 
 
-def drift(values: Array, laid: Array) -> Array:
-    """What drifts, (m, c), of `values` (m, c) with the lines `laid` through them.
+def drift_course(values: Array, laid: Array) -> Array:
+    """Drift (m, c) of `values` (m, c), given the robust lines `laid` through them.
 
-    A drift and a step look alike to two means side by side. In each section the one
-    counts of which less remains: the line, or the two means before and after the
-    instant that parts them best. The course has no step where sections meet.
+    Two neighbouring means cannot distinguish a drift from a step. In each section the
+    one with the smaller residual is used: the line, or two means before and after the
+    best instant. The course has no step between sections.
     """
     rates = []
     sections = max(1, -(-len(values) // SECTION))
     for part, line in zip(
         np.array_split(values, sections), np.array_split(laid, sections), strict=True
     ):
-        drifts = ((part - line) ** 2).sum(axis=0) < _beside_a_step(part)
+        drifts = ((part - line) ** 2).sum(axis=0) < _squares_beside_step(part)
         rate = np.where(drifts, line[-1] - line[0], 0.0) / max(1, len(line) - 1)
         rates.append(np.broadcast_to(rate, part.shape))
     course: Array = np.cumsum(np.concatenate(rates), axis=0)
     return course
 
 
-def _beside_a_step(values: Array) -> Array:
-    """Sum of squares (c,) about the two means that leave the least of it."""
+def _squares_beside_step(values: Array) -> Array:
+    """Least sum of squares (c,) about two means, before and after some instant."""
     about = values - values.mean(axis=0)
     m, total = len(values), np.cumsum(about, axis=0)[:-1]
     first = np.arange(1, m)[:, None]
@@ -58,8 +58,8 @@ def _beside_a_step(values: Array) -> Array:
     return left
 
 
-def _line(values: Array, step: Array) -> Array:
-    """A straight line (m, c) through `values` (m, c): Theil 1950, of medians."""
+def _robust_line(values: Array, step: Array) -> Array:
+    """Straight line (m, c) through `values` (m, c), by medians (Theil 1950)."""
     m = len(values)
     if m < 2 * _PIECES:
         return np.broadcast_to(_median(values, step), values.shape)
@@ -74,9 +74,9 @@ def _line(values: Array, step: Array) -> Array:
 
 
 def _median(values: Array, step: Array) -> Array:
-    """Median (c,) of rounded values (m, c), by how they lie within its step.
+    """Median (c,) of rounded values (m, c), interpolated within its step.
 
-    The median itself is one of few values, and up to half a step off.
+    The plain median is one of few values, and up to half a step off.
     """
     middle: Array = np.median(values, axis=0)
     half = step / 2

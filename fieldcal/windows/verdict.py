@@ -11,21 +11,21 @@ from fieldcal.core.errors import Moved
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.windows.cells import CELL, CellTable
 from fieldcal.windows.disturbance import (
+    DisturbanceStatistic,
     Kind,
-    Least,
-    Statistic,
+    LeastSpread,
     pushes,
     repeats,
     shakes,
     steps,
 )
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.quiet import QuietNoise, quiet
-from fieldcal.windows.rounding import most_scatter, of_mean
-from fieldcal.windows.trend import drift, lines
+from fieldcal.windows.quiet import QuietNoise, estimate_quiet_noise
+from fieldcal.windows.rounding import largest_deviation, variance_of_mean
+from fieldcal.windows.trend import drift_course, robust_lines
 
 THRESHOLD, LONG = 5.8, 600
-"""Departure over its spread that noise alone does not reach in a window of so many
+"""Ratio of departure to spread that noise alone does not reach, in a window of `LONG`
 cells, a minute."""
 
 EARLY = 8.0
@@ -35,7 +35,7 @@ ROUNDED = 1e-6
 """Relative error of a mean of equal values, of which a jump of one step consists."""
 
 _PRESENT = 10
-"""Cells that are the present."""
+"""Cells of the last second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ class Departure:
 
     Attributes
     ----------
-    ratio : departure over what is allowed; above 1 is a disturbance
-    kind : what it looks like
+    ratio : departure over the allowed one; above 1 is a disturbance
+    kind : kind of disturbance
     channel : index in `CHANNELS`
     at, seconds : start, s of device time, and duration, s
     size, noise : departure and its standard deviation by noise, SI
@@ -60,7 +60,7 @@ class Departure:
     size: float
     noise: float
 
-    def error(self, start: float) -> Moved:
+    def as_error(self, start: float) -> Moved:
         """Return the error for a window that began at `start`, s of device time."""
         axis = CHANNELS[self.channel]
         unit = "m/s²" if self.channel < 3 else "rad/s"
@@ -84,48 +84,54 @@ class Departure:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
-    """Result for the samples so far.
+class WindowVerdict:
+    """Result of the test for rest, for the samples so far.
 
     Attributes
     ----------
     worst : the largest departure so far
-    present : the largest ratio of the last second
+    ratio_now : the largest ratio of the last second
     quiet : the noise, for the window that follows
 
     """
 
     worst: Departure
-    present: float
+    ratio_now: float
     quiet: QuietNoise | None
 
 
-def judge(
+def judge_window(
     cells: CellTable,
     limits: StillnessLimits,
     before: QuietNoise | None = None,
     shows: Array | None = None,
-) -> Verdict:
-    """Judge the samples so far by their own noise and that of the windows before.
+) -> WindowVerdict:
+    """Test the samples so far for rest, by their noise and that of earlier windows.
 
-    `shows` (6,) are jumps that come of rounding alone, where the device tells them.
+    `shows` (6,) are the jumps by rounding alone, where the device states its rounding.
     """
-    m = cells.whole
-    if m < limits.settled / CELL:
+    m = cells.complete_count
+    if m < limits.unjudged_s / CELL:
         scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
-        return Verdict(_beyond_noise(cells, scatter, limits), 0.0, before)
-    means = cells.steady[:m]
-    noise = quiet(means, before)
+        return WindowVerdict(_noise_departure(cells, scatter, limits), 0.0, before)
+    means = cells.steady_means[:m]
+    noise = estimate_quiet_noise(means, before)
     allowed = _threshold(m) * (1 + (EARLY / (CELL * noise.cells)) ** 2)
     jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
-    laid = lines(means, cells.resolution / np.maximum(_number(cells), 1.0))
+    laid = robust_lines(
+        means, cells.resolution / np.maximum(_samples_per_cell(cells), 1.0)
+    )
     least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
-    tests = _tests(cells, means, laid, noise, _least_spreads(cells, least))
-    worst = [_worst(cells, test, allowed) for test in tests] + _stuck(cells)
-    worst.append(_beyond_drift(cells, laid, noise, limits))
-    worst.append(_beyond_noise(cells, noise.spread[0], limits))
+    tests = _disturbance_statistics(
+        cells, means, laid, noise, _least_spreads(cells, least)
+    )
+    worst = [_worst_departure(cells, test, allowed) for test in tests] + _stuck_runs(
+        cells
+    )
+    worst.append(_drift_departure(cells, laid, noise, limits))
+    worst.append(_noise_departure(cells, noise.spread[0], limits))
     recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
-    return Verdict(
+    return WindowVerdict(
         max(worst, key=lambda departure: departure.ratio),
         float(max(recent) / allowed),
         noise,
@@ -133,53 +139,57 @@ def judge(
 
 
 def _threshold(cells: int) -> float:
-    """`THRESHOLD` in a window of so many cells: of more, the largest by chance is more.
+    """`THRESHOLD`, raised for a window of more cells than `LONG`.
 
     The largest of n normal deviates grows as sqrt(2 ln n).
     """
     return float(np.sqrt(THRESHOLD**2 + 2 * np.log(max(1.0, cells / LONG))))
 
 
-def _tests(
-    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: Least
-) -> list[Statistic]:
+def _disturbance_statistics(
+    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: LeastSpread
+) -> list[DisturbanceStatistic]:
     m = len(means)
     return [
         *pushes(means - laid, noise, least),
-        *steps(means - drift(means, laid), noise, least),
-        *shakes(np.nan_to_num(cells.short[:m]), cells.steps[:m], least),
+        *steps(means - drift_course(means, laid), noise, least),
+        *shakes(
+            np.nan_to_num(cells.short_lag_variance[:m]), cells.step_counts[:m], least
+        ),
     ]
 
 
 def _rounding_noise(cells: CellTable) -> Array:
-    """What rounding leaves in a mean of values whose noise does not hide it, (6,)."""
-    return np.sqrt(of_mean(cells.resolution, np.nan_to_num(cells.noise)))
+    """Error of a mean by rounding, where noise does not average it out, (6,)."""
+    return np.sqrt(variance_of_mean(cells.resolution, np.nan_to_num(cells.noise)))
 
 
-def _least_spreads(cells: CellTable, always: Array) -> Least:
-    """The least that spreads are: what jumps may be, and how often values change.
+def _least_spreads(cells: CellTable, always: Array) -> LeastSpread:
+    """Lower bounds of the spreads, from `always` and from how often values change.
 
-    A cell in which a value jumps by many steps counts as one that changed all through.
+    A cell in which a value jumps by many steps counts as one with changes throughout.
     """
-    step, differ = cells.resolution, cells.steps
+    step, differ = cells.resolution, cells.step_counts
     unit = np.where(step > 0, step, np.inf) ** 2
-    share = np.minimum(2 * np.nan_to_num(cells.short) / unit, 1.0)
+    share = np.minimum(2 * np.nan_to_num(cells.short_lag_variance) / unit, 1.0)
     changed = (share * differ).sum(axis=0) / np.maximum(differ.sum(axis=0), 1.0)
-    return Least(always, most_scatter(step, changed), _number(cells))
+    return LeastSpread(
+        always, largest_deviation(step, changed), _samples_per_cell(cells)
+    )
 
 
-def _number(cells: CellTable) -> Array:
+def _samples_per_cell(cells: CellTable) -> Array:
     """Samples that a cell usually has, (6,)."""
     number: Array = np.median(cells.counts, axis=0)
     return number
 
 
-def _stuck(cells: CellTable) -> list[Departure]:
+def _stuck_runs(cells: CellTable) -> list[Departure]:
     """Runs of one value, where the axes of a sensor are noisier than its resolution."""
     sampled = np.nan_to_num(cells.noise)
     sensor = np.repeat(np.median(sampled.reshape(2, 3), axis=1), 3)
     noisy = np.flatnonzero(np.maximum(sampled, sensor) > cells.resolution)
-    runs = repeats(np.nan_to_num(cells.short), cells.steps, noisy)
+    runs = repeats(np.nan_to_num(cells.short_lag_variance), cells.step_counts, noisy)
     return [
         Departure(
             np.inf,
@@ -194,7 +204,9 @@ def _stuck(cells: CellTable) -> list[Departure]:
     ]
 
 
-def _worst(cells: CellTable, test: Statistic, allowed: float) -> Departure:
+def _worst_departure(
+    cells: CellTable, test: DisturbanceStatistic, allowed: float
+) -> Departure:
     first, channel = divmod(int(np.argmax(test.z)), test.z.shape[1])
     cell = first + test.cells if test.kind == "step" else first
     return Departure(
@@ -208,10 +220,10 @@ def _worst(cells: CellTable, test: Statistic, allowed: float) -> Departure:
     )
 
 
-def _beyond_drift(
+def _drift_departure(
     cells: CellTable, laid: Array, noise: QuietNoise, limits: StillnessLimits
 ) -> Departure:
-    """Change over the window, by the line, allowed for what noise can pretend."""
+    """Change of the line over the window, against the limit and the noise."""
     change = laid[-1] - laid[0]
     ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
     channel = int(np.argmax(ratio))
@@ -226,7 +238,7 @@ def _beyond_drift(
     )
 
 
-def _beyond_noise(
+def _noise_departure(
     cells: CellTable, scatter: Array, limits: StillnessLimits
 ) -> Departure:
     ratio = scatter / limits.noise

@@ -1,4 +1,4 @@
-"""A window while it fills: mean, error, test for rest and verdict after every block.
+"""A window while it fills: mean, its error and the test for rest after every block.
 
 If a device rotates slightly at rest, in a hand or on a support that gives way, its
 specific force changes across the mean force and not along it. The noise of the mean
@@ -20,19 +20,19 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.windows.cells import CELL, Cells, CellTable, joined
-from fieldcal.windows.grain import variance, visible_step
+from fieldcal.windows.cells import CELL, CellAccumulator, CellTable, join_cells
+from fieldcal.windows.grain import rounding_variance, visible_step
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.longrun import MeanError, error_of_mean
 from fieldcal.windows.mean import Average
 from fieldcal.windows.quiet import QuietNoise
-from fieldcal.windows.verdict import Verdict, judge
+from fieldcal.windows.verdict import WindowVerdict, judge_window
 
 FEWEST = 10
 """Cells a window must have for its mean to have an error: 1 s of samples."""
 
 SETTLED = 15.0
-"""Device time before which nothing is said of what more time would bring, s."""
+"""Device time from which the gain of further averaging is judged, s."""
 
 GAIN_OF_DOUBLING = 0.9
 """Factor to which twice the time must lower the error to go on (white noise: 0.71)."""
@@ -44,27 +44,28 @@ class LearnedNoise:
 
     Attributes
     ----------
-    quiet : how much it wanders at rest; None where windows need not be alike in that
-    seen : (s, 7) log likelihood of the shapes of its spectra: axes, along the force
+    quiet : noise at rest by duration; None where it may differ from window to window
+    shape_likelihood : (s, 7) log likelihood of the spectrum shapes, of the six channels
+        and of the component along the force
 
     """
 
     quiet: QuietNoise | None
-    seen: Array
+    shape_likelihood: Array
 
     @property
-    def spectrum(self) -> LearnedNoise:
-        """What holds in more wind or another hand as well: the shape of the noise."""
+    def without_wander(self) -> LearnedNoise:
+        """The shape of the spectrum alone, which also holds in more wind or by hand."""
         return replace(self, quiet=None)
 
 
 class Window:
     """A window of device time over which the device should be still.
 
-    Feed it with `add`; every property holds for the samples so far, and none depends
-    on how they were cut into blocks. `noise` of a window that was good sharpens the
-    next one of the same device; `grain` is what the device rounds to, where it says so;
-    `pieces` are windows that it goes on from, with what was between them left out.
+    Samples are added with `add`. Every property holds for the samples so far, and none
+    depends on how they were cut into blocks. `noise` is that of an earlier window of
+    the device, which sharpens the test. `grain` is the rounding that the device states.
+    `pieces` are earlier windows that this one continues; the gaps are left out.
 
     >>> import numpy as np
     >>> rng = np.random.default_rng(0)
@@ -73,7 +74,7 @@ class Window:
     >>> window = Window()
     >>> for k in range(0, 3000, 50):
     ...     window.add(Block.of(t[k : k + 50], acc[k : k + 50]))
-    >>> window.moved is None, window.n, f"{window.sigma[1]:.5f} m/s^2"
+    >>> window.disturbance is None, window.n, f"{window.sigma[1]:.5f} m/s^2"
     (True, 3000, '0.00036 m/s^2')
     """
 
@@ -87,10 +88,10 @@ class Window:
         self._limits = limits or StillnessLimits()
         self._before, self._grain = noise, grain or Grain()
         self._pieces = tuple(pieces)
-        self._sum = Cells()
-        self._cells = reduce(joined, (*(p.cells for p in pieces), self._sum.table))
+        self._sum = CellAccumulator()
+        self._cells = reduce(join_cells, (*(p.cells for p in pieces), self._sum.table))
         self._error: MeanError | None = None
-        self._verdict: Verdict | None = None
+        self._verdict: WindowVerdict | None = None
         self._covariance: Array | None = None
 
     def add(self, block: Block) -> None:
@@ -99,8 +100,8 @@ class Window:
         self._changed()
 
     def _changed(self) -> None:
-        own = self._sum.table.heard
-        self._cells = reduce(joined, (*(p.cells for p in self._pieces), own))
+        own = self._sum.table.with_values
+        self._cells = reduce(join_cells, (*(p.cells for p in self._pieces), own))
         self._error = self._verdict = self._covariance = None
 
     @property
@@ -108,9 +109,9 @@ class Window:
         """The cells so far that hold a value."""
         return self._cells
 
-    def cut(self, at: float) -> None:
-        """Forget what is not wholly before an instant, s of device time."""
-        self._sum.cut(at)
+    def truncate(self, at: float) -> None:
+        """Discard the cells that end after an instant, s of device time."""
+        self._sum.truncate(at)
         self._changed()
 
     @property
@@ -162,11 +163,11 @@ class Window:
         return self._covariance
 
     def _widened(self) -> Array:
-        """Covariance with what rounding adds, and for samples that are missing."""
+        """Covariance, increased for rounding and for missing samples."""
         if len(self._cells) < FEWEST:
             return np.full((6, 6), np.nan)
         whole = self._mean_error().covariance
-        along = _known_along(whole[:6, :6], self._along, float(whole[6, 6]))
+        along = _with_variance_along(whole[:6, :6], self._along, float(whole[6, 6]))
         covariance = along + np.diag(self._rounding())
         known = np.isfinite(self._cells.means).mean(axis=0)
         share = np.where(known > 0, known, np.nan)
@@ -174,31 +175,35 @@ class Window:
         return widened
 
     @property
-    def meter(self) -> float:
-        """Motion in the last second as part of what is allowed: above 1 it moves."""
-        return self._judged().present
+    def motion_now(self) -> float:
+        """Motion in the last second over the allowed motion; above 1 it moves."""
+        return self._judged().ratio_now
 
     @property
-    def motion(self) -> float:
-        """Largest departure so far as part of what is allowed: above 1 it moved."""
+    def largest_motion(self) -> float:
+        """Largest departure from rest over the allowed one; above 1 it moved."""
         return self._judged().worst.ratio
 
     @property
-    def moved(self) -> Moved | None:
+    def disturbance(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
         worst = self._judged().worst
-        return worst.error(self.start) if worst.ratio > 1 else None
+        return worst.as_error(self.start) if worst.ratio > 1 else None
 
     @property
     def noise(self) -> LearnedNoise | None:
-        """What is known of the noise for the window after this one, if anything."""
+        """Noise learned for the next window, if any."""
         quiet = self._judged().quiet
-        return LearnedNoise(quiet, self._mean_error().seen) if quiet else self._before
+        return (
+            LearnedNoise(quiet, self._mean_error().shape_likelihood)
+            if quiet
+            else self._before
+        )
 
-    def done(self, target: float | None = None) -> str | None:
-        """Return why averaging can stop before its time, as a sentence, or None.
+    def reason_to_stop(self, target: float | None = None) -> str | None:
+        """Return why averaging can stop early, as a sentence, or None.
 
-        `target` is the standard error wanted of each accelerometer mean, m/s^2.
+        `target` is the wanted standard error of each accelerometer mean, m/s^2.
         """
         sigma = self.sigma[:3]
         if target is not None and np.max(sigma) <= target:
@@ -208,7 +213,9 @@ class Window:
             )
         if self.elapsed < SETTLED or not np.isfinite(sigma).any():
             return None
-        twice = np.sqrt(self._mean_error().doubled[:6] ** 2 + self._rounding())[:3]
+        twice = np.sqrt(
+            self._mean_error().sigma_of_doubled[:6] ** 2 + self._rounding()
+        )[:3]
         open_ = np.isfinite(sigma) & (sigma > (target or 0.0))
         if (twice[open_] > GAIN_OF_DOUBLING * sigma[open_]).all():
             return (
@@ -234,23 +241,23 @@ class Window:
                 f"a window of {self.n} samples over {self.elapsed:.2g} s is too short "
                 f"for its mean to have an error: take {FEWEST * CELL:g} s or more"
             )
-        if moved := self.moved:
+        if moved := self.disturbance:
             raise moved
         start, end = self.start, self.end
         return Average(self.mean, self.covariance, self.temperature, self.n, start, end)
 
-    def _judged(self) -> Verdict:
+    def _judged(self) -> WindowVerdict:
         if self._verdict is None:
             before = self._before.quiet if self._before else None
             sampled = np.nan_to_num(self._cells.noise)
             jumps = visible_step(self._grain, self.mean, sampled)
-            self._verdict = judge(self._cells, self._limits, before, jumps)
+            self._verdict = judge_window(self._cells, self._limits, before, jumps)
         return self._verdict
 
     def _mean_error(self) -> MeanError:
         if self._error is None:
-            before = self._before.seen if self._before else None
-            means = self._cells.steady
+            before = self._before.shape_likelihood if self._before else None
+            means = self._cells.steady_means
             seven = np.column_stack([means, means @ self._along])
             self._error = error_of_mean(seven, self._cells.spacing, before)
         return self._error
@@ -264,11 +271,13 @@ class Window:
 
     def _rounding(self) -> Array:
         sampled = np.nan_to_num(self._cells.noise)
-        return variance(self._grain, self.mean, sampled, self._cells.resolution)
+        return rounding_variance(
+            self._grain, self.mean, sampled, self._cells.resolution
+        )
 
 
-def _known_along(covariance: Array, n: Array, variance: float) -> Array:
-    """Covariance (6, 6) in which the variance along the direction n is this one."""
+def _with_variance_along(covariance: Array, n: Array, variance: float) -> Array:
+    """Change a covariance (6, 6) so that its variance along n (6,) is `variance`."""
     reach = covariance @ n
     q = float(n @ reach)
     if q <= 0:

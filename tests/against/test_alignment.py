@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from fieldcal.against.motion.alignment import aligned
-from fieldcal.against.motion.correlation import score, scores
-from fieldcal.against.motion.grid import GRID_HZ, Grid
+from fieldcal.against.motion.alignment import align_motion
+from fieldcal.against.motion.correlation import explained_score, lag_scores
+from fieldcal.against.motion.grid import GRID_HZ, EvenGrid
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 
@@ -45,7 +45,9 @@ def test_delay_drift_and_axes_are_those_that_were_drawn(
     real += rng.normal(0, 0.01, real.shape)
     if lost is not None:
         sim[:, lost] = np.nan
-    found = aligned(block(t[:-late], real), block(start + t * (1 + drift), sim), NAMES)
+    found = align_motion(
+        block(t[:-late], real), block(start + t * (1 + drift), sim), NAMES
+    )
     where = found.alignment
     true = start + (late / HZ + where.middle) * (1 + drift)
     assert where.middle - where.delay == pytest.approx(true, abs=0.02)
@@ -62,9 +64,9 @@ def test_delay_drift_and_axes_are_those_that_were_drawn(
 def test_what_a_shift_explains_is_the_share_of_a_regression() -> None:
     """Shift by shift, by least squares and not by correlations."""
     six, t = motion(5), np.arange(N) / HZ
-    one = Grid.of(block(t[:4000], six[300:4300]))
-    two = Grid.of(block(t[:6000], six[:6000, [1, 2, 0, 5, 3, 4]]))
-    lags, told = scores(one, two)
+    one = EvenGrid.of(block(t[:4000], six[300:4300]))
+    two = EvenGrid.of(block(t[:6000], six[:6000, [1, 2, 0, 5, 3, 4]]))
+    lags, told = lag_scores(one, two)
     assert lags[np.argmax(told.sum(axis=1))] == -300 / HZ * GRID_HZ
     for lag in (-75, -60, -10, 0):  # in steps of the grid
         z = two.six[-lag : -lag + len(one)]
@@ -73,15 +75,17 @@ def test_what_a_shift_explains_is_the_share_of_a_regression() -> None:
             left = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
             said = -np.log(max(float((left @ left) / (y @ y)), 1e-6))
             assert told[lags == lag, j] == pytest.approx(said, rel=1e-6, abs=1e-9)
-        assert score(one.six, z) == pytest.approx(float(told[lags == lag].sum()))
+        assert explained_score(one.six, z) == pytest.approx(
+            float(told[lags == lag].sum())
+        )
 
 
 def test_no_alignment_without_a_motion_in_common() -> None:
     t = np.arange(N) / HZ
     real, other = block(t, motion(1)), block(t, motion(2))
     with pytest.raises(InputError, match="show no common motion"):
-        aligned(real, other, NAMES)
+        align_motion(real, other, NAMES)
     acc, gyr = motion(1), motion(1)
     acc[:, 3:], gyr[:, :3] = np.nan, np.nan
     with pytest.raises(InputError, match="no moving triad in common"):
-        aligned(block(t, acc), block(t, gyr), NAMES)
+        align_motion(block(t, acc), block(t, gyr), NAMES)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.against.motion.alignment import aligned
+from fieldcal.against.motion.alignment import align_motion
 from fieldcal.against.motion.held import holds_positions
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
@@ -94,9 +94,9 @@ def test_what_is_quicker_than_both_share_counts_for_nothing() -> None:
     real, sim = (
         Block.of(t, v[:, :3], v[:, 3:]) for v in (slow + quick, slow + 0.8 * other)
     )
-    hz = aligned(real, sim, ("a", "b")).hz
+    hz = align_motion(real, sim, ("a", "b")).hz
     assert (hz > 0.3).all() and (hz < 1.2).all()
-    whole = aligned(real, real, ("a", "b")).hz
+    whole = align_motion(real, real, ("a", "b")).hz
     assert np.isinf(whole).all()
 
 

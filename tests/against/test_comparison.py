@@ -10,9 +10,9 @@ import pytest
 import strapdown
 from small_sessions import dictionary, ladder
 
-from fieldcal.against import Match, compare, matched
-from fieldcal.against.side import Side, side
-from fieldcal.against.widened import on_all_axes
+from fieldcal.against import Match, compare, compare_sides
+from fieldcal.against.side import DiagnosedRecording, diagnose_side
+from fieldcal.against.widened import with_all_parameters
 from fieldcal.core.samples import Array, Block
 from fieldcal.model import thresholds
 from fieldcal.session import description
@@ -44,12 +44,14 @@ def played(device: dict[str, Any], seed: int, later: float = 0.0) -> tuple[Any, 
 
 
 @pytest.fixture(scope="module")
-def real() -> Side:
-    return side("real", *played(DEVICE, 1))
+def real() -> DiagnosedRecording:
+    return diagnose_side("real", *played(DEVICE, 1))
 
 
-def against(real: Side, device: dict[str, Any], seed: int = 2) -> Match:
-    return matched(real, side("simulator", *played(device, seed, LATER), real))
+def against(real: DiagnosedRecording, device: dict[str, Any], seed: int = 2) -> Match:
+    return compare_sides(
+        real, diagnose_side("simulator", *played(device, seed, LATER), real)
+    )
 
 
 @pytest.mark.thorough
@@ -67,10 +69,12 @@ def test_a_simulator_without_the_earths_rate() -> None:
 
 
 @pytest.mark.thorough
-def test_outputs_that_the_simulator_has_not_are_left_aside(real: Side) -> None:
+def test_outputs_that_the_simulator_has_not_are_left_aside(
+    real: DiagnosedRecording,
+) -> None:
     block, about = played(DEVICE, 2)
     blind = replace(block, gyr=np.full_like(block.gyr, np.nan))
-    found = matched(real, side("simulator", blind, about, real))
+    found = compare_sides(real, diagnose_side("simulator", blind, about, real))
     assert found.verdict == "consistent"
     assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.15)
     assert any("nothing of gx, gy, gz" in warning for warning in found.warnings)
@@ -83,7 +87,7 @@ def value(found: Match, name: str, parameter: str) -> tuple[float, float]:
     return float(off.value), off.sigma
 
 
-def test_a_simulator_that_is_like_the_device_agrees(real: Side) -> None:
+def test_a_simulator_that_is_like_the_device_agrees(real: DiagnosedRecording) -> None:
     found = against(real, DEVICE)
     assert found.verdict == "consistent" and not found.differences
     assert found.alike == ("cross_coupling",)
@@ -91,15 +95,15 @@ def test_a_simulator_that_is_like_the_device_agrees(real: Side) -> None:
 
 
 def test_what_is_not_likely_enough_is_no_difference_and_is_told(
-    real: Side, monkeypatch: pytest.MonkeyPatch
+    real: DiagnosedRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     louder = {**DEVICE, "noise": {"acc": [0.0208] * 3, "gyr": [1e-3] * 3}}
-    sim = side("simulator", *played(louder, 2, LATER), real)
-    (sure,) = matched(real, sim).differences
+    sim = diagnose_side("simulator", *played(louder, 2, LATER), real)
+    (sure,) = compare_sides(real, sim).differences
     assert sure.id == "noise" and sure.probability > 0.9
     for asked, said in ((sure.probability, 1), (sure.probability + 1e-9, 0)):
         monkeypatch.setattr(thresholds, "DIFFERS", asked)
-        found = matched(real, sim)
+        found = compare_sides(real, sim)
         assert len(found.differences) == said
         assert found.verdict == ("left_out" if said else "consistent")
         told = [w for w in found.warnings if "may differ, with a probability of" in w]
@@ -112,16 +116,16 @@ def test_numbers_of_an_effect_are_told_with_it_on_all_axes() -> None:
     d = dictionary(ladder())
     cause = next(c for c in d.causes if c.name == "scale_asymmetry")
     one = next(v for v in cause.variants if v.params == (1,))
-    assert on_all_axes((cause, one))[1].params == (0, 1, 2)
+    assert with_all_parameters((cause, one))[1].params == (0, 1, 2)
     drift = next(c for c in d.causes if c.key == "settling:acc")
     narrow = next(v for v in drift.variants if len(v.params) == 1)
-    whole = on_all_axes((drift, narrow))[1]
+    whole = with_all_parameters((drift, narrow))[1]
     assert whole.params == (0, 1, 2) and whole.shape == narrow.shape
     exact = replace(narrow, shape={"tau_s": 3.21})
-    assert on_all_axes((drift, exact))[1] is exact
+    assert with_all_parameters((drift, exact))[1] is exact
 
 
-def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:
+def test_a_perfect_simulator_leaves_out_everything(real: DiagnosedRecording) -> None:
     found = against(real, {})
     said = {(d.id, d.direction) for d in found.differences}
     assert said == {
@@ -138,7 +142,7 @@ def test_a_perfect_simulator_leaves_out_everything(real: Side) -> None:
 
 
 def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
-    real: Side,
+    real: DiagnosedRecording,
 ) -> None:
     """By itself it shows none of it: its size is the device's."""
     weak = {"acc": [[1.004, 0, 0], [2e-4, 0.997, 0], [0, 0, 1.001]]}
@@ -157,7 +161,7 @@ def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
 
 @pytest.mark.thorough
 def test_what_the_simulator_has_beyond_the_device_has_the_other_direction(
-    real: Side,
+    real: DiagnosedRecording,
 ) -> None:
     more = {
         **DEVICE,

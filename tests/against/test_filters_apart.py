@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fieldcal.against import offsets
-from fieldcal.against.causes import Decided
-from fieldcal.against.filters import filters
+from fieldcal.against.causes import DecidedCauses
+from fieldcal.against.filters import filter_difference
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.filtered_turns import FILTERED
@@ -33,7 +33,9 @@ def side(square: tuple[float, float], sigma: tuple[float, float]) -> Any:
 
 
 def against(real: Any, sim: Any) -> Any:
-    return list(filters(cast(Decided, SimpleNamespace(real=real, sim=sim))))
+    return list(
+        filter_difference(cast(DecidedCauses, SimpleNamespace(real=real, sim=sim)))
+    )
 
 
 NONE, SOME, MORE = (1e-6, -2e-6), (2.5e-3, 9e-4), (4e-3, 9e-4)
@@ -85,7 +87,8 @@ def test_sets_that_may_all_be_right_have_biases_apart() -> None:
 
     sets = [(one(4.0, 1.0), 0.6), (one(0.0, 1.0), 0.2)]
     explanation = cast(Explanation, SimpleNamespace(
-        dictionary=SimpleNamespace(bias=2, scale=8), average=SimpleNamespace(sets=sets)
+        dictionary=SimpleNamespace(bias=2, scale=8),
+        model_average=SimpleNamespace(sets=sets)
     ))  # fmt: skip
-    found = offsets.between_sets(explanation, "acc_bias", np.array([0, 1]))
+    found = offsets.scatter_between_sets(explanation, "acc_bias", np.array([0, 1]))
     np.testing.assert_allclose(found, [[3.0, 0.0], [0.0, 0.0]], atol=1e-12)

@@ -12,7 +12,7 @@ import pytest
 import strapdown
 from session_folders import write_session
 
-from fieldcal.against.gate import checks, limits, write_junit
+from fieldcal.against.gate import check_match, parse_limits, write_junit
 from fieldcal.against.result import (
     Difference,
     Direction,
@@ -54,7 +54,7 @@ def match(*differences: Difference) -> Match:
 
 
 def failed(found: Match, *given: str) -> list[str]:
-    return [one.name for one in checks(found, limits(given)) if not one.ok]
+    return [one.name for one in check_match(found, parse_limits(given)) if not one.ok]
 
 
 def test_whatever_differs_fails_unless_it_is_within_its_limit() -> None:
@@ -86,13 +86,13 @@ def test_a_delay_has_a_limit_in_s_though_instants_have_none() -> None:
 @pytest.mark.parametrize("given", ["acc_bias", "acc_bias=", "acc_bias=-1", "speed=1"])
 def test_limits_that_are_none_are_refused(given: str) -> None:
     with pytest.raises(InputError, match="--limit"):
-        limits([given])
+        parse_limits([given])
 
 
 def test_junit_has_a_case_for_everything_and_numbers_to_follow(tmp_path: Path) -> None:
     found = match(differing("acc_bias", 0.1, 0.08))
     path = tmp_path / "against.xml"
-    write_junit(path, "bench", found, checks(found, {}))
+    write_junit(path, "bench", found, check_match(found, {}))
     suite = ElementTree.parse(path).getroot()
     cases = {c.get("name"): c.find("failure") for c in suite.iter("testcase")}
     assert set(cases) >= {"acc_bias", "gyr_scale", "noise", "quadratic"}

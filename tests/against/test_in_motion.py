@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.in_motion.driven import Drive, coloured, recorded
 from benchmarks.in_motion.pairs import ABOUT, KINDS, WHITE, block_of, compared, pulls
 from fieldcal.against import Match
-from fieldcal.against.motion import compared_in_motion
+from fieldcal.against.motion import compare_in_motion
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
@@ -43,7 +43,7 @@ def true() -> Block:
 
 def held(device: Mapping[str, Any], true: Block, seconds: float = 60.0) -> Match:
     real = block_of(recorded(DRIVE, {"start": 5.0, **device}, seconds, 25.0))
-    return compared_in_motion((real, ABOUT), true, NAMES)
+    return compare_in_motion((real, ABOUT), true, NAMES)
 
 
 def number(found: Match, name: str, parameter: str) -> tuple[float, float]:
@@ -191,7 +191,7 @@ def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     table = recorded(DRIVE, {"start": 5.0, **NOISE}, 50.0, 25.0)
     coarse = table.copy()
     coarse[:, 0] = np.floor(table[:, 0] / 0.015) * 0.015
-    found = compared_in_motion((block_of(coarse), ABOUT), true, NAMES)
+    found = compare_in_motion((block_of(coarse), ABOUT), true, NAMES)
     assert {d.id for d in found.differences} - CALIBRATION == {"stamp_error"}
     share, sigma = number(found, "stamp_error", "share")
     assert abs(share - 1) < 4 * sigma < 0.2
@@ -200,7 +200,7 @@ def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     spline = CubicSpline(even[:, 0], even[:, 1:])
     rng = np.random.default_rng(2)
     coarse[:, 1:] = spline(coarse[:, 0]) + rng.normal(0, WHITE, (len(coarse), 6))
-    kept = compared_in_motion((block_of(coarse[5:-5]), ABOUT), true, NAMES)
+    kept = compare_in_motion((block_of(coarse[5:-5]), ABOUT), true, NAMES)
     assert not {d.id for d in kept.differences} - CALIBRATION
 
 
@@ -215,7 +215,7 @@ def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> Non
     given = kind(name).EXAMPLE.given
     real = simulate(plain.having(effect(name, given)), windows, seed=3)
     sim = simulate(plain, windows, seed=4, noise=False)
-    found = compared_in_motion((real, ABOUT), sim, NAMES)
+    found = compare_in_motion((real, ABOUT), sim, NAMES)
     assert {d.id for d in found.differences} - CALIBRATION == {name}
     for part in set(given) & set(known()[name].names):
         value = given[part]
@@ -230,7 +230,7 @@ def test_nothing_is_said_of_what_is_alike() -> None:
         real, sim = table.copy(), table.copy()
         real[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])
         sim[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])
-        found = compared_in_motion((block_of(real), ABOUT), block_of(sim), NAMES)
+        found = compare_in_motion((block_of(real), ABOUT), block_of(sim), NAMES)
         assert found.verdict == "consistent" and not found.differences
         assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.1)
 
@@ -238,7 +238,7 @@ def test_nothing_is_said_of_what_is_alike() -> None:
 def test_motions_with_nothing_in_common_are_refused(true: Block) -> None:
     other = block_of(recorded(Drive(11), {}, 60.0, 25.0))
     with pytest.raises(InputError, match="recording and simulator show no common"):
-        compared_in_motion((other, ABOUT), true, NAMES)
+        compare_in_motion((other, ABOUT), true, NAMES)
 
 
 def test_a_motion_that_repeats_itself_is_refused() -> None:
@@ -247,11 +247,11 @@ def test_a_motion_that_repeats_itself_is_refused() -> None:
     real = once.copy()
     real[:, 1:] += coloured(np.random.default_rng(1), len(real), 0.04, {"white": 0.1})
     with pytest.raises(InputError, match="repeats itself: shifted by"):
-        compared_in_motion((block_of(real), ABOUT), block_of(twice), NAMES)
+        compare_in_motion((block_of(real), ABOUT), block_of(twice), NAMES)
 
 
 def test_a_recording_beside_itself_is_alike(true: Block) -> None:
-    assert compared_in_motion((true, ABOUT), true, NAMES).verdict == "consistent"
+    assert compare_in_motion((true, ABOUT), true, NAMES).verdict == "consistent"
 
 
 def test_too_little_in_common_is_refused(true: Block) -> None:
@@ -277,7 +277,7 @@ def test_one_triad_is_compared_where_the_other_is_not_there(
             (true, sim),
         )
     )
-    found = compared_in_motion((one, ABOUT), two, NAMES)
+    found = compare_in_motion((one, ABOUT), two, NAMES)
     scaled = set() if real.stop else {"gyr_scale"}
     assert {d.id for d in found.differences} == scaled
     assert all(any(w.startswith(s) for w in found.warnings) for s in says)
@@ -287,12 +287,12 @@ def test_one_triad_is_compared_where_the_other_is_not_there(
 def test_different_triads_are_refused(true: Block) -> None:
     acc, gyr = without(true, slice(3, 6)), without(true, slice(0, 3))
     with pytest.raises(InputError, match="no moving triad in common"):
-        compared_in_motion((acc, ABOUT), gyr, NAMES)
+        compare_in_motion((acc, ABOUT), gyr, NAMES)
 
 
 def test_a_recording_of_a_moment_is_refused(true: Block) -> None:
     with pytest.raises(InputError, match="no common motion|at least 20 s"):
-        compared_in_motion((true[:10], ABOUT), true, NAMES)
+        compare_in_motion((true[:10], ABOUT), true, NAMES)
 
 
 def without(block: Block, channels: slice) -> Block:

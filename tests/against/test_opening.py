@@ -11,7 +11,7 @@ import pytest
 import strapdown
 from session_folders import write_session
 
-from fieldcal.against.opening import opened
+from fieldcal.against.opening import open_simulator_output
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
@@ -46,7 +46,7 @@ def test_the_same_schedule_on_another_clock(tmp_path: Path, folder: Path) -> Non
         replace(session.about, windows=tuple(map(tuple, ours + 700.0))),
     )
     path = write_csv(tmp_path / "simulated.csv", strapdown.outputs(NOISE))
-    block, about, _ = opened(path, real)
+    block, about, _ = open_simulator_output(path, real)
     assert block.t[0] == session.block.t[0] and len(ours) == len(strapdown.ANGLES)
     theirs = [w for w in about.windows if w]
     np.testing.assert_allclose(np.array(theirs), ours, atol=1e-9)
@@ -60,7 +60,7 @@ def test_other_times_of_the_same_positions_in_their_order(
     table[:, 0] *= 0.5  # held for half as long
     table[:, 4:] *= 2.0
     path = write_csv(tmp_path / "quick.csv", table)
-    _, about, _ = opened(path, (session.block, session.about))
+    _, about, _ = open_simulator_output(path, (session.block, session.about))
     windows = [w for w in about.windows if w]
     assert len(windows) == len(strapdown.ANGLES)
     assert all(5.0 < end - start < 9.0 for start, end in windows)
@@ -74,7 +74,7 @@ def test_other_positions_are_refused(tmp_path: Path, folder: Path) -> None:
     table = strapdown.outputs(NOISE)
     path = write_csv(tmp_path / "short.csv", table[: len(table) // 3])
     with pytest.raises(InputError, match="rests 3 times .* 9 positions"):
-        opened(path, (session.block, session.about))
+        open_simulator_output(path, (session.block, session.about))
 
 
 def test_the_command_writes_shows_and_ends_with_what_it_found(

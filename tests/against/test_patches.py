@@ -18,7 +18,7 @@ from fieldcal.against.result import (
     RealAndSimulated,
     SimulatorPrediction,
 )
-from fieldcal.against.sensor_model import SensorModel, patched
+from fieldcal.against.sensor_model import SensorModel, patch_model
 from fieldcal.commands import diagnose
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity
@@ -176,7 +176,7 @@ def test_an_instant_counts_from_the_start_of_the_recording_that_has_it(
     none = SimulatorPrediction(0.0, 0.0, 1.0)
     found = Match("left_out", 1.0, (Difference("bias_step", "added", 1.0, pairs),), (),
                   none, none, here, there, (), "")  # fmt: skip
-    model = patched(found)
+    model = patch_model(found)
     assert model.effects["bias_step"] == {"ax": 0.0, "at_s": 50.0}
     assert "bias step" not in written("toml", tmp_path, model)[1]
 

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from fieldcal.against.joint import (
-    EffectTold,
-    apart,
-    as_large,
-    both,
-    differs,
-    likeliest,
-    proportional,
-    weighed,
+    EffectInformation,
+    evidence_of_proportional,
+    evidence_of_same,
+    evidence_of_same_size,
+    likeliest_difference,
+    probability_of_difference,
+    probability_of_differing,
+    relation_probabilities,
 )
-from fieldcal.against.prediction import unsure_squares
-from fieldcal.against.side import noise_of
+from fieldcal.against.prediction import chi2_of_uncertain_prediction
+from fieldcal.against.side import sample_noise
 from fieldcal.core.samples import Array, Block
 from fieldcal.model import priors
 from fieldcal.session import description
@@ -30,9 +30,11 @@ def rows(value: Array, seed: int) -> tuple[Array, Array]:
     return design, design @ value + SIGMA * rng.standard_normal(30)
 
 
-def told(design: Array, y: Array) -> EffectTold:
+def told(design: Array, y: Array) -> EffectInformation:
     inner = design.T @ design / SIGMA**2
-    return EffectTold(inner, design.T @ y / SIGMA**2, float(np.diag(inner).max()))
+    return EffectInformation(
+        inner, design.T @ y / SIGMA**2, float(np.diag(inner).max())
+    )
 
 
 def density(design: Array, y: Array, v: float) -> float:
@@ -55,12 +57,16 @@ REAL, SIM = rows(np.array([0.02, -0.01]), 1), rows(np.array([0.015, 0.0]), 2)
 def test_the_same_effect_in_both_is_that_of_all_rows_together() -> None:
     design, y = np.vstack([REAL[0], SIM[0]]), np.concatenate([REAL[1], SIM[1]])
     expected = over_sizes([density(design, y, v) for v in priors.SIZES])
-    assert both(told(*REAL), told(*SIM)) == pytest.approx(expected, rel=1e-9)
+    assert evidence_of_same(told(*REAL), told(*SIM)) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 def test_what_is_random_shares_its_size_alone() -> None:
     expected = over_sizes([density(*REAL, v) + density(*SIM, v) for v in priors.SIZES])
-    assert as_large(told(*REAL), told(*SIM)) == pytest.approx(expected, rel=1e-9)
+    assert evidence_of_same_size(told(*REAL), told(*SIM)) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,9 +81,12 @@ def test_who_has_it(
     real: tuple[float, float], sim: tuple[float, float], expected: str
 ) -> None:
     one, two = told(*rows(np.array(real), 3)), told(*rows(np.array(sim), 4))
-    found = weighed(one, two, 0.01, None)
+    found = relation_probabilities(one, two, 0.01, None)
     assert sum(found.values()) == pytest.approx(1.0)
-    assert apart(found) > 0.99 and likeliest(found) == expected
+    assert (
+        probability_of_differing(found) > 0.99
+        and likeliest_difference(found) == expected
+    )
 
 
 def test_the_same_too_weak_is_one_number_along_what_the_other_shows() -> None:
@@ -90,7 +99,7 @@ def test_the_same_too_weak_is_one_number_along_what_the_other_shows() -> None:
         [density(column, SIM[1], v) for v in sizes]
     )
     for pair in ((told(*REAL), told(*SIM)), (told(*SIM), told(*REAL))):
-        assert proportional(*pair) == pytest.approx(expected, rel=1e-9)
+        assert evidence_of_proportional(*pair) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_simulator_that_has_some_of_it_is_told_from_one_without() -> None:
@@ -103,8 +112,14 @@ def test_a_simulator_that_has_some_of_it_is_told_from_one_without() -> None:
             design = rng.normal(0, 0.3, (30, 12))
             y = share * design @ value + SIGMA * rng.standard_normal(30)
             one, two = told(*rows(value, seed)), told(design, y)
-            for out, scaled in zip(found, (None, proportional(one, two)), strict=True):
-                out.append(likeliest(weighed(one, two, 0.01, None, scaled)))
+            for out, scaled in zip(
+                found, (None, evidence_of_proportional(one, two)), strict=True
+            ):
+                out.append(
+                    likeliest_difference(
+                        relation_probabilities(one, two, 0.01, None, scaled)
+                    )
+                )
         counts[share] = [out.count("other") for out in found]
     assert counts[0.0][1] <= 2, "chance"
     assert counts[0.3][1] >= 14 and counts[0.3][1] >= counts[0.3][0] + 8
@@ -119,8 +134,9 @@ def test_what_a_simulator_does_not_know_is_no_misfit() -> None:
     white = np.exp(rng.normal(size=30))
     expected = r @ np.linalg.solve(np.diag(white) + design @ covariance @ design.T, r)
     scaled = design.T / white
-    found = unsure_squares(float(r @ (r / white)), scaled @ r, scaled @ design,
-                           covariance)  # fmt: skip
+    found = chi2_of_uncertain_prediction(
+        float(r @ (r / white)), scaled @ r, scaled @ design, covariance
+    )
     assert found == pytest.approx(expected, rel=1e-9)
 
 
@@ -131,8 +147,9 @@ def test_the_noise_of_a_window_is_known_as_well_as_is_said() -> None:
     rng, seen = np.random.default_rng(9), []
     for _ in range(60):
         six = rng.standard_normal((201, 6))
-        level, unsure = noise_of(Block.of(np.arange(201) / 100, *np.split(six, 2, 1)),
-                                 about)  # fmt: skip
+        level, unsure = sample_noise(
+            Block.of(np.arange(201) / 100, *np.split(six, 2, 1)), about
+        )
         seen.append(np.log(level) / unsure)
     assert np.std(seen) == pytest.approx(1.0, abs=0.15)
 
@@ -142,20 +159,27 @@ def test_equal_pairs_do_not_differ(size: float) -> None:
     for seed in range(20):
         value = np.array([size, -size])
         one, two = (told(*rows(value, 100 * k + seed)) for k in (1, 2))
-        assert apart(weighed(one, two, 0.01, None)) < 0.5
+        assert (
+            probability_of_differing(relation_probabilities(one, two, 0.01, None)) < 0.5
+        )
 
 
 def test_what_a_session_cannot_have_is_the_others_alone() -> None:
-    found = weighed(told(*rows(np.array([0.05, 0.0]), 5)), None, 0.01, None)
+    found = relation_probabilities(
+        told(*rows(np.array([0.05, 0.0]), 5)), None, 0.01, None
+    )
     assert found["real"] > 0.99 and set(found) == {"neither", "real"}
 
 
 def test_a_difference_counts_by_its_sigmas_and_not_by_its_unit() -> None:
     cov, typical = np.diag([1e-4, 4e-4, 1e-4]), np.full(3, 0.3)
     chances = [
-        differs(k * np.sqrt(np.diag(cov)), cov, typical) for k in (0.0, 1.0, 4.0, 8.0)
+        probability_of_difference(k * np.sqrt(np.diag(cov)), cov, typical)
+        for k in (0.0, 1.0, 4.0, 8.0)
     ]
     assert chances == sorted(chances)
     assert chances[1] < 0.05 < 0.95 < chances[3]
-    mg = differs(8e3 * np.sqrt(np.diag(cov)), 1e6 * cov, 1e3 * typical)
+    mg = probability_of_difference(
+        8e3 * np.sqrt(np.diag(cov)), 1e6 * cov, 1e3 * typical
+    )
     assert mg == pytest.approx(chances[3])

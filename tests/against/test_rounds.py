@@ -20,8 +20,8 @@ from fieldcal.against.result import (
     RealAndSimulated,
     SimulatorPrediction,
 )
-from fieldcal.against.rounds import rounds
-from fieldcal.against.sensor_model import SensorModel, patched
+from fieldcal.against.rounds import run_and_patch
+from fieldcal.against.sensor_model import SensorModel, patch_model
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
@@ -75,7 +75,7 @@ def unread(path: Path) -> tuple[Match, list[str]]:
 def test_what_a_simulator_that_fails_says_is_told(code: str, told: str) -> None:
     command = f'{sys.executable} -c "{code}" {{patch}} {{out}}'
     with pytest.raises(InputError) as error:
-        rounds(command, unread, 50.0, "json", 1, lambda *_: None)
+        run_and_patch(command, unread, 50.0, "json", 1, lambda *_: None)
     assert told in str(error.value)
 
 
@@ -89,7 +89,7 @@ def test_what_a_simulator_that_fails_says_is_told(code: str, told: str) -> None:
 )
 def test_a_command_that_is_none_is_refused(command: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
-        rounds(command, unread, 50.0, "json", 1, lambda *_: None)
+        run_and_patch(command, unread, 50.0, "json", 1, lambda *_: None)
 
 
 def pair(real: float, sim: float, unit: str) -> RealAndSimulated:
@@ -112,9 +112,11 @@ def test_what_a_format_has_nothing_for_ends_the_rounds(
 ) -> None:
     even = {"z": pair(3e-4, 0.0, "1/(m/s^2)")}
     given = differing(Difference("quadratic", "left_out", 1.0, even))
-    monkeypatch.setattr(module, "_run", lambda *_: (given, []))
+    monkeypatch.setattr(module, "_run_and_compare", lambda *_: (given, []))
     for form, runs in (("px4", 1), ("json", 4)):
-        done = rounds("sim {patch} {out}", unread, 50.0, form, 3, lambda *_: None)
+        done = run_and_patch(
+            "sim {patch} {out}", unread, 50.0, form, 3, lambda *_: None
+        )
         assert len(done) == runs and done[-1].patch.changed == ("quadratic",)
 
 
@@ -127,10 +129,12 @@ def test_what_a_simulator_has_beyond_its_parameters_is_made_up_for() -> None:
             Difference("noise", "resized", 1.0, {"ax": pair(5.0, noise, "m/s^2")}),
         )
 
-    first = patched(compared(0.02, 3.0), SensorModel(rate_hz=100.0))
+    first = patch_model(compared(0.02, 3.0), SensorModel(rate_hz=100.0))
     assert first.calibration["acc_bias"][0] == pytest.approx(0.1)
     built_in = first.calibration["acc_bias"][0] + 0.02
-    then = patched(compared(built_in, float(np.hypot(first.noise["ax"], 3.0))), first)
+    then = patch_model(
+        compared(built_in, float(np.hypot(first.noise["ax"], 3.0))), first
+    )
     assert then.calibration["acc_bias"][0] + 0.02 == pytest.approx(0.1)
     assert np.hypot(then.noise["ax"], 3.0) == pytest.approx(5.0)
 
@@ -140,7 +144,7 @@ def test_effects_of_the_recording_come_in_and_those_of_the_simulator_go_out() ->
     even = {
         "z": RealAndSimulated(None, Quantity(3e-4, 1e-6, ""), Quantity(-3e-4, 1e-6, ""))
     }
-    found = patched(
+    found = patch_model(
         differing(
             Difference("bias_step", "left_out", 1.0, step),
             Difference("quadratic", "added", 1.0, even),

@@ -1,7 +1,7 @@
 """Rows of the table that the terminal shows."""
 
 from fieldcal.against.result import Difference, RealAndSimulated
-from fieldcal.against.wording import lines
+from fieldcal.against.wording import difference_rows
 from fieldcal.diagnosis.result import Quantity
 
 
@@ -19,7 +19,7 @@ def test_what_happened_often_is_one_row_with_its_largest() -> None:
     quantity = Quantity(-0.002, 0.0001, "1")
     added = RealAndSimulated(None, Quantity(0.002, 0.0001, "1"), quantity)
     tied = Difference("quadratic", "added", 0.9, {"x": added}, ("cross_coupling",))
-    first, second = lines([bump(12.0, 1.0), bump(50.0, 3.0), tied])
+    first, second = difference_rows([bump(12.0, 1.0), bump(50.0, 3.0), tied])
     assert first == (
         "bump (2 times)", "left out",
         "push: real 3.00 ± 0.10 m/s², simulator none", "+3.00 ± 0.10 m/s²",

@@ -17,7 +17,7 @@ from fieldcal.diagnosis.result import (
     Quality,
     Quantity,
 )
-from fieldcal.diagnosis.wording.lines import lines
+from fieldcal.diagnosis.wording.lines import effect_lines
 
 SCREENS = Path(__file__).parent / "screens"
 
@@ -75,7 +75,7 @@ AMBIGUOUS = Diagnosis(
     warnings=(),
     says="Something is left out, and it may be cross_coupling.",
     next=NEXT,
-    lines=lines(EFFECTS),
+    lines=effect_lines(EFFECTS),
 )  # fmt: skip
 CONSISTENT = Diagnosis(
     "consistent", 0.87, (), (), "m/s^2",
@@ -122,7 +122,7 @@ OF_NINE = (
     *EFFECTS,
     *(FoundEffect(i, {"x": Quantity(0.1, 0.01, "1")}) for i in OTHERS),
 )
-MANY = replace(AMBIGUOUS, effects=OF_NINE, lines=lines(OF_NINE))
+MANY = replace(AMBIGUOUS, effects=OF_NINE, lines=effect_lines(OF_NINE))
 
 
 @pytest.mark.parametrize("height", [20, 24, 50])

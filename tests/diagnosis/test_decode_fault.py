@@ -11,7 +11,7 @@ from ladder_sessions import tables
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Block
-from fieldcal.diagnosis.signal.chain import check
+from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.effects.decode_fault import undone
 from fieldcal.session import description
 
@@ -55,7 +55,7 @@ def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
             continue
         six = whole.copy()
         six[:, c] = broken * LSB[c]
-        told = check(with_six(block, six), about)
+        told = check_chain(with_six(block, six), about)
         found = [f.values for i, f in told.faults if i == "decode_fault"]
         assert found == [{"channel": name, "kind": kind}]
         np.testing.assert_allclose(told.block.six, whole, rtol=1e-6, atol=1e-9)
@@ -72,7 +72,7 @@ def test_single_wild_values_are_replaced_at_rest_and_on_the_way() -> None:
     lost = rng.choice(np.arange(5, len(six) - 5, 4), 60, replace=False)
     size = rng.uniform(0.4, 1, (60, 6)) * rng.choice([-1, 1], (60, 6))
     six[lost] = size * full
-    told = check(with_six(block, six), about)
+    told = check_chain(with_six(block, six), about)
     found = [f.values for i, f in told.faults if i == "decode_fault"]
     assert found == [{"channel": c, "kind": "wild"} for c in CHANNELS]
     kept = np.delete(np.arange(len(six)), lost)
@@ -97,7 +97,7 @@ def test_what_shakes_a_device_is_no_wild_value() -> None:
     six, shaken = block.six, ridden.held == 4
     six[shaken, :3] += rng.normal(0, 4.0, (shaken.sum(), 3))
     six[shaken, 3:] += rng.normal(0, 0.4, (shaken.sum(), 3))
-    told = check(with_six(block, six), about)
+    told = check_chain(with_six(block, six), about)
     assert "decode_fault" not in told.ids
 
 
@@ -114,10 +114,10 @@ def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
     block, rng = record(TACTICAL, ridden), np.random.default_rng(seed)
     six = block.six
     six[:, 1] -= 0.9 * rng.normal(size=len(six)) ** 2
-    assert "decode_fault" not in check(with_six(block, six), about).ids
+    assert "decode_fault" not in check_chain(with_six(block, six), about).ids
     lost = rng.choice(np.flatnonzero(ridden.held >= 0), 3, replace=False)
     six[lost, 1] += 60.0
-    told = check(with_six(block, six), about)
+    told = check_chain(with_six(block, six), about)
     assert "decode_fault" in told.ids
     assert np.abs(told.block.acc[lost, 1] - six[lost, 1]).min() > 40.0
 
@@ -130,7 +130,7 @@ def test_wild_values_that_come_often_are_found_among_each_other() -> None:
     lost = np.flatnonzero(ridden.held >= 0)[10:-10:30]
     six = block.six
     six[lost, 2] += 70.0
-    told = check(with_six(block, six), about)
+    told = check_chain(with_six(block, six), about)
     assert [f.values for i, f in told.faults if i == "decode_fault"] == [
         {"channel": "az", "kind": "wild"}
     ]
@@ -147,7 +147,7 @@ def test_a_knock_on_the_way_is_no_wild_value(push: float) -> None:
     at = np.flatnonzero(held if push < 5 else ~held)[40::400]
     six = block.six
     six[at, :3] += push
-    told = check(with_six(block, six), about)
+    told = check_chain(with_six(block, six), about)
     assert "decode_fault" not in told.ids
 
 
@@ -157,7 +157,7 @@ def test_steps_however_coarse_are_no_slip(steps: float) -> None:
     block = record(device, ride(device, seed=3))
     size = np.repeat([steps, steps / 100], 3)
     six = np.round(block.six / size) * size
-    told = check(with_six(block, six), description.parse(tables(TACTICAL)))
+    told = check_chain(with_six(block, six), description.parse(tables(TACTICAL)))
     assert "decode_fault" not in told.ids
 
 

@@ -10,7 +10,7 @@ from session_folders import SITE, places, recorded, write_session
 
 from fieldcal.calibration import limits
 from fieldcal.diagnosis.explain import explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile, Truth
 from fieldcal.sim_device.vocabulary import effect
@@ -25,7 +25,7 @@ def quadratic_left(folder: Path, truth: Truth) -> float:
     held = places(AROUND)
     written = write_session(folder, recorded(profile, held), held, site=SITE)
     session = Session.open(written)
-    found = explain(prepare(session.block, session.about))
+    found = explain(prepare_recording(session.block, session.about))
     (group,) = [g for g in found.dictionary.unfitted if g.part == "quadratic"]
     # an output of K2 g^2 for each m/s^2 of K2
     return float(np.max(group.typical))

@@ -29,7 +29,7 @@ from fieldcal.cli import main
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
@@ -199,7 +199,7 @@ def test_what_is_told_is_the_likeliest_of_all_that_was_looked_at(
     assert main(["import", str(path), "-o", str(tmp_path / "bench")]) == 0
     capsys.readouterr()
     session = Session.open(tmp_path / "bench")
-    found = explain(prepare(session.block, session.about))
+    found = explain(prepare_recording(session.block, session.about))
     likely = dict(found.posterior.weights)
     assert likely[found.inferred.best] == max(likely.values()) > 0.5
     assert {"warm_up", "random_walk"} <= set(named(diagnosed(tmp_path / "bench")))

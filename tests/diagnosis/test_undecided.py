@@ -11,8 +11,8 @@ from session_folders import write_session
 
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare
-from fieldcal.diagnosis.verdict import concluded
+from fieldcal.diagnosis.prepare import prepare_recording
+from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.effects import catalogue
 from fieldcal.session.folder import Session
 
@@ -25,7 +25,7 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> tuple[Block, Explanation]
     write_session(folder, record(TACTICAL, ride(TACTICAL, 1, 0.0), ()),
                   said.pop("position"), **said)  # fmt: skip
     session = Session.open(folder)
-    return session.block, explain(prepare(session.block, session.about))
+    return session.block, explain(prepare_recording(session.block, session.about))
 
 
 def weighed(explanation: Explanation, *shares: float) -> list[str]:
@@ -50,7 +50,7 @@ def test_what_cannot_be_named_is_not_called_nothing(
 ) -> None:
     block, explanation = clean
     names = weighed(explanation, 0.4, 0.35, 0.2, 0.05)
-    said = concluded(block, explanation)
+    said = make_diagnosis(block, explanation)
     assert said.verdict == "ambiguous" and not said.effects
     assert said.probability == pytest.approx(0.6)
     assert "probability 0.60" in said.says
@@ -64,7 +64,7 @@ def test_what_is_likelier_not_there_is_called_nothing(
 ) -> None:
     block, explanation = clean
     weighed(explanation, 0.51, 0.3, 0.19)
-    said = concluded(block, explanation)
+    said = make_diagnosis(block, explanation)
     assert said.verdict == "consistent"
     assert said.probability == pytest.approx(0.51)
     assert "Something" not in said.says and not said.next

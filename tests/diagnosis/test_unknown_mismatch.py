@@ -10,7 +10,7 @@ import pytest
 
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings import unknown_mismatch
-from fieldcal.diagnosis.findings.unknown_mismatch import unknown
+from fieldcal.diagnosis.findings.unknown_mismatch import unknown_mismatches
 from fieldcal.diagnosis.result import Mismatch
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.posterior.probabilities import Standing
@@ -27,15 +27,19 @@ def test_two_wrong_angles_each_have_their_own_positions_and_size(
         values = np.deg2rad([0.2, -0.3, 0.001])[columns]
         return values, np.full(len(columns), np.deg2rad(0.01)), np.eye(len(columns))
 
-    monkeypatch.setattr(unknown_mismatch, "estimates", estimates)
+    monkeypatch.setattr(unknown_mismatch, "column_estimates", estimates)
     wide = np.ones(1)
     shared = Group("wrong", "", np.array([0]), wide, params=(0,), together=(1, 4))
     single = Group("wrong", "", np.array([1, 2]), wide, params=(1, 0), position=6)
     cause = Cause("wrong", "", 0.01, (shared, single), "position")
     standing = Standing("wrong", ((cause, shared), (cause, single)), 1.0, ())
     explanation = cast(Explanation, SimpleNamespace(best=SimpleNamespace(set=None)))
-    first, second = unknown(explanation, standing, [off_in((1, 4)), off_in((6,))])
-    assert [j for j, _ in first.turned] == ["α"]
-    assert [j for j, _ in second.turned] == ["β"], "0.001 ± 0.01° does not stand out"
-    assert first.turned[0][1].value == pytest.approx(0.2)
-    assert second.turned[0][1].value == pytest.approx(-0.3)
+    first, second = unknown_mismatches(
+        explanation, standing, [off_in((1, 4)), off_in((6,))]
+    )
+    assert [j for j, _ in first.angle_errors] == ["α"]
+    assert [j for j, _ in second.angle_errors] == ["β"], (
+        "0.001 ± 0.01° does not stand out"
+    )
+    assert first.angle_errors[0][1].value == pytest.approx(0.2)
+    assert second.angle_errors[0][1].value == pytest.approx(-0.3)

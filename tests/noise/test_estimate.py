@@ -8,9 +8,9 @@ import pytest
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.noise import estimate, reduced
+from fieldcal.noise import estimate_noise, reduce_recording
 from fieldcal.noise.levels import CosineLevels
-from fieldcal.noise.likelihood import Powers, fit
+from fieldcal.noise.likelihood import Powers, fit_processes
 from fieldcal.noise.spectrum import CosineSpectrum
 
 DT = 0.1
@@ -25,9 +25,9 @@ def fits(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
     errors, stated = [], []
     for c in range(values.shape[1]):
         one = np.ones(len(spectrum.last.bin))
-        power, count = spectrum.of(c, spectrum.last.values[:, c], one)
+        power, count = spectrum.channel_powers(c, spectrum.last.values[:, c], one)
         powers = Powers(power, count, np.zeros(len(power), dtype=bool))
-        if found := fit(spectrum, powers, tuple(sizes), start):
+        if found := fit_processes(spectrum, powers, tuple(sizes), start):
             errors.append((found.x - start) / 2)
             stated.append(np.sqrt(np.diag(found.covariance)) / 2)
     assert len(errors) > 0.95 * values.shape[1]
@@ -74,7 +74,7 @@ def test_processes_that_are_there_are_named_and_no_others() -> None:
                 noise(rng, 20_000, DT, 2, N=1.0, B=1.0),
             ]
         )
-        found = estimate([reduced([recording(values, DT)])]).channels
+        found = estimate_noise([reduce_recording([recording(values, DT)])]).channels
         seen.append(["".join(sorted(c.processes)) for c in found.values()])
     for pair, expected in ((0, "N"), (2, "KN"), (4, "BN")):
         named = [row[i] == expected for row in seen for i in (pair, pair + 1)]
@@ -83,7 +83,7 @@ def test_processes_that_are_there_are_named_and_no_others() -> None:
 
 def test_a_slow_process_has_its_correlation_time() -> None:
     values = noise(np.random.default_rng(7), 60_000, DT, 6, N=1.0, s=1.0, T=20.0)
-    found = estimate([reduced([recording(values, DT)])]).channels
+    found = estimate_noise([reduce_recording([recording(values, DT)])]).channels
     times = [c.processes["G1"] for c in found.values() if "G1" in c.processes]
     assert len(times) >= 4
     for one in times:
@@ -93,8 +93,10 @@ def test_a_slow_process_has_its_correlation_time() -> None:
 
 def test_everything_scales_with_the_unit() -> None:
     values = noise(np.random.default_rng(8), 4000, DT, 6, N=1.0, K=0.2)
-    one = estimate([reduced([recording(values, DT)])]).channels["gz"]
-    other = estimate([reduced([recording(1e-6 * values + 3.0, DT)])]).channels["gz"]
+    one = estimate_noise([reduce_recording([recording(values, DT)])]).channels["gz"]
+    other = estimate_noise(
+        [reduce_recording([recording(1e-6 * values + 3.0, DT)])]
+    ).channels["gz"]
     assert one.processes.keys() == other.processes.keys()
     for name, size in one.processes.items():
         assert 1e-6 * size.value == pytest.approx(other.processes[name].value, rel=1e-4)
@@ -103,10 +105,10 @@ def test_everything_scales_with_the_unit() -> None:
 def test_bumps_are_bridged_and_change_nothing() -> None:
     rng = np.random.default_rng(9)
     values = noise(rng, 20_000, 0.01, 6, N=1.0, K=0.05)
-    calm = estimate([reduced([recording(values, 0.01)])])
+    calm = estimate_noise([reduce_recording([recording(values, 0.01)])])
     for at in range(2000, 20_000, 3000):
         values[at : at + 60] += 80 * rng.standard_normal((60, 6))
-    bumped = estimate([reduced([recording(values, 0.01)])])
+    bumped = estimate_noise([reduce_recording([recording(values, 0.01)])])
     assert 0.005 < bumped.bridged < 0.1 and calm.bridged < 0.005
     for name, channel in bumped.channels.items():
         before = calm.channels[name].processes["N"]
@@ -119,9 +121,9 @@ def test_what_goes_on_all_the_time_is_no_disturbance() -> None:
     values = noise(np.random.default_rng(25), 6000, 0.01, 6, N=1.0)
     for at in range(20, 6000, 150):
         values[at : at + 10] *= 12
-    found = estimate([reduced([recording(values, 0.01)])])
+    found = estimate_noise([reduce_recording([recording(values, 0.01)])])
     assert found.seconds == pytest.approx(60, abs=0.1) and not found.bridged
-    found = estimate([reduced([recording(values[:3050], 0.01)])])
+    found = estimate_noise([reduce_recording([recording(values[:3050], 0.01)])])
     assert found.longest > 30
 
 
@@ -131,7 +133,7 @@ def test_what_follows_the_temperature_is_taken_out() -> None:
     warmth = 25 + 4 * np.sin(t / 300) + 0.02 * rng.standard_normal(len(t))
     values = noise(rng, len(t), DT, 6, N=1.0)
     values[:, 3:] += 0.2 * (warmth - 25)[:, None]
-    found = estimate([reduced([recording(values, DT, warmth)])]).channels
+    found = estimate_noise([reduce_recording([recording(values, DT, warmth)])]).channels
     for name, channel in found.items():
         if name[0] == "g":
             assert channel.temperature is not None
@@ -149,7 +151,7 @@ def test_a_noisy_thermometer_does_not_make_a_coefficient_smaller() -> None:
     course = 4 * np.sin(t / 300)
     values = noise(rng, len(t), DT, 6, N=1.0) + 0.2 * course[:, None]
     warmth = 25 + course + 6 * rng.standard_normal(len(t))
-    found = estimate([reduced([recording(values, DT, warmth)])]).channels
+    found = estimate_noise([reduce_recording([recording(values, DT, warmth)])]).channels
     seen = [c.temperature for c in found.values() if c.temperature is not None]
     assert len(seen) == 6
     assert np.mean([value for value, _ in seen]) == pytest.approx(0.2, rel=0.05)
@@ -160,7 +162,9 @@ def test_what_scatters_more_than_its_processes_is_known_less_well() -> None:
     rng = np.random.default_rng(27)
     swell = 1 + 0.9 * np.sin(2 * np.pi * np.arange(16_000) * DT / 200)
     values = swell[:, None] * noise(rng, 16_000, DT, 6, N=1.0)
-    found = estimate([reduced([recording(values, DT)])]).channels.values()
+    found = estimate_noise(
+        [reduce_recording([recording(values, DT)])]
+    ).channels.values()
     # 1.86 is the mean of the fourth power over the squared one of the second
     assert 1.3 < np.mean([c.dispersion for c in found]) < 2.4
 
@@ -168,14 +172,18 @@ def test_what_scatters_more_than_its_processes_is_known_less_well() -> None:
 def test_noise_that_a_device_makes_quickly_is_white_to_a_second() -> None:
     """N^2 + 2 s^2 T of a Gauss-Markov process of a twentieth of a second."""
     values = noise(np.random.default_rng(28), 60_000, 0.01, 6, N=0.3, s=3.0, T=0.05)
-    for channel in estimate([reduced([recording(values, 0.01)])]).channels.values():
+    for channel in estimate_noise(
+        [reduce_recording([recording(values, 0.01)])]
+    ).channels.values():
         whole = np.sqrt(0.3**2 + 2 * 3.0**2 * 0.05)
         assert channel.processes["N"].value == pytest.approx(whole, rel=0.06)
 
 
 def test_a_ramp_is_no_walk() -> None:
     values = noise(np.random.default_rng(11), 30_000, DT, 6, N=1.0, R=1e-3)
-    for channel in estimate([reduced([recording(values, DT)])]).channels.values():
+    for channel in estimate_noise(
+        [reduce_recording([recording(values, DT)])]
+    ).channels.values():
         ramp = channel.processes["R"]
         assert abs(ramp.value - 1e-3) < 4 * ramp.sigma
         assert "K" not in channel.processes
@@ -188,15 +196,22 @@ def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
     filtered = np.apply_along_axis(
         lambda x: np.convolve(x, np.ones(8) / 8, "same"), 0, white
     )
-    for channel in estimate([reduced([recording(filtered, dt)])]).channels.values():
+    for channel in estimate_noise(
+        [reduce_recording([recording(filtered, dt)])]
+    ).channels.values():
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.08)
         assert channel.filtered_hz < 60
 
 
 def test_several_sessions_tell_more_than_one() -> None:
     rng = np.random.default_rng(13)
-    parts = [reduced([recording(noise(rng, 6000, DT, 6, N=1.0), DT)]) for _ in range(4)]
-    one, all_ = (estimate(p).channels["ax"].processes["N"] for p in (parts[:1], parts))
+    parts = [
+        reduce_recording([recording(noise(rng, 6000, DT, 6, N=1.0), DT)])
+        for _ in range(4)
+    ]
+    one, all_ = (
+        estimate_noise(p).channels["ax"].processes["N"] for p in (parts[:1], parts)
+    )
     assert all_.sigma == pytest.approx(one.sigma / 2, rel=0.1)
 
 
@@ -205,11 +220,11 @@ def test_a_gap_begins_another_stretch_and_a_turn_too() -> None:
     values[6000:, 1] += 500.0  # turned
     block = recording(values, DT)
     block.t[3000:] += 60.0
-    found = reduced([block[:100], block[100:5000], block[5000:]])
+    found = reduce_recording([block[:100], block[100:5000], block[5000:]])
     assert [s.samples for s in found.stretches] == pytest.approx(
         [3000, 3000, 3000], abs=20
     )
-    for channel in estimate([found]).channels.values():
+    for channel in estimate_noise([found]).channels.values():
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.08)
 
 
@@ -218,18 +233,18 @@ def test_what_is_missing_is_not_a_channel() -> None:
     values[:, 2] = 9.81  # stuck
     values[::7, 0] = np.nan
     values[:, 4] = np.nan
-    found = estimate([reduced([recording(values, DT)])])
+    found = estimate_noise([reduce_recording([recording(values, DT)])])
     assert list(found.channels) == ["ax", "ay", "gx", "gz"]
 
 
 def test_too_short_a_recording_is_refused_with_what_to_do() -> None:
     values = noise(np.random.default_rng(16), 200, DT, 6, N=1.0)
     with pytest.raises(InputError, match=r"lasts 20 s: record 30 s at least"):
-        estimate([reduced([recording(values, DT)])])
+        estimate_noise([reduce_recording([recording(values, DT)])])
     with pytest.raises(InputError, match="lasts 0 s"):
-        estimate([reduced([])])
+        estimate_noise([reduce_recording([])])
     with pytest.raises(InputError, match="none of ax"):
-        estimate([reduced([recording(np.zeros((900, 6)), DT)])])
+        estimate_noise([reduce_recording([recording(np.zeros((900, 6)), DT)])])
 
 
 def test_windows_of_half_a_minute_tell_of_means_over_half_a_minute() -> None:
@@ -240,7 +255,7 @@ def test_windows_of_half_a_minute_tell_of_means_over_half_a_minute() -> None:
         block = recording(noise(rng, 1500, 0.02, 6, N=1.0), 0.02)
         block.t[:] += 60.0 * i
         parts.append(block)
-    found = estimate([reduced(parts)])
+    found = estimate_noise([reduce_recording(parts)])
     assert found.stretches == 8
     for channel in found.channels.values():
         value, spread = channel.averaging.at(30.0)

@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from fieldcal.noise.levels import FOLDS, KEPT, SEGMENT, CosineLevels, bins, neighbours
-from fieldcal.noise.measured import measured
+from fieldcal.noise.levels import (
+    FOLDS,
+    KEPT,
+    SEGMENT,
+    CosineLevels,
+    neighbour_differences,
+    octave_bins,
+)
+from fieldcal.noise.measured import measured_allan_deviation
 
 
 def test_it_does_not_matter_how_samples_come() -> None:
@@ -62,7 +69,7 @@ def test_memory_does_not_grow_with_length() -> None:
 
 @given(st.integers(1, 200), st.integers(2, 3000))
 def test_bins_cover_all_coefficients_once(first: int, more: int) -> None:
-    edges = bins(first, first + more)
+    edges = octave_bins(first, first + more)
     assert edges[0] == first and edges[-1] == first + more
     assert (np.diff(edges) > 0).all()
 
@@ -72,11 +79,11 @@ def test_measured_deviations_are_those_of_allantools() -> None:
     values = np.random.default_rng(3).standard_normal((60_000, 1)).cumsum(axis=0)
     levels = CosineLevels(0.01, 2, 1)
     levels.add(np.hstack([values, np.zeros_like(values)]))
-    found = measured([levels.reduced()], 0)
+    found = measured_allan_deviation([levels.reduced()], 0)
     m = np.round(found.tau / 0.01).astype(int)
     expected = [
         # overlapping by means, not by samples
-        np.sqrt(np.mean(neighbours(_means(values, 8), int(k) // 8) ** 2) / 2)
+        np.sqrt(np.mean(neighbour_differences(_means(values, 8), int(k) // 8) ** 2) / 2)
         for k in m
     ]
     assert found.deviation == pytest.approx(np.array(expected))

@@ -7,9 +7,15 @@ import pytest
 
 from benchmarks.noise.processes import covariance, noise, recording
 from fieldcal.core.samples import Array
-from fieldcal.noise import estimate, reduced
-from fieldcal.noise.measured import measured
-from fieldcal.noise.processes import FAR, STEPS, allan_variance, covariances, freedom
+from fieldcal.noise import estimate_noise, reduce_recording
+from fieldcal.noise.measured import measured_allan_deviation
+from fieldcal.noise.processes import (
+    FAR,
+    STEPS,
+    allan_variance,
+    degrees_of_freedom,
+    difference_covariances,
+)
 
 ONE = np.zeros(1)
 
@@ -42,7 +48,7 @@ def test_estimates_scatter_as_they_are_said_to(term: str, time: float) -> None:
     """The exact variance of the estimate from a dense covariance."""
     n, m = 240, 16
     x = np.array([0.0, np.log(time)]) if term == "G" else ONE
-    r = covariances((term,), x, float(m), 0.1, FAR * STEPS)
+    r = difference_covariances((term,), x, float(m), 0.1, FAR * STEPS)
     bends = np.array(
         [
             np.concatenate(
@@ -53,21 +59,21 @@ def test_estimates_scatter_as_they_are_said_to(term: str, time: float) -> None:
     )
     whole = bends @ covariance(n, 1.0, term, time) @ bends.T
     exact = np.trace(whole) ** 2 / np.sum(whole**2)
-    assert freedom(r, float(m), float(n)) == pytest.approx(exact, rel=0.1)
+    assert degrees_of_freedom(r, float(m), float(n)) == pytest.approx(exact, rel=0.1)
 
 
 def halves(values: Array, dt: float) -> tuple[list[bool], list[float]]:
     """Whether the first half's bands hold the second half, and the log scores."""
     middle = len(values) // 2
-    model = estimate([reduced([recording(values[:middle], dt)])])
-    second = reduced([recording(values[middle:], dt)])
+    model = estimate_noise([reduce_recording([recording(values[:middle], dt)])])
+    second = reduce_recording([recording(values[middle:], dt)])
     held: list[bool] = []
     scores: list[float] = []
     for i, name in enumerate(("ax", "ay", "az", "gx", "gy", "gz")):
-        seen = measured(second.stretches, i)
+        seen = measured_allan_deviation(second.stretches, i)
         length = middle * dt
         asked = (seen.tau >= 10) & (seen.tau <= min(1000, length / 4))
-        said = model.channels[name].predicted(seen.tau[asked], length)
+        said = model.channels[name].predict_allan(seen.tau[asked], length)
         deviation = seen.deviation[asked]
         held += ((said.low < deviation) & (deviation < said.high)).tolist()
         scores += said.log_score(deviation).tolist()
@@ -95,7 +101,9 @@ def test_sizes_are_drawn_from_their_likelihood() -> None:
     """The log of a variance from n samples of white noise scatters by sqrt(2/n)."""
     values = noise(np.random.default_rng(19), 400, 0.1, 6, N=1.0)
     spread = []
-    for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+    for channel in estimate_noise(
+        [reduce_recording([recording(values, 0.1)])]
+    ).channels.values():
         alone = [d.x[0] for d in channel.drawn if d.terms == ("N",)]
         if channel.dispersion == 1 and len(alone) > 50:
             spread.append(np.std(alone) / np.sqrt(2 / 400))
@@ -105,8 +113,8 @@ def test_sizes_are_drawn_from_their_likelihood() -> None:
 
 def test_the_score_is_a_density() -> None:
     values = noise(np.random.default_rng(18), 6000, 0.1, 6, N=1.0)
-    model = estimate([reduced([recording(values, 0.1)])]).channels["ax"]
-    said = model.predicted(np.array([20.0]), 600.0)
+    model = estimate_noise([reduce_recording([recording(values, 0.1)])]).channels["ax"]
+    said = model.predict_allan(np.array([20.0]), 600.0)
     grid = np.linspace(np.log(said.median[0]) - 3, np.log(said.median[0]) + 3, 400)
     density = [np.exp(said.log_score(np.exp(np.array([g])))[0]) for g in grid]
     assert np.trapezoid(density, grid) == pytest.approx(1.0, abs=0.01)

@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 from benchmarks.noise import ours, spectra
 from benchmarks.noise.processes import bound, covariance
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import Powers, fit
-from fieldcal.noise.reference import most_probable
+from fieldcal.noise.likelihood import Powers, fit_processes
+from fieldcal.noise.reference import most_probable_sizes
 
 DT = 0.1
 
@@ -80,13 +80,13 @@ def test_a_walk_known_to_a_third_has_no_bias_and_reaches_the_bound() -> None:
 def test_a_correlation_time_stays_where_it_was() -> None:
     values = drawn(4, 600, 1, {"N": 1.0, "K": 0.5})
     spectrum = spectra(values)
-    power, count = spectrum.of(
+    power, count = spectrum.channel_powers(
         0, spectrum.last.values[:, 0], np.ones(len(spectrum.last.bin))
     )
     powers = Powers(power, count, np.zeros(len(power), dtype=bool))
     start = np.array([0.0, 0.0, np.log(10.0)])
-    likely = fit(spectrum, powers, ("N", "G"), start)
+    likely = fit_processes(spectrum, powers, ("N", "G"), start)
     assert likely is not None
-    found = most_probable(spectrum, powers, likely)
+    found = most_probable_sizes(spectrum, powers, likely)
     assert found.x[2] == likely.x[2] and found.x[1] != likely.x[1]
     assert found.log_likelihood == likely.log_likelihood

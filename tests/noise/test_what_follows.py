@@ -9,25 +9,35 @@ import pytest
 
 from benchmarks.noise.processes import noise, recording
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.noise import estimate, reduced
-from fieldcal.noise.alignment import alignment
-from fieldcal.noise.averaging import averaging
-from fieldcal.noise.filters import TwoNumbers, kalibr, of_program, ros, worst
-from fieldcal.noise.prediction import Draw
-from fieldcal.noise.recalibration import HistoryStep, recalibration, walk_of
+from fieldcal.noise import estimate_noise, reduce_recording
+from fieldcal.noise.alignment import gyrocompass_heading
+from fieldcal.noise.averaging import averaging_error
+from fieldcal.noise.filters import (
+    FilterNoisePair,
+    kalibr_parameters,
+    noisiest_axes,
+    program_parameters,
+    ros_covariances,
+)
+from fieldcal.noise.prediction import SizeDraw
+from fieldcal.noise.recalibration import (
+    HistoryStep,
+    recalibration_time,
+    walk_from_history,
+)
 
 DAY = 86400.0
 
 
-def drawn(**sizes: float) -> tuple[Draw, ...]:
+def drawn(**sizes: float) -> tuple[SizeDraw, ...]:
     """One draw: processes exactly so large."""
     terms = tuple(sizes)
-    return (Draw(terms, 2 * np.log(list(sizes.values()))),)
+    return (SizeDraw(terms, 2 * np.log(list(sizes.values()))),)
 
 
 def test_averaging_is_best_where_white_noise_and_walk_meet() -> None:
     """N^2/T = K^2 T/3 at T = sqrt(3) N/K; twice the white part there."""
-    found = averaging(drawn(N=1.0, K=0.05), 0.0, 0.01, 4000.0)
+    found = averaging_error(drawn(N=1.0, K=0.05), 0.0, 0.01, 4000.0)
     meet = math.sqrt(3) / 0.05
     assert found.best[0] == pytest.approx(meet, rel=0.2)
     assert found.white_until[0] == pytest.approx(meet, rel=0.4)
@@ -37,14 +47,14 @@ def test_averaging_is_best_where_white_noise_and_walk_meet() -> None:
 
 
 def test_white_noise_is_worth_averaging_for_longer_than_is_known() -> None:
-    found = averaging(drawn(N=1.0), 0.0, 0.01, 400.0)
+    found = averaging_error(drawn(N=1.0), 0.0, 0.01, 400.0)
     assert found.best[0] == math.inf and found.white_until[0] == math.inf
     assert found.seconds[-1] == pytest.approx(400.0, rel=0.02)
 
 
 def test_a_ramp_ends_averaging() -> None:
     """N^2/T + R^2 T^2/2 is least at T^3 = N^2 / R^2."""
-    found = averaging(drawn(N=1.0), 1e-3, 0.01, 4000.0)
+    found = averaging_error(drawn(N=1.0), 1e-3, 0.01, 4000.0)
     assert found.best[0] == pytest.approx(100.0, rel=0.2)
 
 
@@ -56,7 +66,9 @@ def test_the_stated_walk_is_not_exceeded_in_95_of_100() -> None:
     above = []
     for _ in range(6):
         values = noise(rng, 3000, 0.1, 6, N=1.0, K=0.004)
-        for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+        for channel in estimate_noise(
+            [reduce_recording([recording(values, 0.1)])]
+        ).channels.values():
             pair = channel.pair
             bound = pair.walk + 1.645 * np.nan_to_num(pair.walk_sigma)
             above.append(bound > 0.004)
@@ -67,7 +79,9 @@ def test_the_stated_walk_is_not_exceeded_in_95_of_100() -> None:
 def test_two_numbers_are_as_much_larger_as_what_they_leave_out() -> None:
     """A bump in the Allan deviation that no sum of two slopes has."""
     values = noise(np.random.default_rng(31), 60_000, 0.1, 6, N=1.0, s=0.6, T=20.0)
-    for channel in estimate([reduced([recording(values, 0.1)])]).channels.values():
+    for channel in estimate_noise(
+        [reduce_recording([recording(values, 0.1)])]
+    ).channels.values():
         pair, tau = channel.pair, np.geomspace(1, 1500, 30)
         covered = pair.white**2 / tau + pair.walk**2 * tau / 3
         u = tau / 20.0
@@ -78,18 +92,18 @@ def test_two_numbers_are_as_much_larger_as_what_they_leave_out() -> None:
 
 def test_the_noisiest_axis_of_a_triad_counts() -> None:
     pairs = {
-        "gx": TwoNumbers(2.0, 0.2, 1.0, 0.1, 1.1),
-        "gy": TwoNumbers(1.0, 0.1, 3.0, math.nan, 1.3),
+        "gx": FilterNoisePair(2.0, 0.2, 1.0, 0.1, 1.1),
+        "gy": FilterNoisePair(1.0, 0.1, 3.0, math.nan, 1.3),
     }
-    found = worst(pairs, "g")
+    found = noisiest_axes(pairs, "g")
     assert found and (found.white, found.walk, found.left_out) == (2.0, 3.0, 1.3)
-    assert worst(pairs, "a") is None
-    assert set(kalibr(pairs)) == {"gyroscope_noise_density",
-                                         "gyroscope_random_walk"}  # fmt: skip
+    assert noisiest_axes(pairs, "a") is None
+    assert set(kalibr_parameters(pairs)) == {"gyroscope_noise_density",
+                                             "gyroscope_random_walk"}  # fmt: skip
     for program, step in (("ardupilot", 0.012), ("px4", 0.01)):
-        values = [v for v, _, _ in of_program(program, pairs).values()]
+        values = [v for v, _, _ in program_parameters(program, pairs).values()]
         assert values == pytest.approx([2 / math.sqrt(step), 3 / math.sqrt(step)])
-    told = ros({"gy": (1e-3, 1e-5)}, 200.0)
+    told = ros_covariances({"gy": (1e-3, 1e-5)}, 200.0)
     assert told["angular_velocity_covariance[4]"][:2] == pytest.approx((2e-4, 4e-6))
 
 
@@ -97,7 +111,7 @@ def test_the_noisiest_axis_of_a_triad_counts() -> None:
 def test_a_walk_leaves_its_limit_when_it_is_said_to() -> None:
     """The chance at the date, counted among simulated walks."""
     k, limit = 1e-6, 5e-4
-    found = recalibration(drawn(N=1e-9, K=k), 0.0, limit, 0.0)
+    found = recalibration_time(drawn(N=1e-9, K=k), 0.0, limit, 0.0)
     rng = np.random.default_rng(32)
     for chance, seconds in zip((0.05, 0.32), found.seconds, strict=True):
         walks = k * math.sqrt(seconds) * rng.standard_normal(20_000)
@@ -108,45 +122,47 @@ def test_a_walk_leaves_its_limit_when_it_is_said_to() -> None:
 def test_what_returns_leaves_its_limit_by_as_much_as_it_has() -> None:
     """A Gauss-Markov process changes by a variance of 2 s^2 (1 - exp(-t/T))."""
     s, time, limit = 1e-4, 5e4, 2e-4
-    known = (Draw(("N", "G"), np.log([1e-18, s**2, time])),)
-    found = recalibration(known, 0.0, limit, 0.0).seconds[0]
+    known = (SizeDraw(("N", "G"), np.log([1e-18, s**2, time])),)
+    found = recalibration_time(known, 0.0, limit, 0.0).seconds[0]
     assert found == pytest.approx(
         -time * math.log(1 - (limit / 1.96 / s) ** 2 / 2), rel=0.15
     )
-    assert recalibration(known, 0.0, 1.96 * 1.5 * s, 0.0).seconds[0] == math.inf
+    assert recalibration_time(known, 0.0, 1.96 * 1.5 * s, 0.0).seconds[0] == math.inf
 
 
 def test_flicker_up_to_a_time_changes_no_more_behind_it() -> None:
     """Each e-fold of its correlation times, from 1 s on, has B^2 / pi."""
     time = 1e4
-    known = (Draw(("N", "BT"), np.log([1e-18, 1.0, time])),)
+    known = (SizeDraw(("N", "BT"), np.log([1e-18, 1.0, time])),)
     most = math.sqrt(2 / math.pi * math.log(time))
     inside, beyond = (
-        recalibration(known, 0.0, 1.96 * part * most, 0.0).seconds[0]
+        recalibration_time(known, 0.0, 1.96 * part * most, 0.0).seconds[0]
         for part in (0.95, 1.05)
     )
     assert 0.2 * time < inside < 2 * time and beyond == math.inf
 
 
 def test_a_ramp_leaves_its_limit_on_a_day() -> None:
-    found = recalibration(drawn(N=1e-9), 1e-9, 1e-4, 1e-14)
+    found = recalibration_time(drawn(N=1e-9), 1e-9, 1e-4, 1e-14)
     assert found.seconds == pytest.approx((1e5, 1e5), rel=0.2)
-    assert recalibration(drawn(N=1e-9), 0.0, 1.0, 1e-14).seconds == (math.inf,) * 2
+    assert recalibration_time(drawn(N=1e-9), 0.0, 1.0, 1e-14).seconds == (math.inf,) * 2
 
 
 def test_a_ramp_that_goes_on_is_told_from_a_walk_that_was_not_seen() -> None:
-    found = recalibration(drawn(N=1e-9), 1e-9, 1e-4, 1e-14, unseen=1e-9)
+    found = recalibration_time(drawn(N=1e-9), 1e-9, 1e-4, 1e-14, unseen=1e-9)
     assert found.by_ramp and found.seconds[0] == pytest.approx(1e5, rel=0.15)
-    slow = recalibration(drawn(N=1e-9), 1e-13, 5e-4, 0.0, unseen=1e-6)
-    assert slow.unseen and not slow.by_ramp
-    never = recalibration(drawn(N=1e-9), 1e-16, 1e-4, 1e-14)
+    slow = recalibration_time(drawn(N=1e-9), 1e-13, 5e-4, 0.0, unseen=1e-6)
+    assert slow.by_unseen_walk and not slow.by_ramp
+    never = recalibration_time(drawn(N=1e-9), 1e-16, 1e-4, 1e-14)
     assert never.seconds == (math.inf,) * 2 and not never.by_ramp
 
 
 def test_a_walk_that_would_not_be_seen_counts_where_none_is() -> None:
-    seen = recalibration(drawn(N=1e-9, K=1e-6), 0.0, 5e-4, 0.0, unseen=1e-5)
-    none = recalibration(drawn(N=1e-9), 0.0, 5e-4, 0.0, unseen=1e-6)
-    assert none.seconds == seen.seconds and none.unseen and not seen.unseen
+    seen = recalibration_time(drawn(N=1e-9, K=1e-6), 0.0, 5e-4, 0.0, unseen=1e-5)
+    none = recalibration_time(drawn(N=1e-9), 0.0, 5e-4, 0.0, unseen=1e-6)
+    assert (
+        none.seconds == seen.seconds and none.by_unseen_walk and not seen.by_unseen_walk
+    )
     # 1.96 K sqrt(t) = limit
     assert none.seconds[0] == pytest.approx((5e-4 / 1.96e-6) ** 2, rel=0.15)
 
@@ -158,16 +174,16 @@ def test_what_history_shows_counts_more_than_an_hour() -> None:
         HistoryStep(30 * DAY, k * math.sqrt(30 * DAY) * float(z), 1e-12)
         for z in rng.standard_normal(400)
     ]
-    assert math.sqrt(walk_of(steps)) == pytest.approx(k, rel=0.1)
-    found = recalibration(drawn(N=1e-6, K=1e-5), 1e-6, 1e-3, 0.0, steps)
+    assert math.sqrt(walk_from_history(steps)) == pytest.approx(k, rel=0.1)
+    found = recalibration_time(drawn(N=1e-6, K=1e-5), 1e-6, 1e-3, 0.0, steps)
     assert found.from_history
     # 1.96 k sqrt(t) = limit
     assert found.seconds[0] == pytest.approx((1e-3 / 1.96 / k) ** 2, rel=0.25)
 
 
 def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
-    good, bad = (averaging(drawn(N=n), 0.0, 0.01, 1000.0) for n in (1e-7, 1e-6))
-    found = alignment([good, bad], math.radians(60))
+    good, bad = (averaging_error(drawn(N=n), 0.0, 0.01, 1000.0) for n in (1e-7, 1e-6))
+    found = gyrocompass_heading([good, bad], math.radians(60))
     assert found is not None
     seconds, sigma, spread = found.best
     expected = 1e-6 / math.sqrt(seconds) / (EARTH_RATE * 0.5)
@@ -177,6 +193,6 @@ def test_north_is_as_sure_as_the_worst_gyroscope_is_still() -> None:
 
 
 def test_at_a_pole_no_gyroscope_finds_north() -> None:
-    good = averaging(drawn(N=1e-7), 0.0, 0.01, 1000.0)
-    assert alignment([good], math.radians(89.9)) is not None
-    assert alignment([good], math.pi / 2) is None
+    good = averaging_error(drawn(N=1e-7), 0.0, 0.01, 1000.0)
+    assert gyrocompass_heading([good], math.radians(89.9)) is not None
+    assert gyrocompass_heading([good], math.pi / 2) is None

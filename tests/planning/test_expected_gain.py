@@ -12,7 +12,7 @@ import pytest
 
 from fieldcal.core.positions import Position
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.search.inference import Inference
 from fieldcal.planning.expected_gain import ExpectedGain
 from fieldcal.session import description
@@ -56,7 +56,7 @@ def explained(
             "position": tables,
         }
     )
-    return explain(prepare(block, about))
+    return explain(prepare_recording(block, about))
 
 
 def gain_of(found: Explanation) -> ExpectedGain:

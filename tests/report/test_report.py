@@ -29,7 +29,7 @@ from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
 from fieldcal.report.residuals import reached, residuals
 from fieldcal.report.stillness import motion_by_second
 from fieldcal.sim_device.profile import Profile
-from fieldcal.windows.cells import Cells
+from fieldcal.windows.cells import CellAccumulator
 
 HOSTILE = "</script><script>hacked=1</script><img src=x onerror=hacked=1>\"'&{{7*7}}"
 
@@ -304,7 +304,7 @@ def test_restlessness_is_told_by_the_quietest_tenth() -> None:
     t = np.arange(6000) / 100
     loud = np.where((t > 20) & (t < 40), 20.0, 1.0)
     six = loud[:, None] * np.random.default_rng(4).standard_normal((6000, 6))
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(Block.of(t, six[:, :3], six[:, 3:]))
     at, r = motion_by_second(cells.table)
     assert 1 < np.median(r[(at < 19) | (at > 41)]) < 3

@@ -21,9 +21,9 @@ from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures import adaptive
 from fieldcal.run import plan_file, session_run
-from fieldcal.run.judging import judged
+from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import OperatorView, Wish
-from fieldcal.run.session_run import SessionRun, recorded_averages, resume
+from fieldcal.run.session_run import SessionRun, open_for_resume, recorded_averages
 from fieldcal.run.wait_reason import WaitReason
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
@@ -76,13 +76,13 @@ class Bench:
     ) -> Calibration:
         site = {"latitude_deg": 45.0, "angle_setting_deg": 0.003}
         tables = {"site": site, "run": {"seconds": 12.0, **run}, **more}
-        task = plan_file.task(tables, "the test")
+        task = plan_file.task_from_tables(tables, "the test")
         with Recorder(self.folder, task.tables) as recorder:
             return self._going(task, recorder, {}, until_go)
 
     def _going(
         self,
-        task: plan_file.Task,
+        task: plan_file.PlanTask,
         recorder: Recorder,
         taken: dict[int, Average],
         until_go: bool = False,
@@ -95,8 +95,8 @@ class Bench:
         return one.run(driver)
 
     def resumed(self) -> Calibration:
-        session, tables, _ = resume(self.folder)
-        task = plan_file.task(tables, "the test")
+        session, tables, _ = open_for_resume(self.folder)
+        task = plan_file.task_from_tables(tables, "the test")
         taken = recorded_averages(session, task)
         with Recorder(self.folder, None) as recorder:
             return self._going(task, recorder, taken)
@@ -160,14 +160,14 @@ def test_at_go_it_ends_if_a_further_position_is_left_out(
     full: list[int] = []
 
     def counted(folder: Path, *given: Any) -> InterimResult:
-        so_far = judged(folder, *given)
+        so_far = judge_session(folder, *given)
         full.extend(
             [len(so_far.prepared_session.windows.position_numbers)]
             * (not so_far.incremental)
         )
         return so_far
 
-    monkeypatch.setattr(session_run, "judged", counted)
+    monkeypatch.setattr(session_run, "judge_session", counted)
     bench.hand = Content(bench.hand.driver)
     found = bench.run(ADAPTIVE, until_go=True)
     asked = [t for t in bench.hand.told if "the next position tells" in t]
@@ -199,7 +199,7 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     two = {"procedure": "positions"}
     start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
     bench.run(two, until_go=True, position=start)
-    assert max(bench.numbers) >= 3 and judged(bench.folder, BOUNDS).sufficient
+    assert max(bench.numbers) >= 3 and judge_session(bench.folder, BOUNDS).sufficient
     said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
     assert len(said) == max(bench.numbers) - 2
     assert all("one position more" in t and "then GO is expected" in t for t in said)
@@ -244,8 +244,10 @@ def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
 
 
 def test_only_a_plan_that_finds_its_positions_says_how_many_there_are_at_most() -> None:
-    about = plan_file.task({"run": ADAPTIVE}, "the test").about
+    about = plan_file.task_from_tables({"run": ADAPTIVE}, "the test").about
     assert procedures.most(about, "adaptive") == 9
     assert procedures.most(about, "five_position") is None
-    more = plan_file.task({"run": {**ADAPTIVE, "most": 6}}, "the test").about
+    more = plan_file.task_from_tables(
+        {"run": {**ADAPTIVE, "most": 6}}, "the test"
+    ).about
     assert procedures.most(more, "adaptive") == 6

@@ -15,7 +15,7 @@ from fieldcal.commands.virtual import address
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
-from fieldcal.run.companions import Times
+from fieldcal.run.companions import ArrivalTimes
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
@@ -154,18 +154,18 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
 
 
 def test_times_go_over_the_hosts_clock() -> None:
-    times = Times()
-    assert np.isnan(times.device(0.0))
+    times = ArrivalTimes()
+    assert np.isnan(times.device_time(0.0))
     before = host_clock()
     times.add(Block.of(np.array([10.0]), np.zeros((1, 3))))
-    assert before <= times.host(10.0) <= host_clock()
+    assert before <= times.host_time(10.0) <= host_clock()
 
 
 def test_whoever_records_may_be_late() -> None:
     """What counts is when samples were read."""
-    times, acc = Times(), np.zeros((1, 3))
+    times, acc = ArrivalTimes(), np.zeros((1, 3))
     for t, host in ((1.0, 500.0), (2.0, 501.0), (3.0, 502.5)):
         times.add(Block.of(np.array([t]), acc, t_host=np.array([host])))
-    assert times.device(501.75) == pytest.approx(2.5)
-    assert times.host(1.5) == pytest.approx(500.5)
-    assert times.device(times.host(2.7)) == pytest.approx(2.7)
+    assert times.device_time(501.75) == pytest.approx(2.5)
+    assert times.host_time(1.5) == pytest.approx(500.5)
+    assert times.device_time(times.host_time(2.7)) == pytest.approx(2.7)

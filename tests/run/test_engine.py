@@ -603,7 +603,7 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
     for piece in pieces(block, 0.1):
         units.add(piece)
     assert ("they are in deg/s and not in rad/s" in units.says) == wrong
-    assert not units.asks(99.0)
+    assert not units.question(99.0)
 
 
 @pytest.mark.parametrize(
@@ -644,8 +644,8 @@ def test_rates_that_move_where_nothing_is_felt_ask_for_their_unit() -> None:
         gyr = 2.0 + 0.3 * rng.standard_normal((10, 3))
         wait.add(Block.of(t, acc, gyr))
         assert not wait.says
-        assert not wait.asks(float(t[-1])) or t[-1] > 4.9
-    assert "if they are in deg/s" in wait.asks(20.0) and not wait.asks(3.0)
+        assert not wait.question(float(t[-1])) or t[-1] > 4.9
+    assert "if they are in deg/s" in wait.question(20.0) and not wait.question(3.0)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from fieldcal.commands import ports
 from fieldcal.commands.introduce import introduce
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, pieces
-from fieldcal.run.introduction import introduced, unit_by_a_turn
+from fieldcal.run.introduction import introduce_device, rate_unit_from_turn
 from fieldcal.run.movers import VirtualMover
 
 N = 200
@@ -39,14 +39,16 @@ def at_rest(f: Array, bias: Array, seed: int = 0) -> Block:
 def test_gravity_says_which_way_is_up(
     f: tuple[float, ...], up: str, mounting: tuple[str, ...] | None
 ) -> None:
-    known = introduced(at_rest(np.array(f), np.array([0.01, -0.02, 0.03])), 9.81)
-    assert known.up == up and not known.centred
+    known = introduce_device(at_rest(np.array(f), np.array([0.01, -0.02, 0.03])), 9.81)
+    assert known.up == up and not known.rates_zeroed
     assert mounting is None or known.mounting == mounting
     assert (f"{up} is up" if up else "it stands askew") in known.says
 
 
 def test_units_that_are_not_g_are_said() -> None:
-    known = introduced(at_rest(np.array([0.0, -1.0, 0.0]), np.full(3, 0.01)), 9.81)
+    known = introduce_device(
+        at_rest(np.array([0.0, -1.0, 0.0]), np.full(3, 0.01)), 9.81
+    )
     assert not known.up and "m/s² at rest, and gravity is 9.81 m/s²" in known.says
 
 
@@ -54,8 +56,8 @@ def test_a_device_that_takes_its_bias_out_is_seen() -> None:
     f = np.array([0.0, -9.81, 0.0])
     centred = at_rest(f, np.zeros(3))
     centred = Block.of(centred.t, centred.acc, centred.gyr - centred.gyr.mean(axis=0))
-    assert "takes their bias out itself" in introduced(centred, 9.81).says
-    assert "bias out" not in introduced(at_rest(f, np.full(3, 0.01)), 9.81).says
+    assert "takes their bias out itself" in introduce_device(centred, 9.81).says
+    assert "bias out" not in introduce_device(at_rest(f, np.full(3, 0.01)), 9.81).says
 
 
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "rad/s"), (180 / np.pi, "deg/s")])
@@ -68,8 +70,8 @@ def test_one_turn_by_hand_tells_the_unit(scale: float, unit: str) -> None:
     gyr = scale * np.column_stack([rate, 0 * t, 0 * t])
     noise = rng.standard_normal((2, len(t), 3)) * [[[0.02]], [[2e-3 * scale]]]
     block = Block.of(t, acc + noise[0], gyr + noise[1])
-    assert unit_by_a_turn(pieces(block, 0.1), 9.81, 60.0) == unit
-    assert unit_by_a_turn(pieces(block[:300], 0.1), 9.81, 2.0) is None
+    assert rate_unit_from_turn(pieces(block, 0.1), 9.81, 60.0) == unit
+    assert rate_unit_from_turn(pieces(block[:300], 0.1), 9.81, 2.0) is None
 
 
 @pytest.fixture

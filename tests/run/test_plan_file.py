@@ -42,19 +42,19 @@ def test_the_schema_is_one() -> None:
 
 def test_a_whole_plan_is_taken() -> None:
     mover = {"kind": "command", "command": ["tt", "{alpha}", "{beta}"], "timeout_s": 9}
-    task = plan_file.task(
+    task = plan_file.task_from_tables(
         plan(seconds=20, verify=True, mover=mover, device="serial:/dev/x"), "p.toml"
     )
     assert task.seconds == 20.0 and task.procedure == "positions"
     assert len(task.positions) == 3 and task.verification is not None
     own = {**plan(), "verification": {"alpha_deg": 10.0, "beta_deg": 1.0}}
-    named = plan_file.task(own, "p.toml").verification
+    named = plan_file.task_from_tables(own, "p.toml").verification
     assert named is not None and named.degrees == (10.0, 1.0)
 
 
 @pytest.mark.parametrize("name", procedures.names())
 def test_a_procedure_brings_its_positions(name: str) -> None:
-    task = plan_file.task({"run": {"procedure": name}}, "plan.toml")
+    task = plan_file.task_from_tables({"run": {"procedure": name}}, "plan.toml")
     taken = [p.degrees for p in task.about.positions]
     assert taken == [p.degrees for p in procedures.procedure(name).POSITIONS]
 
@@ -120,7 +120,7 @@ def test_a_wrong_plan_is_refused_with_file_key_and_remedy(
     tables: dict[str, Any], says: str
 ) -> None:
     with pytest.raises(PlanError) as error:
-        plan_file.task(tables, "p.toml")
+        plan_file.task_from_tables(tables, "p.toml")
     assert str(error.value).startswith("p.toml: ") and says in str(error.value)
 
 
@@ -142,7 +142,7 @@ KEYS = st.sampled_from(
 def test_whatever_a_plan_says_it_is_taken_or_refused(tables: dict[str, Any]) -> None:
     for whole in (tables, {**plan(), **tables}):
         try:
-            task = plan_file.task(whole, "p.toml")
+            task = plan_file.task_from_tables(whole, "p.toml")
         except PlanError as error:
             assert str(error).startswith("p.toml: ")
         else:
@@ -248,7 +248,10 @@ def test_the_plan_of_the_readme_is_one() -> None:
     readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
     blocks = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
     assert len(blocks) == 1
-    assert len(plan_file.task(tomllib.loads(blocks[0]), "README.md").positions) == 5
+    assert (
+        len(plan_file.task_from_tables(tomllib.loads(blocks[0]), "README.md").positions)
+        == 5
+    )
 
 
 def test_a_position_may_be_one_finite_turn() -> None:
@@ -257,20 +260,22 @@ def test_a_position_may_be_one_finite_turn() -> None:
         {"rotation_vector_deg": [120 / 3**0.5] * 3},
         {"quaternion": [0.5, 0.5, 0.5, 0.5]},
     ]
-    made = plan_file.task({**plan(), "position": [*POSITIONS, *turns]}, "p.toml")
+    made = plan_file.task_from_tables(
+        {**plan(), "position": [*POSITIONS, *turns]}, "p.toml"
+    )
     one, other = made.positions[-2:]
     assert one.all_degrees == pytest.approx(other.all_degrees, abs=1e-6)
     with pytest.raises(PlanError, match="rotation_vector_deg or quaternion"):
         half = [*POSITIONS, {"alpha_deg": 10.0}]
-        plan_file.task({**plan(), "position": half}, "p.toml")
+        plan_file.task_from_tables({**plan(), "position": half}, "p.toml")
 
 
 def test_a_third_angle_wants_somebody_who_turns_it() -> None:
     third = [*POSITIONS, {"alpha_deg": 10.0, "beta_deg": 5.0, "gamma_deg": 30.0}]
 
-    def of(**mover: Any) -> plan_file.Task:
+    def of(**mover: Any) -> plan_file.PlanTask:
         run = {"mover": mover} if mover else {}
-        return plan_file.task({"position": third, "run": run}, "p.toml")
+        return plan_file.task_from_tables({"position": third, "run": run}, "p.toml")
 
     assert of().positions[2].all_degrees == (10.0, 5.0, 30.0)  # by hand
     whole = of(kind="command", command=["tt", "{alpha}", "{beta}", "{gamma}"])

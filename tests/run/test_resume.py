@@ -21,7 +21,11 @@ from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
-from fieldcal.run.session_run import positions_left_out, recorded_averages, resume
+from fieldcal.run.session_run import (
+    open_for_resume,
+    positions_left_out,
+    recorded_averages,
+)
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import MARKS
@@ -96,29 +100,29 @@ def test_what_was_taken_is_known_and_what_was_wanted_again_is_not(
     tmp_path: Path,
 ) -> None:
     recorded(tmp_path / "s")
-    session, tables, _ = resume(tmp_path / "s")
-    taken = recorded_averages(session, plan_file.task(tables, "s"))
+    session, tables, _ = open_for_resume(tmp_path / "s")
+    taken = recorded_averages(session, plan_file.task_from_tables(tables, "s"))
     assert list(taken) == [0] and taken[0].n == 1000
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("repeated", position=0)
-    session, tables, _ = resume(tmp_path / "s")
-    assert recorded_averages(session, plan_file.task(tables, "s")) == {}
+    session, tables, _ = open_for_resume(tmp_path / "s")
+    assert recorded_averages(session, plan_file.task_from_tables(tables, "s")) == {}
     assert session.windows == (None, None)
 
 
 def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="is no session"):
-        resume(tmp_path)
+        open_for_resume(tmp_path)
     (tmp_path / "session.toml").write_text("format = 1\n")
     with pytest.raises(SessionError, match="was not recorded by fieldcal run"):
-        resume(tmp_path)
+        open_for_resume(tmp_path)
     recorded(tmp_path / "s")
     with Recorder(tmp_path / "s", None) as recorder:
         recorder.mark("finished")
-    resume(tmp_path / "s")  # killed before the result was written
+    open_for_resume(tmp_path / "s")  # killed before the result was written
     (tmp_path / "s" / "result.json").write_text("{}")
     with pytest.raises(SessionError, match="is finished"):
-        resume(tmp_path / "s")
+        open_for_resume(tmp_path / "s")
 
 
 def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
@@ -131,8 +135,8 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
     remedy = {"says": "", "again": [0], "positions": [besides], "seconds": 20.0}
     decision = {"go": False, "remedy": remedy}
     (folder / "result.json").write_text(json.dumps({"decision": decision}))
-    session, tables, again = resume(folder)
-    task = plan_file.task(tables, "s")
+    session, tables, again = open_for_resume(folder)
+    task = plan_file.task_from_tables(tables, "s")
     assert again == (0,) and len(task.about.positions) == len(session.positions) + 1
     assert task.about.positions[-1].degrees == (45.0, -5.0)
     assert task.procedure == "positions" and task.seconds == 20.0
@@ -141,17 +145,17 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
         recorder.mark("repeated", position=0)
         recorder.mark("added", position=number, name="besides", **besides)
     # broken off here: what was asked for stands, and nothing is added twice
-    session, tables, again = resume(folder)
+    session, tables, again = open_for_resume(folder)
     assert again == () and len(session.positions) == number + 1
     assert session.positions[-1].name == "besides" and session.windows[0] is None
-    assert len(plan_file.task(tables, "s").about.positions) == number + 1
+    assert len(plan_file.task_from_tables(tables, "s").about.positions) == number + 1
     with Recorder(folder, None) as recorder:
         recorder.mark("window", position=number, start_s=1.0, end_s=2.0)
         recorder.mark("finished")
     assert Session.open(folder).windows[-1] == (1.0, 2.0)
     (folder / "result.json").write_text(json.dumps({"decision": {"go": False}}))
     # no remedy, but what was repeated has no window since: that comes first
-    session, tables, again = resume(folder)
+    session, tables, again = open_for_resume(folder)
     assert again == positions_left_out(session) and 0 in again
     assert len(tables["position"]) == len(session.positions)
     with Recorder(folder, None) as recorder:
@@ -160,7 +164,7 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
             recorder.mark("window", position=i, start_s=start, end_s=start + 2.0)
         recorder.mark("finished")
     with pytest.raises(SessionError, match="no position taken besides would"):
-        resume(folder)
+        open_for_resume(folder)
 
 
 def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:
@@ -176,8 +180,10 @@ def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:
     remedy = {"says": "", "again": [], "positions": [besides, other], "seconds": 20.0}
     decision = {"go": False, "remedy": remedy}
     (folder / "result.json").write_text(json.dumps({"decision": decision}))
-    _, tables, _ = resume(folder)
-    places = [p.degrees for p in plan_file.task(tables, "s").about.positions]
+    _, tables, _ = open_for_resume(folder)
+    places = [
+        p.degrees for p in plan_file.task_from_tables(tables, "s").about.positions
+    ]
     assert places[number:] == [(45.0, -5.0), (-45.0, 5.0)]
 
 
@@ -196,14 +202,14 @@ def test_what_verified_a_no_go_is_taken_anew_behind_what_its_remedy_adds(
     remedy = {"says": "", "again": [], "positions": [besides], "seconds": 10.0}
     decision = {"go": False, "remedy": remedy}
     (folder / "result.json").write_text(json.dumps({"decision": decision}))
-    session, tables, again = resume(folder)
+    session, tables, again = open_for_resume(folder)
     assert again == (2,) and len(tables["position"]) == 3
     with Recorder(folder, None) as recorder:
         recorder.mark("repeated", position=2)
         recorder.mark("added", position=2, name="besides", **besides)
     now = Session.open(folder)
     assert now.windows == (*session.windows, None)
-    task = plan_file.task(tables, "s")
+    task = plan_file.task_from_tables(tables, "s")
     assert task.verification is not None
     assert sorted(recorded_averages(now, task)) == [0, 1]
 

@@ -16,12 +16,12 @@ from fieldcal.drivers.driver import ClockLine, Health
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
-from fieldcal.run.operator.banner import drawable, large
-from fieldcal.run.operator.box import FIRST, picture, pictures
+from fieldcal.run.operator.banner import can_draw, draw_large
+from fieldcal.run.operator.box import FIRST, draw_box, draw_joints
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
-from fieldcal.run.operator.widgets import HALF, RULER, inclinometer, link
+from fieldcal.run.operator.widgets import HALF, RULER, inclinometer, link_state
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -54,7 +54,7 @@ class Keys(Keyboard):
     def __init__(self, *wishes: Wish) -> None:
         self.wishes = list(wishes)
 
-    there = True
+    has_keys = True
 
     def pressed(self) -> Wish | None:
         return self.wishes.pop(0) if self.wishes else None
@@ -201,10 +201,10 @@ def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
     made.show(view("turning"))
     console.print(made.screen())
     lines = out.getvalue()
-    for line in [*large("TURN TO"), *large("α 22.5°  β 0°")]:
+    for line in [*draw_large("TURN TO"), *draw_large("α 22.5°  β 0°")]:
         assert line in lines
     assert len(lines.splitlines()) <= 40
-    assert not drawable("WAIT FOR ME?") and drawable("HOLD STILL")
+    assert not can_draw("WAIT FOR ME?") and can_draw("HOLD STILL")
 
 
 def test_many_positions_leave_room_for_what_is_said() -> None:
@@ -303,14 +303,14 @@ def test_the_scale_is_always_the_same() -> None:
 @pytest.mark.parametrize(("sigma", "shown"), [(0.3, "1"), (9.6, "10"), (43.0, "43")])
 def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
     health = Health(samples=1234, clock=ClockLine(-20.2, sigma, 0.0, 1e-3))
-    text = link(view("averaging", health=health)).plain
+    text = link_state(view("averaging", health=health)).plain
     assert text.endswith(f"clock -20 ± {shown} ppm")
 
 
 def test_a_clock_of_which_nothing_is_known_is_not_shown() -> None:
     """After the computer was asleep."""
     health = Health(samples=1234, clock=ClockLine(-93958.0, 20272.0, 0.0, 5.0))
-    assert "clock" not in link(view("averaging", health=health)).plain
+    assert "clock" not in link_state(view("averaging", health=health)).plain
 
 
 def test_leaving_out_is_asked_back() -> None:
@@ -350,12 +350,12 @@ def test_what_a_second_press_no_longer_does_is_not_shown(
 def test_the_box_is_drawn_turned_clockwise(
     angle: float, right_lower: bool, left_lower: bool
 ) -> None:
-    lowest = picture(angle)[-1]
+    lowest = draw_box(angle)[-1]
     dots = [i for i, letter in enumerate(lowest) if letter != chr(FIRST)]
     middle = (len(lowest) - 1) / 2
     assert (np.mean(dots) > middle) == right_lower
     assert (np.mean(dots) < middle) == left_lower
-    assert "facing N" in pictures(FIVE[1], 40, 5)[-1]
+    assert "facing N" in draw_joints(FIVE[1], 40, 5)[-1]
 
 
 @pytest.mark.parametrize("size", [(80, 24), (40, 15), (110, 40)])
@@ -376,14 +376,14 @@ def test_a_position_of_three_angles_is_shown_whole(size: tuple[int, int]) -> Non
 
 def test_pictures_of_three_joints_stand_side_by_side_or_below_or_not_at_all() -> None:
     third = Position.deg(10.0, 5.0, gamma=90.0)
-    wide, narrow = pictures(third, 40, 5), pictures(third, 30, 10)
+    wide, narrow = draw_joints(third, 40, 5), draw_joints(third, 30, 10)
     for lines in (wide, narrow):
         text = "\n".join(lines)
         assert all(w in text for w in ("α, facing N", "β, facing E", "γ, from above"))
     assert (len(wide), len(narrow)) == (5, 10)
-    assert pictures(third, 30, 9) == pictures(Position("by hand"), 99, 99) == []
+    assert draw_joints(third, 30, 9) == draw_joints(Position("by hand"), 99, 99) == []
     # the arrow of gamma points east
-    arrow = picture(90.0)
+    arrow = draw_box(90.0)
     assert [line[24:].strip() for line in wide[:4]] == [x.strip() for x in arrow]
 
 

@@ -74,7 +74,7 @@ def test_a_gust_is_no_turn_and_calls_nobody_anew(
     )
     for first in range(0, len(t), 10):
         waiting.add(block[first : first + 10], float(t[first]))
-        if waiting.alarm() is not None:
+        if waiting.alarm_due() is not None:
             called.append(float(t[first]))
     assert len(called) == len(calls)
     assert all(0.0 <= c - w < 8.0 for c, w in zip(called, calls, strict=True))

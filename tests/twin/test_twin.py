@@ -22,7 +22,7 @@ from fieldcal.sim_device import profile_file
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import parse
-from fieldcal.twin.device import settled
+from fieldcal.twin.device import effects_of_terms
 from fieldcal.twin.physical import from_one_instant
 
 QUIET = NoiseFigures(acc_instability=(0, 0, 0), gyr_instability=(0, 0, 0))
@@ -194,7 +194,7 @@ def test_what_settles_counts_from_one_instant() -> None:
     once = from_one_instant(state, since)
     assert [t.origin for t in once.terms] == [1, 1]
     np.testing.assert_allclose(once.output(x, since), state.output(x, since))
-    both = settled(once.terms, 0.0)
+    both = effects_of_terms(once.terms, 0.0)
     assert len(both) == 1 and both[0]["gx"] == 3e-3
 
 

@@ -12,7 +12,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import allan
 from fieldcal.windows.allan import AllanDeviation, allan_deviation
-from fieldcal.windows.rounding import of_mean
+from fieldcal.windows.rounding import variance_of_mean
 
 RATE = 50.0
 
@@ -210,7 +210,7 @@ def test_the_rounding_is_that_of_the_finest_step_of_the_sensor() -> None:
     block.gyr[:] = 0.25
     found = allan_deviation(block)
     noise = np.sqrt(np.mean(np.diff(block.acc, axis=0) ** 2, axis=0) / 2)
-    expected = np.sqrt(of_mean(np.full(3, 0.1), noise))
+    expected = np.sqrt(variance_of_mean(np.full(3, 0.1), noise))
     np.testing.assert_allclose(found.rounding[:3], expected)
     assert (found.rounding[:3] > 0).all() and not found.rounding[3:].any()
 

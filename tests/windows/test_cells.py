@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import cells
-from fieldcal.windows.cells import Cells, CellTable, hold_last, resolution
+from fieldcal.windows.cells import CellAccumulator, CellTable, hold_last, resolution
 
 
 def block(n: int = 400, seed: int = 0, lost: float = 0.1) -> Block:
@@ -25,8 +25,8 @@ def block(n: int = 400, seed: int = 0, lost: float = 0.1) -> Block:
     return Block.of(t[kept], six[kept, :3], six[kept, 3:], warm[kept])
 
 
-def filled(samples: Block) -> Cells:
-    out = Cells()
+def filled(samples: Block) -> CellAccumulator:
+    out = CellAccumulator()
     out.add(samples)
     return out
 
@@ -53,7 +53,7 @@ def test_a_cell_holds_what_its_samples_say() -> None:
         x, d = six[some], step[some]
         known, moved = np.isfinite(x).sum(axis=0), np.isfinite(d).sum(axis=0)
         np.testing.assert_array_equal(table.counts[cell], known)
-        np.testing.assert_array_equal(table.steps[cell], moved)
+        np.testing.assert_array_equal(table.step_counts[cell], moved)
         for c in range(6):
             if known[c]:
                 mean = table.origin[c] + table.means[cell, c]
@@ -61,14 +61,14 @@ def test_a_cell_holds_what_its_samples_say() -> None:
             else:
                 assert np.isnan(table.means[cell, c])
             if moved[c]:
-                assert table.short[cell, c] == pytest.approx(
+                assert table.short_lag_variance[cell, c] == pytest.approx(
                     np.nanmean(d[:, c] ** 2) / 2
                 )
             else:
-                assert np.isnan(table.short[cell, c])
+                assert np.isnan(table.short_lag_variance[cell, c])
             changes = np.abs(d[:, c])
             finest = np.min(changes[changes > 0], initial=np.inf)
-            assert table.finest[cell, c] == finest
+            assert table.smallest_changes[cell, c] == finest
 
 
 def test_the_whole_of_a_table_is_that_of_its_samples() -> None:
@@ -105,9 +105,9 @@ def test_what_was_never_measured_is_nan_and_has_no_step() -> None:
 
 
 def test_nothing_yet_is_an_empty_table() -> None:
-    nothing = Cells()
+    nothing = CellAccumulator()
     assert nothing.n == 0 and np.isnan([nothing.start, nothing.end]).all()
-    assert len(nothing.table) == 0 and nothing.table.whole == 0
+    assert len(nothing.table) == 0 and nothing.table.complete_count == 0
     assert np.isnan(nothing.table.mean).all() and not nothing.table.resolution.any()
     assert len(nothing.take_complete()) == 0
 
@@ -123,7 +123,7 @@ def assert_same(one: CellTable, other: CellTable) -> None:
 def test_how_samples_come_does_not_matter(cuts: list[int], seed: int) -> None:
     samples = block(1000, seed)
     edges = [0, *sorted(min(c, len(samples)) for c in cuts), len(samples)]
-    pieces = Cells()
+    pieces = CellAccumulator()
     for a, b in zip(edges, edges[1:], strict=False):
         pieces.add(samples[a:b])
     assert_same(pieces.table, filled(samples).table)
@@ -141,7 +141,7 @@ def test_long_blocks_are_summed_in_parts_and_short_ones_added_up(
 
 def test_cells_are_handed_over_once_and_the_last_is_kept() -> None:
     samples = block(600)
-    made, taken = Cells(), []
+    made, taken = CellAccumulator(), []
     for a in range(0, len(samples), 25):
         made.add(samples[a : a + 25])
         taken.append(made.take_complete())
@@ -169,7 +169,7 @@ def table_of(counts: Array, means: Array) -> CellTable:
 def test_cells_that_are_alike_stay_as_they_are() -> None:
     means = np.random.default_rng(0).normal(size=(40, 6))
     table = table_of(np.full((40, 6), 10.0), means)
-    np.testing.assert_array_equal(table.steady, table.means)
+    np.testing.assert_array_equal(table.steady_means, table.means)
 
 
 def test_a_cell_with_few_values_is_drawn_to_the_line_of_the_others() -> None:
@@ -178,7 +178,7 @@ def test_a_cell_with_few_values_is_drawn_to_the_line_of_the_others() -> None:
     means, counts = line.copy(), np.full((240, 6), 10.0)
     means[100] += 1.0
     counts[100, 0], counts[100, 1], counts[100, 2], counts[100, 3] = 2.5, 0, 20, 5
-    found = table_of(counts, means).steady - line
+    found = table_of(counts, means).steady_means - line
     expected = np.zeros((240, 6))
     expected[100] = [0.5, 0.0, 1.0, np.sqrt(0.5), 1.0, 1.0]
     np.testing.assert_allclose(found, expected, atol=1e-9)
@@ -187,7 +187,7 @@ def test_a_cell_with_few_values_is_drawn_to_the_line_of_the_others() -> None:
 def test_a_channel_that_has_no_values_is_steady_at_none() -> None:
     counts = np.full((40, 6), 10.0)
     counts[:, 4] = 0
-    found = table_of(counts, np.ones((40, 6))).steady
+    found = table_of(counts, np.ones((40, 6))).steady_means
     np.testing.assert_allclose(found, np.where(np.arange(6) == 4, 0.0, 1.0) + 0 * found)
 
 
@@ -196,18 +196,18 @@ def test_the_last_cell_counts_once_it_is_filled(last: float, whole: int) -> None
     counts = np.full((8, 6), 10.0)
     counts[-1] = last
     counts[:, 5] = 0.0
-    assert table_of(counts, np.ones((8, 6))).whole == whole
-    assert table_of(counts[-1:], np.ones((1, 6))).whole == 1
+    assert table_of(counts, np.ones((8, 6))).complete_count == whole
+    assert table_of(counts[-1:], np.ones((1, 6))).complete_count == 1
 
 
 def test_cells_begin_at_the_first_sample_or_not() -> None:
     samples = block(60, lost=0.0)
     table = filled(samples).table
-    assert table.on_edge
+    assert table.starts_on_edge
     later = CellTable(table.times - 0.01, table.sums, table.origin)
     assert (
-        not later.on_edge
-        and not CellTable(table.times + 6e-7, table.sums, table.origin).on_edge
+        not later.starts_on_edge
+        and not CellTable(table.times + 6e-7, table.sums, table.origin).starts_on_edge
     )
 
 

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import ACC, GYR, Block
-from fieldcal.windows.dead_axis import LivingRows, broken, dead_sensors, without_dead
+from fieldcal.windows.dead_axis import (
+    LiveAxisRows,
+    broken_axis_messages,
+    dead_sensors,
+    without_dead_axes,
+)
 
 
 def test_an_axis_that_changes_once_is_not_dead() -> None:
@@ -19,7 +24,7 @@ def test_beside_axes_as_coarse_it_may_only_not_be_turned() -> None:
     six = np.round(np.random.default_rng(2).normal(size=(500, 6)) * 0.3)
     six[:, 1] = 0.0
     assert dead_sensors(six) == []
-    np.testing.assert_array_equal(without_dead(six), six)
+    np.testing.assert_array_equal(without_dead_axes(six), six)
 
 
 def test_beside_axes_that_jump_once_it_may_only_not_be_turned() -> None:
@@ -31,7 +36,7 @@ def test_beside_axes_that_jump_once_it_may_only_not_be_turned() -> None:
 def test_others_of_its_sensor_still_tell_of_rest() -> None:
     six = np.random.default_rng(2).normal(size=(50, 6))
     six[:, 5] = 0.0
-    told = without_dead(six)
+    told = without_dead_axes(six)
     assert np.isnan(told[:, 5]).all()
     np.testing.assert_array_equal(told[:, :5], six[:, :5])
     assert (six[:, 5] == 0).all()
@@ -66,16 +71,16 @@ def test_rows_of_either_sensor_in_turn_are_both_alive() -> None:
 
 def test_an_axis_that_never_changes_beside_others_that_do_is_a_broken_one() -> None:
     six = np.random.default_rng(4).normal(size=(50, 6))
-    assert broken(six) == []
+    assert broken_axis_messages(six) == []
     six[:, 1] = 0.3
-    (said,) = broken(six)
+    (said,) = broken_axis_messages(six)
     assert said.startswith("ay never changes while the rest of the sensor does")
     six[:, 0], six[4, 0] = 0.1, np.nan
-    (said,) = broken(six)
+    (said,) = broken_axis_messages(six)
     assert said.startswith("ax and ay never change while")
     # a column that is missing was not recorded, and a sensor of zeros is not there
     six[:, :2], six[:, 3:] = np.nan, 0.0
-    assert broken(six) == []
+    assert broken_axis_messages(six) == []
 
 
 def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:
@@ -83,7 +88,7 @@ def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:
     rows = np.random.default_rng(5).normal(size=(5000, 35))
     rows[:, 27:33] = np.nan
     rows[100, 27] = rows[4900, [28, 30, 31, 32]] = 1e-3
-    alive = LivingRows(rows)
+    alive = LiveAxisRows(rows)
     assert len(alive) == 5000
     found, expected = alive[10:4950], rows[10:4950].copy()
     expected[:, [1 + 2, 7 + 2, 13 + 2, 19 + 2]] = 0.0
@@ -92,7 +97,9 @@ def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:
 
     t = np.arange(4.0)
     block = Block.of(t, np.ones((4, 3)), np.ones((4, 3)))
-    (seen,) = alive.of(lambda start, end: iter([block]))(0.0, 4.0)
+    (seen,) = alive.samples_without_dead_axes(lambda start, end: iter([block]))(
+        0.0, 4.0
+    )
     assert seen.acc.shape == seen.gyr.shape == (4, 3)
     assert np.isnan(seen.acc[:, 2]).all() and (seen.acc[:, :2] == 1).all()
     assert (seen.gyr == 1).all() and (block.acc == 1).all()
@@ -101,7 +108,9 @@ def test_cells_of_an_axis_that_never_changes_are_as_if_not_recorded() -> None:
 def test_where_nothing_changes_everything_is_looked_at() -> None:
     rows = np.ones((10, 35))
     rows[:, 27:33] = np.nan
-    alive = LivingRows(rows)
+    alive = LiveAxisRows(rows)
     np.testing.assert_array_equal(alive[:], rows)
     nothing = iter(())
-    assert alive.of(lambda start, end: nothing)(0.0, 1.0) is nothing
+    assert (
+        alive.samples_without_dead_axes(lambda start, end: nothing)(0.0, 1.0) is nothing
+    )

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.disturbance import Least, pushes, repeats, shakes, steps
-from fieldcal.windows.quiet import quiet
+from fieldcal.windows.disturbance import LeastSpread, pushes, repeats, shakes, steps
+from fieldcal.windows.quiet import estimate_quiet_noise
 
 M = 64
 
 
-def at_least(*always: float, sampled: float = 0.0, number: float = 1.0) -> Least:
+def at_least(*always: float, sampled: float = 0.0, number: float = 1.0) -> LeastSpread:
     """Bounds of as many channels as there are numbers."""
     bound = np.array(always)
     ones = np.ones(len(bound))
-    return Least(bound, sampled * ones, number * ones)
+    return LeastSpread(bound, sampled * ones, number * ones)
 
 
 NONE, ONE = at_least(0.0, 0.0), at_least(0.0)
@@ -32,7 +32,7 @@ def mean_of(values: Array, first: int, number: int) -> Array:
 
 
 def test_a_push_is_a_mean_over_its_spread() -> None:
-    y, noise = cells(), quiet(cells())
+    y, noise = cells(), estimate_quiet_noise(cells())
     tests = pushes(y, noise, NONE)
     assert [t.cells for t in tests] == [1, 2, 4, 8, 16, 32]
     for k, test in enumerate(tests):
@@ -45,7 +45,7 @@ def test_a_push_is_a_mean_over_its_spread() -> None:
 
 
 def test_a_step_is_a_difference_of_neighbouring_means() -> None:
-    y, noise = cells(), quiet(cells())
+    y, noise = cells(), estimate_quiet_noise(cells())
     tests = steps(y, noise, NONE)
     assert [t.cells for t in tests] == [1, 2, 4, 8, 16, 32]
     for k, test in enumerate(tests):
@@ -101,7 +101,7 @@ def test_cells_without_a_change_do_not_shake() -> None:
 
 
 def test_nothing_is_measured_finer_than_the_least_spread() -> None:
-    y, noise = cells(), quiet(cells())
+    y, noise = cells(), estimate_quiet_noise(cells())
     least = at_least(0.0, 100.0)
     for make in (pushes, steps):
         for plain, bound in zip(
@@ -118,7 +118,7 @@ def test_nothing_is_measured_finer_than_the_least_spread() -> None:
 
 
 def test_noise_that_steps_hide_counts_less_the_more_samples_a_mean_has() -> None:
-    y, noise = cells(), quiet(cells())
+    y, noise = cells(), estimate_quiet_noise(cells())
     hidden = at_least(0.0, 0.0, sampled=300.0, number=9.0)
     for make, more in ((pushes, 1.0), (steps, np.sqrt(2.0))):
         for test in make(y, noise, hidden):
@@ -135,7 +135,9 @@ def test_what_never_varies_is_no_disturbance() -> None:
     y = np.zeros((M, 2))
     y[20, 0] = 5.0
     for make in (pushes, steps):
-        assert not any(test.z.any() for test in make(y, quiet(0 * y), NONE))
+        assert not any(
+            test.z.any() for test in make(y, estimate_quiet_noise(0 * y), NONE)
+        )
 
 
 def test_a_run_of_one_value_is_found_with_its_place() -> None:

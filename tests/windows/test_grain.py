@@ -7,8 +7,8 @@ from scipy.stats import norm
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import Average, average
-from fieldcal.windows.grain import AROUND, variance, visible_step
-from fieldcal.windows.rounding import of_few, of_mean
+from fieldcal.windows.grain import AROUND, rounding_variance, visible_step
+from fieldcal.windows.rounding import variance_of_few_values, variance_of_mean
 
 STEP = np.repeat([9.80665e-3, 1e-3], 3)
 CUT = Grain(STEP[0], STEP[3], cut=True)
@@ -88,8 +88,10 @@ def off(v: float, noise: float) -> float:
 def stated(mean: float, noise: float, grain: Grain = CUT) -> Array:
     """What is stated beside the rounding, in steps squared."""
     sampled = np.sqrt(noise**2 + 1 / 12) * STEP
-    rounded = np.maximum(of_mean(STEP, sampled), of_few(STEP, sampled))
-    found = variance(grain, mean * STEP, sampled, 3 * STEP)
+    rounded = np.maximum(
+        variance_of_mean(STEP, sampled), variance_of_few_values(STEP, sampled)
+    )
+    found = rounding_variance(grain, mean * STEP, sampled, 3 * STEP)
     return np.asarray((found - rounded) / STEP**2)
 
 
@@ -111,7 +113,7 @@ def test_far_from_zero_and_of_what_is_rounded_nothing_is_added() -> None:
 
 
 def test_without_noise_the_variance_is_that_of_anywhere_within_two_steps() -> None:
-    found = variance(CUT, np.zeros(6), np.zeros(6), STEP) / STEP**2
+    found = rounding_variance(CUT, np.zeros(6), np.zeros(6), STEP) / STEP**2
     # 1/3, of which the grid of 21 places tells 1/12 + 0.25 * 18/21
     np.testing.assert_allclose(found, 1 / 3, rtol=0.13)
 
@@ -119,16 +121,18 @@ def test_without_noise_the_variance_is_that_of_anywhere_within_two_steps() -> No
 def test_what_is_not_said_is_taken_as_it_is_seen() -> None:
     grain = Grain(acc=STEP[0], cut=True)
     seen = np.full(6, 0.5)
-    found = variance(grain, np.full(6, np.nan), np.zeros(6), seen)
+    found = rounding_variance(grain, np.full(6, np.nan), np.zeros(6), seen)
     np.testing.assert_allclose(found[3:], 0.25 / 12)
     np.testing.assert_allclose(found[:3], found[0])
     assert found[0] > STEP[0] ** 2 / 12
     # a step that is seen but not said leaves the mean of two values out of account
     sampled = np.full(6, 0.4 * 0.5)
-    noisy = variance(Grain(), np.zeros(6), sampled, seen)
-    np.testing.assert_allclose(noisy, of_mean(seen, sampled))
-    said = variance(Grain(0.5, 0.5), np.zeros(6), sampled, seen)
-    np.testing.assert_allclose(said, np.maximum(noisy, of_few(seen, sampled)))
+    noisy = rounding_variance(Grain(), np.zeros(6), sampled, seen)
+    np.testing.assert_allclose(noisy, variance_of_mean(seen, sampled))
+    said = rounding_variance(Grain(0.5, 0.5), np.zeros(6), sampled, seen)
+    np.testing.assert_allclose(
+        said, np.maximum(noisy, variance_of_few_values(seen, sampled))
+    )
     assert (said > 1.1 * noisy).all()
 
 

@@ -14,7 +14,7 @@ from laid_about import G, turned, write
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.folder import Session
-from fieldcal.windows.jumps import Jumps
+from fieldcal.windows.jumps import JumpFinder
 
 HZ, NOISE = 50.0, 0.012
 
@@ -33,7 +33,7 @@ def rests(seed: int, lengths: list[int], wild: float = 0.0) -> Array:
 
 def found(acc: Array, cut: int = 10**9) -> list[tuple[float, float]]:
     """Positions of rows that come in blocks of so many."""
-    jumps, t = Jumps(), np.arange(len(acc)) / HZ
+    jumps, t = JumpFinder(), np.arange(len(acc)) / HZ
     for first in range(0, len(acc), cut):
         some = slice(first, first + cut)
         jumps.add(Block.of(t[some], acc[some]))
@@ -58,7 +58,7 @@ def test_it_is_no_matter_how_the_rows_are_cut(cut: int, seed: int) -> None:
     acc = rests(seed, [60, 33, 100, 45])
     # what a row's noise is, the first block tells
     first = 50
-    jumps, t = Jumps(), np.arange(len(acc)) / HZ
+    jumps, t = JumpFinder(), np.arange(len(acc)) / HZ
     jumps.add(Block.of(t[:first], acc[:first]))
     for a in range(first, len(acc), cut):
         jumps.add(Block.of(t[a : a + cut], acc[a : a + cut]))

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Block, concat
-from fieldcal.windows.cells import CELL, Cells, CellTable
+from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
 from fieldcal.windows.knocks import (
     SURE,
     TURNED,
-    Rest,
-    as_before,
-    bias_of_flicker,
-    joined_rests,
+    RestPeriod,
+    flicker_bias_function,
+    join_rests,
+    probability_unmoved,
 )
-from fieldcal.windows.stretches import still_stretches, summary
+from fieldcal.windows.stretches import cell_rows, still_stretches
 
 RATE, G = 50.0, 9.81
 AT = (40.0, 75.0)
@@ -68,12 +68,12 @@ def recorded(
     return Block.of(t, acc, gyr + 0.01)
 
 
-def rests(block: Block) -> list[Rest]:
-    cells = Cells()
+def rests(block: Block) -> list[RestPeriod]:
+    cells = CellAccumulator()
     cells.add(block)
     table = cells.table
-    return joined_rests(
-        summary(table),
+    return join_rests(
+        cell_rows(table),
         table.origin,
         lambda start, end: [block.between(start, end)],
         still_stretches(block),
@@ -84,10 +84,10 @@ def test_a_knock_is_left_out_of_a_rest() -> None:
     block = recorded(1)
     assert len(still_stretches(block)) == 3
     (rest,) = rests(block)
-    assert len(rest.without) == 2
-    for at, (start, end) in zip(AT, rest.without, strict=True):
+    assert len(rest.gaps) == 2
+    for at, (start, end) in zip(AT, rest.gaps, strict=True):
         assert at - 1.0 <= start <= at and at + 0.2 <= end <= at + 2.0
-    assert rest.pieces[1] == (rest.without[0][1], rest.without[1][0])
+    assert rest.pieces[1] == (rest.gaps[0][1], rest.gaps[1][0])
 
 
 @pytest.mark.statistical
@@ -133,7 +133,7 @@ def test_of_a_bias_that_jumps_untouched_nothing_is_left_out(touched: bool) -> No
     block = Block.of(t, acc, gyr)
     assert len(still_stretches(block)) == 2
     (rest,) = rests(block)
-    assert len(rest.without) == touched
+    assert len(rest.gaps) == touched
     assert rest.start < 2 and rest.end > 118
 
 
@@ -156,7 +156,7 @@ def test_what_is_said_to_be_sure_is() -> None:
         sides = [block.between(30.0, gap[0]), block.between(gap[1], 51.0)]
         before, after = cells_of(sides)
         way = block.between(gap[0] - CELL, gap[1] + CELL)
-        said.append(as_before(before, way, after, gap) > SURE)
+        said.append(probability_unmoved(before, way, after, gap) > SURE)
         true.append(as_it_lay)
     sure, same = np.array(said), np.array(true)
     assert sure[same].mean() > 0.8
@@ -165,7 +165,7 @@ def test_what_is_said_to_be_sure_is() -> None:
 
 def cells_of(sides: list[Block]) -> list[CellTable]:
     """Cells of two parts of a recording, about one origin."""
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(concat(sides))
     table = cells.table
     first = table.times < sides[1].t[0] - CELL / 2
@@ -195,4 +195,4 @@ def test_means_of_flicker_apart_differ_as_the_bias_function_says(gap: int) -> No
             ]
         )
     near, far = np.mean(changes, axis=0)
-    assert far / near == pytest.approx(bias_of_flicker(1 + gap / m), rel=0.05)
+    assert far / near == pytest.approx(flicker_bias_function(1 + gap / m), rel=0.05)

@@ -21,4 +21,4 @@ def test_on_a_base_that_sways_what_it_turns_by_is_no_drift() -> None:
     still, swaying = StillnessLimits(), StillnessLimits.swaying()
     np.testing.assert_array_equal(swaying.noise, still.noise)
     np.testing.assert_array_equal(swaying.drift, 2 * still.noise)
-    assert swaying.settled == 16.0
+    assert swaying.unjudged_s == 16.0

@@ -14,10 +14,10 @@ from fieldcal.windows.longrun import (
     KNEES,
     SHAPES,
     WALKS,
-    Shapes,
+    SpectrumShapes,
     error_of_mean,
+    fourier_sums,
     log_likelihood,
-    transform,
     without_lines,
 )
 from windows.signals import flicker, low_passed, markov, white
@@ -56,20 +56,22 @@ def test_the_error_stated_is_the_error_made(
     assert np.mean(np.abs(found) > 1.96) < 0.075
 
 
-def shape(corner: float = np.inf, knee: float = 0.0, walk: float = 0.0) -> Shapes:
+def shape(
+    corner: float = np.inf, knee: float = 0.0, walk: float = 0.0
+) -> SpectrumShapes:
     one = (np.array([x]) for x in (corner, knee, walk, 0.0))
-    return Shapes(*one)
+    return SpectrumShapes(*one)
 
 
 def test_spectra_over_white_noise() -> None:
     f = np.array([0.1, 0.5, 2.0])
-    np.testing.assert_allclose(shape().at(f), [[1, 1, 1]])
+    np.testing.assert_allclose(shape().spectra(f), [[1, 1, 1]])
     # a first-order low-pass has half its power at the corner
-    assert shape(corner=0.5).at(f)[0, 1] == pytest.approx(0.5)
-    assert shape(corner=0.5).at(f)[0, 2] == pytest.approx(1 / 17)
+    assert shape(corner=0.5).spectra(f)[0, 1] == pytest.approx(0.5)
+    assert shape(corner=0.5).spectra(f)[0, 2] == pytest.approx(1 / 17)
     # flicker and walk are as large as white noise at the knee
-    np.testing.assert_allclose(shape(knee=0.5).at(f), [[6, 2, 1.25]])
-    np.testing.assert_allclose(shape(walk=0.5).at(f), [[26, 2, 1.0625]])
+    np.testing.assert_allclose(shape(knee=0.5).spectra(f), [[6, 2, 1.25]])
+    np.testing.assert_allclose(shape(walk=0.5).spectra(f), [[26, 2, 1.0625]])
 
 
 @pytest.mark.parametrize("seconds", [1.0, 30.0])
@@ -86,13 +88,13 @@ def test_the_variance_of_a_mean_is_that_of_its_spectrum(
     x = np.pi * f * seconds
     seen = np.sin(x) ** 4 / x**2
     white = np.trapezoid(seen, f)
-    found = np.trapezoid(family.at(f)[0] * seen, f) / white
+    found = np.trapezoid(family.spectra(f)[0] * seen, f) / white
     assert family.variance(seconds)[0] == pytest.approx(found, rel=1e-3)
     assert shape().variance(seconds)[0] == 1.0
 
 
 def test_the_family_is_every_corner_with_every_knee_and_the_walks() -> None:
-    made = longrun._family()
+    made = longrun._shape_family()
     for name in ("corner", "knee", "walk", "log_prior"):
         np.testing.assert_array_equal(getattr(made, name), getattr(SHAPES, name))
     rows = list(zip(made.corner, made.knee, made.walk, strict=True))
@@ -117,7 +119,7 @@ def test_the_likelihood_is_that_of_exponential_powers_at_their_best_level() -> N
     """Whittle: each power is exponential about w g; w at its best is Q / n."""
     rng = np.random.default_rng(0)
     f = np.linspace(0.1, 2.5, 30)
-    g = SHAPES.at(f)
+    g = SHAPES.spectra(f)
     power = rng.exponential(size=(30, 3))
     found, q = log_likelihood(power, g)
     level = q / 30
@@ -134,7 +136,7 @@ def test_the_likelihood_is_that_of_exponential_powers_at_their_best_level() -> N
 def test_the_transform_is_a_sum_of_cosines_and_sines_up_to_the_band() -> None:
     m, spacing = 200, 0.1
     y = np.random.default_rng(1).normal(size=(m, 2))
-    f, sums = transform(y, spacing)
+    f, sums = fourier_sums(y, spacing)
     np.testing.assert_allclose(f, np.arange(1, 51) / 20.0)
     for j in (0, 7, 49):
         turns = np.exp(-2j * np.pi * f[j] * spacing * np.arange(m))
@@ -145,7 +147,7 @@ def test_the_transform_is_a_sum_of_cosines_and_sines_up_to_the_band() -> None:
 def test_of_short_windows_eight_frequencies_are_used_if_there_are_as_many(
     m: int, number: int
 ) -> None:
-    f, sums = transform(np.random.default_rng(m).normal(size=(m, 1)), 0.1)
+    f, sums = fourier_sums(np.random.default_rng(m).normal(size=(m, 1)), 0.1)
     assert len(f) == len(sums) == number
     np.testing.assert_allclose(f, np.arange(1, number + 1) / (0.1 * m))
 
@@ -178,7 +180,7 @@ def test_few_frequencies_have_no_neighbours_to_be_a_line_beside(
 def slow(y: Array, spacing: float, before: Array | None = None) -> tuple[float, Array]:
     """(5) of one channel (m,) and its weights, shape by shape."""
     m = len(y)
-    f, sums = transform((y - y.mean())[:, None], spacing)
+    f, sums = fourier_sums((y - y.mean())[:, None], spacing)
     power = without_lines(np.abs(sums) ** 2)[:, 0]
     logs, q = [], []
     for i in range(len(SHAPES.corner)):
@@ -198,14 +200,14 @@ def test_the_variance_is_the_mean_over_the_shapes(m: int) -> None:
     rng = np.random.default_rng(m)
     y = np.column_stack([rng.normal(size=m), np.cumsum(rng.normal(size=m)) + 100])
     found = error_of_mean(y, 0.1)
-    after = error_of_mean(y, 0.1, found.seen)
+    after = error_of_mean(y, 0.1, found.shape_likelihood)
     for c in range(2):
         variance, seen = slow(y[:, c], 0.1)
         assert found.covariance[c, c] == pytest.approx(variance)
-        np.testing.assert_allclose(found.seen[:, c], seen, atol=1e-9)
-        variance, seen = slow(y[:, c], 0.1, found.seen[:, c])
+        np.testing.assert_allclose(found.shape_likelihood[:, c], seen, atol=1e-9)
+        variance, seen = slow(y[:, c], 0.1, found.shape_likelihood[:, c])
         assert after.covariance[c, c] == pytest.approx(variance)
-        np.testing.assert_allclose(after.seen[:, c], seen, atol=1e-9)
+        np.testing.assert_allclose(after.shape_likelihood[:, c], seen, atol=1e-9)
 
 
 def test_twice_the_time_halves_the_variance_of_white_noise_and_not_of_a_walk() -> None:
@@ -214,9 +216,9 @@ def test_twice_the_time_halves_the_variance_of_white_noise_and_not_of_a_walk() -
         [rng.normal(size=600), np.cumsum(rng.normal(size=600)), np.ones(600)]
     )
     found = error_of_mean(y, 0.1)
-    ratio = found.doubled[:2] ** 2 / np.diag(found.covariance)[:2]
+    ratio = found.sigma_of_doubled[:2] ** 2 / np.diag(found.covariance)[:2]
     assert ratio[0] == pytest.approx(0.5, abs=0.03) and ratio[1] > 1.8
-    assert not found.covariance[2].any() and found.doubled[2] == 0
+    assert not found.covariance[2].any() and found.sigma_of_doubled[2] == 0
 
 
 def test_the_covariance_is_that_of_the_whitened_channels() -> None:

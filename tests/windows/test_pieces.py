@@ -22,7 +22,7 @@ def rest(rng: np.random.Generator, start: float, seconds: float, off: Array) -> 
 def fed(pieces: PiecedWindow, block: Block) -> None:
     for first in range(0, len(block), 40):
         pieces.add(block[first : first + 40])
-        if pieces.moved:
+        if pieces.disturbance:
             return
 
 
@@ -39,9 +39,9 @@ def in_gusts(seed: int, off: Array | None = None) -> PiecedWindow:
     pieces = PiecedWindow(None, Grain())
     for start in (0.0, 12.0):
         fed(pieces, gust(rng, start, 9.0, 0.4))
-        moved = pieces.moved
+        moved = pieces.disturbance
         assert moved is not None and start + 8.5 < moved.at < start + 9.9
-        pieces.keep(moved)
+        pieces.keep_undisturbed(moved)
     fed(pieces, rest(rng, 24.0, 12.0, np.zeros(6) if off is None else off))
     return pieces
 
@@ -52,7 +52,7 @@ def test_pieces_add_up_and_the_error_of_their_mean_holds() -> None:
         pieces = in_gusts(seed)
         found = pieces.average()
         if found is not None:
-            assert len(pieces.without) == 2
+            assert len(pieces.gaps) == 2
             pulls.append((found.mean - AT_REST) / found.sigma)
     assert len(pulls) >= 15, "chance alone gives up what was before"
     spread = float(np.sqrt(np.mean(np.square(pulls))))
@@ -63,7 +63,7 @@ def test_what_is_left_out_is_between_the_pieces() -> None:
     pieces = in_gusts(3)
     found = pieces.average()
     assert found is not None
-    (first, second) = pieces.without
+    (first, second) = pieces.gaps
     assert 8.0 < first[0] < 9.4 and first[1] == pytest.approx(12.0)
     assert 20.0 < second[0] < 21.4 and second[1] == pytest.approx(24.0)
     assert found.start == 0.0 and found.end == pytest.approx(35.99)
@@ -80,7 +80,7 @@ def test_a_device_that_lies_otherwise_afterwards_begins_again(channel: int) -> N
     off[channel] = 6 * NOISE[channel] / np.sqrt(900)
     pieces = in_gusts(5, off)
     assert pieces.average() is None and pieces.dropped > 15.0
-    assert not pieces.without
+    assert not pieces.gaps
     found = pieces.average()
     assert found is not None and found.start == pytest.approx(24.0)
 
@@ -89,15 +89,15 @@ def test_what_is_too_short_to_be_judged_is_not_kept() -> None:
     rng = np.random.default_rng(1)
     pieces = PiecedWindow(None, Grain())
     fed(pieces, gust(rng, 0.0, 2.0, 2.0))
-    moved = pieces.moved
+    moved = pieces.disturbance
     if moved is None:  # so short a piece may not even show it
         fed(pieces, gust(rng, 2.8, 1.0, 2.0))
-        moved = pieces.moved
-    assert moved is not None and pieces.keep(moved) == 0.0
+        moved = pieces.disturbance
+    assert moved is not None and pieces.keep_undisturbed(moved) == 0.0
     fed(pieces, rest(rng, 10.0, 8.0, np.zeros(6)))
     found = pieces.average()
     assert found is not None and found.start == pytest.approx(10.0)
-    assert not pieces.without and pieces.dropped == 0.0
+    assert not pieces.gaps and pieces.dropped == 0.0
 
 
 def test_what_is_no_window_together_is_given_up_and_ends() -> None:
@@ -108,6 +108,6 @@ def test_what_is_no_window_together_is_given_up_and_ends() -> None:
     before = pieces.elapsed
     assert pieces.average() is None
     assert pieces.elapsed < before and pieces.elapsed == pytest.approx(12.0, abs=0.1)
-    assert not pieces.full(30.0) and pieces.full(11.0)
+    assert not pieces.is_full(30.0) and pieces.is_full(11.0)
     found = pieces.average()
     assert found is not None and found.n == pytest.approx(1200, abs=2)

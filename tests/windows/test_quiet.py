@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.quiet import QuietNoise, quiet, running
+from fieldcal.windows.quiet import QuietNoise, estimate_quiet_noise, running_means
 
 
 def test_white_noise_falls_with_the_root_of_the_duration_and_spreads_so() -> None:
@@ -25,13 +25,13 @@ def test_the_spread_sums_what_changes_at_all_longer_durations() -> None:
 @pytest.mark.parametrize(("m", "levels"), [(1, 1), (3, 1), (4, 2), (9, 3), (600, 8)])
 def test_running_means_are_means_of_neighbours(m: int, levels: int) -> None:
     values = np.random.default_rng(m).normal(size=(m, 2))
-    found = running(values)
+    found = running_means(values)
     assert len(found) == levels
     for k, u in enumerate(found):
         width = 2**k
         slow = [values[i : i + width].mean(axis=0) for i in range(m - width + 1)]
         np.testing.assert_allclose(u, slow, atol=1e-12)
-    assert len(running(values, 2)) == min(levels, 2)
+    assert len(running_means(values, 2)) == min(levels, 2)
 
 
 def slow(means: Array) -> Array:
@@ -72,7 +72,7 @@ def test_each_level_is_the_slow_one(m: int, kind: str) -> None:
         x = np.cumsum(x, axis=0)
     if kind == "falling":
         x = np.diff(x, axis=0, append=0.0)
-    found = quiet(x)
+    found = estimate_quiet_noise(x)
     assert found.cells == m
     for channel in range(3):
         np.testing.assert_allclose(
@@ -81,7 +81,9 @@ def test_each_level_is_the_slow_one(m: int, kind: str) -> None:
 
 
 def test_the_noise_of_white_cells_is_their_deviation() -> None:
-    found = quiet(0.3 * np.random.default_rng(0).standard_normal((6000, 40)))
+    found = estimate_quiet_noise(
+        0.3 * np.random.default_rng(0).standard_normal((6000, 40))
+    )
     expected = 0.3 / np.sqrt(2.0 ** np.arange(8))
     np.testing.assert_allclose(found.allan.mean(axis=1), expected, rtol=0.05)
 
@@ -91,18 +93,22 @@ def test_a_step_and_a_push_leave_the_noise_as_it_is() -> None:
     disturbed = x.copy()
     disturbed[200:] += 20
     disturbed[400:420] += 50
-    np.testing.assert_allclose(quiet(disturbed).allan[:4], quiet(x).allan[:4], rtol=0.1)
+    np.testing.assert_allclose(
+        estimate_quiet_noise(disturbed).allan[:4],
+        estimate_quiet_noise(x).allan[:4],
+        rtol=0.1,
+    )
 
 
 def test_what_never_varies_has_no_noise() -> None:
-    assert not quiet(np.full((100, 2), 3.0)).allan.any()
+    assert not estimate_quiet_noise(np.full((100, 2), 3.0)).allan.any()
 
 
 def test_windows_before_are_pooled_by_their_cells() -> None:
     x = np.random.default_rng(2).standard_normal((40, 1))
-    own = quiet(x).allan
+    own = estimate_quiet_noise(x).allan
     before = QuietNoise(0.9 * own, 120)
-    found = quiet(x, before)
+    found = estimate_quiet_noise(x, before)
     assert found.cells == 160
     expected = np.sqrt((40 * own**2 + 120 * (0.9 * own) ** 2) / 160)
     np.testing.assert_allclose(found.allan, expected)
@@ -110,9 +116,9 @@ def test_windows_before_are_pooled_by_their_cells() -> None:
 
 def test_the_noise_may_double_from_one_window_to_the_next_and_no_more() -> None:
     x = np.random.default_rng(3).standard_normal((40, 2))
-    own = quiet(x).allan
+    own = estimate_quiet_noise(x).allan
     known = np.column_stack([own[:, 0] / 10, 0 * own[:, 1]])
-    found = quiet(x, QuietNoise(known, 40)).allan
+    found = estimate_quiet_noise(x, QuietNoise(known, 40)).allan
     bounded = np.sqrt(((2 * known[:, 0]) ** 2 + known[:, 0] ** 2) / 2)
     np.testing.assert_allclose(found[:, 0], bounded)
     # of what never varied before nothing is known
@@ -122,10 +128,10 @@ def test_the_noise_may_double_from_one_window_to_the_next_and_no_more() -> None:
 @pytest.mark.parametrize("levels", [2, 8])
 def test_levels_that_only_one_of_the_windows_has_are_taken_over(levels: int) -> None:
     x = np.random.default_rng(4).standard_normal((40, 1))
-    own = quiet(x).allan
+    own = estimate_quiet_noise(x).allan
     assert len(own) == 5
     before = QuietNoise(np.full((levels, 1), 0.5), 40)
-    found = quiet(x, before).allan
+    found = estimate_quiet_noise(x, before).allan
     assert len(found) == max(5, levels)
     expected = own[2:] if levels == 2 else np.full((3, 1), 0.5)
     np.testing.assert_allclose(found[min(5, levels) :], expected)

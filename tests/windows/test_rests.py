@@ -12,7 +12,7 @@ from fieldcal.windows import rests
 
 
 def rows_of(seed: int, m: int = 150) -> Array:
-    """Rows of `summary`, in some of which values are few or missing."""
+    """Rows of `cell_rows`, in some of which values are few or missing."""
     rng = np.random.default_rng(seed)
     rows = np.zeros((m, 35))
     rows[:, 0] = np.arange(m) / 10
@@ -107,7 +107,7 @@ def test_calm_runs_go_on_from_part_to_part_up_to_the_longest(
     bound = np.full(6, 0.6)
     parts = [(k, spread[k : k + 5], level[k : k + 5]) for k in range(0, 400, 5)]
     calm = (spread < bound).all(axis=1)
-    found = list(rests._calm(parts, bound))
+    found = list(rests._calm_runs(parts, bound))
     covered = np.zeros(400, dtype=bool)
     for first, s, x in found:
         rows = slice(first, first + len(s))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Stillness
-from fieldcal.windows.cells import Cells
+from fieldcal.windows.cells import CellAccumulator
 
 BIAS = np.array([0.01, -0.02, 0.005])
 
@@ -148,7 +148,7 @@ def test_channels_that_are_not_measured_do_not_matter() -> None:
 
 def slow(block: Block) -> list[tuple[float, float | None]]:
     """(1) to (4) cell by cell: what is allowed of it, and since when it rests."""
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     table, noises, looks = cells.table, [], []
     rest, since, even = None, None, 0

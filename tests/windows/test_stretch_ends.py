@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.windows.cells import Cells
-from fieldcal.windows.stretch_ends import reasons
-from fieldcal.windows.stretches import still_stretches, summary, why_none
+from fieldcal.windows.cells import CellAccumulator
+from fieldcal.windows.stretch_ends import stretch_end_reasons
+from fieldcal.windows.stretches import cell_rows, explain_no_stretch, still_stretches
 
 RATE = 50.0
 
@@ -41,10 +41,10 @@ def test_what_ends_a_stretch_is_said(change: str, ended: str) -> None:
     block = recorded(change)
     spans = still_stretches(block)
     assert len(spans) == 2
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     table = cells.table
-    (first, second) = reasons(summary(table), table.origin, spans)
+    (first, second) = stretch_end_reasons(cell_rows(table), table.origin, spans)
     assert first[0] == "the recording begins" and second[1] == "the recording ends"
     assert ended in first[1] and ended in second[0]
 
@@ -65,9 +65,9 @@ def turned_slowly(rate: float) -> Block:
 )  # fmt: skip
 def test_why_there_is_none_is_said(block: Block, says: str) -> None:
     assert not still_stretches(block)
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
-    assert says in why_none(summary(cells.table), cells.table.origin)
+    assert says in explain_no_stretch(cell_rows(cells.table), cells.table.origin)
 
 
 def test_a_coarse_output_that_flips_rests() -> None:

@@ -15,7 +15,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.session.folder import Session
 from fieldcal.windows import average, still_stretches, stretches
 from fieldcal.windows import rests as rest_module
-from fieldcal.windows.cells import Cells
+from fieldcal.windows.cells import CellAccumulator
 
 
 def recording(
@@ -181,9 +181,9 @@ def test_a_recording_that_is_looked_at_in_parts_gives_the_same(
 
 
 def test_samples_are_asked_for_where_sums_do_not_do(long: Block) -> None:
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(long)
-    rows = stretches.summary(cells.table)
+    rows = stretches.cell_rows(cells.table)
     assert rows.shape == (len(cells.table), 35)
     np.testing.assert_array_equal(rows[:, 0], cells.table.times)
     asked = []
@@ -220,7 +220,7 @@ def test_a_push_cuts_a_rest_in_two() -> None:
 
 def asking(block: Block, shortest: float) -> tuple[list[tuple[float, float]], int]:
     """Stretches, and how often the samples themselves were asked for."""
-    cells, asked = Cells(), []
+    cells, asked = CellAccumulator(), []
     cells.add(block)
 
     def between(start: float, end: float) -> list[Block]:
@@ -228,7 +228,7 @@ def asking(block: Block, shortest: float) -> tuple[list[tuple[float, float]], in
         part = block.between(start, end)
         return [part[:0], part[:7], part[7:7], part[7:], part[:0]]
 
-    rows = stretches.summary(cells.table)
+    rows = stretches.cell_rows(cells.table)
     found = stretches.still_stretches_of_file(
         rows, cells.table.origin, between, shortest
     )

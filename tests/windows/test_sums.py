@@ -41,14 +41,14 @@ def looped(x: Array, step: Array) -> Array:
 def test_sums_of_samples_that_are_all_there() -> None:
     x, step = samples(0)
     for whole in (True, False):
-        found = sums.channels(x, step, FIRST, whole)
+        found = sums.channel_sums(x, step, FIRST, whole)
         np.testing.assert_allclose(found, looped(x, step), atol=1e-12)
 
 
 @given(st.integers(0, 99), st.lists(st.integers(0, 77), min_size=1, max_size=20))
 def test_a_missing_value_enters_no_sum(seed: int, missing: list[int]) -> None:
     x, step = samples(seed, tuple(missing))
-    found = sums.channels(x, step, FIRST, False)
+    found = sums.channel_sums(x, step, FIRST, False)
     np.testing.assert_allclose(found, looped(x, step), atol=1e-12)
 
 
@@ -57,7 +57,7 @@ def test_a_sensor_that_is_not_there_leaves_the_other_as_it_is(sensor: slice) -> 
     x, _ = samples(1)
     x[sensor] = np.nan
     step = np.diff(x, axis=1, prepend=0.0)
-    found = sums.channels(x, step, FIRST, False)
+    found = sums.channel_sums(x, step, FIRST, False)
     assert not found[..., sensor].any()
     np.testing.assert_allclose(found, looped(x, step), atol=1e-12)
 
@@ -66,14 +66,14 @@ def test_the_finest_change_is_the_smallest_that_is_one() -> None:
     step = np.zeros((2, N))
     step[0] = [0, -0.5, 2, 0, 0, 0.25, 0.5, -0.125, 0, 0, 0, np.nan]
     step[1] = np.arange(1, N + 1)
-    found = sums.finest(step, FIRST)
+    found = sums.smallest_changes(step, FIRST)
     np.testing.assert_array_equal(found[:, 0], [0.5, np.inf, 0.125, np.inf])
     np.testing.assert_array_equal(found[:, 1], [1, 4, 5, 10])
 
 
 def test_temperatures_are_summed_where_they_are_known() -> None:
     warm = np.array([20.0, np.nan, 22, 21, np.nan, 1, 2, 3, np.inf, np.nan, 5, 6])
-    found = sums.warmth(warm, FIRST)
+    found = sums.temperature_sums(warm, FIRST)
     np.testing.assert_array_equal(found, [[42, 2], [21, 1], [6, 3], [11, 2]])
-    unknown = sums.warmth(np.full(N, np.nan), FIRST)
+    unknown = sums.temperature_sums(np.full(N, np.nan), FIRST)
     np.testing.assert_array_equal(unknown, np.zeros((4, 2)))

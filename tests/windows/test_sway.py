@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Stillness
-from fieldcal.windows.sway import waves_of
-from fieldcal.windows.sway_process import needed
-from fieldcal.windows.sway_waves import Waves
+from fieldcal.windows.sway import find_sway
+from fieldcal.windows.sway_process import needed_seconds
+from fieldcal.windows.sway_waves import SwayWaves
 
 G, RATE = 9.81, 50.0
 NOISE = np.repeat([5e-3, 1e-3], 3)
@@ -52,11 +52,13 @@ def swayed(
 
 def at_rest(t: Array, six: Array) -> tuple[Array, Array]:
     """Mean without the swaying, and its standard deviation."""
-    found = waves_of(t, six, PLAIN)
+    found = find_sway(t, six, PLAIN)
     assert found
     parts = np.array_split(np.arange(len(t)), len(found))
-    rest = np.vstack([six[p] - w.of(t[p]) for p, w in zip(parts, found, strict=True)])
-    left = sum(w.left for w in found) / len(found) ** 2
+    rest = np.vstack(
+        [six[p] - w.outputs(t[p]) for p, w in zip(parts, found, strict=True)]
+    )
+    left = sum(w.excess_variance for w in found) / len(found) ** 2
     return rest.mean(axis=0), np.sqrt(NOISE**2 / len(t) + left)
 
 
@@ -96,11 +98,13 @@ def test_accelerometers_alone_show_it_as_well(hz: tuple[float, ...]) -> None:
         sigma.append(sd[:3])
     assert 0.75 < np.sqrt(((np.array(off) / sigma) ** 2).mean()) < 1.25
     assert (np.sqrt((np.array(off) ** 2).mean(axis=0)) < 1.5 * white).all()
-    (found,) = waves_of(t, six, PLAIN)
+    (found,) = find_sway(t, six, PLAIN)
     turned = 0.5 * np.deg2rad(1.0) ** 2  # <phi^2> of two axes
-    assert found.size[0] == pytest.approx(turned, rel=0.25)
+    assert found.mean_squares[0] == pytest.approx(turned, rel=0.25)
     pulse = 2 * np.pi * np.array(hz)
-    assert found.size[1] / found.size[0] == pytest.approx(np.mean(pulse**2), rel=0.1)
+    assert found.mean_squares[1] / found.mean_squares[0] == pytest.approx(
+        np.mean(pulse**2), rel=0.1
+    )
 
 
 def test_what_is_left_does_not_drift() -> None:
@@ -108,54 +112,54 @@ def test_what_is_left_does_not_drift() -> None:
     rng, tilt = np.random.default_rng(4), []
     for _ in range(4):
         t, six = swayed(rng, (0.085, 0.095, 0.1, 0.105, 0.115))
-        (found,) = waves_of(t, six, PLAIN)
+        (found,) = find_sway(t, six, PLAIN)
         s = (t - t.mean()) / np.ptp(t) * 2
-        tilt.append((six - found.of(t)).T @ s / (s @ s))
+        tilt.append((six - found.outputs(t)).T @ s / (s @ s))
     assert np.sqrt((np.array(tilt) ** 2).mean(axis=0)).max() < 6e-4
 
 
 def test_less_than_a_period_tells_no_frequency() -> None:
     rng = np.random.default_rng(6)
-    assert waves_of(*swayed(rng, (0.1,), seconds=9.0), PLAIN) == []
-    assert len(waves_of(*swayed(rng, (0.1,), seconds=16.0), PLAIN)) == 1
+    assert find_sway(*swayed(rng, (0.1,), seconds=9.0), PLAIN) == []
+    assert len(find_sway(*swayed(rng, (0.1,), seconds=16.0), PLAIN)) == 1
 
 
 def test_an_arm_pulls_outward() -> None:
     """Three metres from the turning centre the mean of w x (w x r) is 5e-3 m/s^2."""
     rng, arm = np.random.default_rng(3), np.array([0.0, 3.0, 0.0])
     t, six = swayed(rng, (0.5,), arm=arm)
-    found = waves_of(t, six, PLAIN)
+    found = find_sway(t, six, PLAIN)
     assert found[0].arm[1] == pytest.approx(3.0, abs=0.1)
     assert np.abs(at_rest(t, six)[0] - REST)[:3].max() < 4e-4
 
 
 def test_a_minute_is_cut_and_a_base_at_rest_is_none() -> None:
     rng = np.random.default_rng(5)
-    assert len(waves_of(*swayed(rng, (0.2,), seconds=70.0), PLAIN)) == 2
-    assert waves_of(*swayed(rng, (0.2,), degrees=0.0), PLAIN) == []
+    assert len(find_sway(*swayed(rng, (0.2,), seconds=70.0), PLAIN)) == 2
+    assert find_sway(*swayed(rng, (0.2,), degrees=0.0), PLAIN) == []
 
 
 def test_what_pushes_and_does_not_turn_is_no_sway() -> None:
     """Gyroscopes that show a turning which accelerometers deny."""
     t, six = swayed(np.random.default_rng(5), (0.2,), degrees=0.0)
     six[:, 3] += 0.02 * np.sin(2 * np.pi * 0.08 * t)
-    assert waves_of(t, six, PLAIN) == []
+    assert find_sway(t, six, PLAIN) == []
 
 
 def test_missing_samples_and_short_windows() -> None:
     t, six = swayed(np.random.default_rng(9), (0.3,))
     six[100:130, 2] = np.nan
-    found = waves_of(t, six, PLAIN)
-    rest = np.nanmean(six - found[0].of(t), axis=0)
+    found = find_sway(t, six, PLAIN)
+    rest = np.nanmean(six - found[0].outputs(t), axis=0)
     assert np.abs((rest - REST) / NOISE * np.sqrt(len(t))).max() < 4
-    assert waves_of(t[:20], six[:20], PLAIN) == []
+    assert find_sway(t[:20], six[:20], PLAIN) == []
 
 
 def test_slow_and_irregular_swaying_needs_longer_windows() -> None:
     def seconds(*hz: float) -> float:
         wide = np.full((len(hz), 6), 0.1)
-        return needed(
-            Waves(
+        return needed_seconds(
+            SwayWaves(
                 np.array(hz), 0.0, wide, wide, REST[:3], np.zeros(3), np.zeros(6),
                 NOISE**2 / 5, 0.1, (0.0, 30.0), PLAIN,
             )
@@ -185,4 +189,4 @@ def test_times_in_another_unit_take_no_memory(unit: float) -> None:
     """A window of 20 s would be cut into hundreds of millions of minutes."""
     t = np.arange(2000) / 100.0
     six = np.random.default_rng(1).normal(0.0, 1e-3, (2000, 6)) + [0, 0, 9.8, 0, 0, 0]
-    assert waves_of(t * unit, six, np.ones(3)) == []
+    assert find_sway(t * unit, six, np.ones(3)) == []

@@ -7,26 +7,26 @@ import pytest
 from scipy.stats import theilslopes
 
 from fieldcal.core.samples import Array
-from fieldcal.windows.trend import drift, lines
+from fieldcal.windows.trend import drift_course, robust_lines
 
 
 @pytest.mark.parametrize("m", [24, 25, 100, 600])
 def test_a_straight_line_is_itself(m: int) -> None:
     values = np.arange(m)[:, None] * [0.5, -2.0, 0.0] + [3.0, 0.0, 1.0]
-    np.testing.assert_allclose(lines(values), values, atol=1e-9)
+    np.testing.assert_allclose(robust_lines(values), values, atol=1e-9)
 
 
 @pytest.mark.parametrize("m", [1, 7, 23])
 def test_of_few_values_it_is_their_median(m: int) -> None:
     values = np.random.default_rng(m).normal(size=(m, 2)) + np.arange(m)[:, None]
     expected = np.broadcast_to(np.median(values, axis=0), (m, 2))
-    np.testing.assert_array_equal(lines(values), expected)
+    np.testing.assert_array_equal(robust_lines(values), expected)
 
 
 @pytest.mark.parametrize("m", [120, 131])
 def test_it_is_that_of_theil_through_twelve_medians(m: int) -> None:
     values = np.random.default_rng(m).normal(size=(m, 2)) + np.arange(m)[:, None] / 30
-    found = lines(values)
+    found = robust_lines(values)
     assert found.shape == (m, 2)
     size = m // 12
     for channel in range(2):
@@ -42,7 +42,7 @@ def test_a_disturbance_of_a_sixth_does_not_turn_it(at: int) -> None:
     truth = np.arange(120)[:, None] * [0.01, -0.02]
     values = truth.copy()
     values[at : at + 20] += 7.0
-    np.testing.assert_allclose(lines(values), truth, atol=1e-9)
+    np.testing.assert_allclose(robust_lines(values), truth, atol=1e-9)
 
 
 @pytest.mark.parametrize("noise", [0.4, 0.6, 0.9])
@@ -50,18 +50,21 @@ def test_of_rounded_values_it_is_no_step_of_theirs(noise: float) -> None:
     drawn = np.random.default_rng(6).normal(size=(1200, 40))
     middles = np.linspace(-0.5, 0.5, 40)
     values = np.round(middles + noise * drawn)
-    off, plain = lines(values, np.ones(40)) - middles, lines(values) - middles
+    off, plain = (
+        robust_lines(values, np.ones(40)) - middles,
+        robust_lines(values) - middles,
+    )
     assert off.std() < 0.12 and off.std() < 0.5 * plain.std()
     # a slope is as that of values which are not rounded
     rising = np.arange(1200)[:, None] * 0.002
-    found = lines(np.round(rising + middles + noise * drawn), np.ones(40))
+    found = robust_lines(np.round(rising + middles + noise * drawn), np.ones(40))
     assert (found - rising - middles).std() < 0.12
 
 
 def test_of_fine_values_the_step_says_nothing() -> None:
     values = np.random.default_rng(7).normal(size=(240, 3))
-    fine = lines(values, np.full(3, 1e-9))
-    np.testing.assert_allclose(fine, lines(values), atol=1e-8)
+    fine = robust_lines(values, np.full(3, 1e-9))
+    np.testing.assert_allclose(fine, robust_lines(values), atol=1e-8)
 
 
 def test_what_settles_over_hours_is_near_its_lines() -> None:
@@ -69,14 +72,14 @@ def test_what_settles_over_hours_is_near_its_lines() -> None:
     for tau in (300.0, 1200.0, 4000.0):
         course = np.exp(-t / tau)[:, None]
         straight = np.polyfit(t, course[:, 0], 1)
-        assert np.abs(lines(course) - course).max() < 0.02
+        assert np.abs(robust_lines(course) - course).max() < 0.02
         assert np.abs(np.polyval(straight, t) - course[:, 0]).max() > 0.1
 
 
 def test_each_section_has_the_line_of_its_own_values() -> None:
     values = np.random.default_rng(8).normal(size=(3600, 2))
-    parts = [lines(values[a : a + 1200]) for a in (0, 1200, 2400)]
-    np.testing.assert_array_equal(lines(values), np.concatenate(parts))
+    parts = [robust_lines(values[a : a + 1200]) for a in (0, 1200, 2400)]
+    np.testing.assert_array_equal(robust_lines(values), np.concatenate(parts))
 
 
 def about_two_means(y: Array) -> float:
@@ -91,8 +94,8 @@ def test_a_drift_is_what_a_line_describes_better_than_a_step(seed: int) -> None:
     values = rng.normal(size=(240, 20))
     values += rng.uniform(0, 3, 20) * (np.arange(240)[:, None] - 119.5) / 240
     values += rng.uniform(0, 3, 20) * (np.arange(240)[:, None] > rng.integers(240))
-    laid = lines(values)
-    found, drifts = drift(values, laid), 0
+    laid = robust_lines(values)
+    found, drifts = drift_course(values, laid), 0
     for y, line, course in zip(values.T, laid.T, found.T, strict=True):
         slope = (line[-1] - line[0]) / 239
         better = ((y - line) ** 2).sum() < about_two_means(y)
@@ -105,5 +108,5 @@ def test_a_step_between_two_sections_is_no_drift() -> None:
     values = np.random.default_rng(9).normal(size=(2400, 1))
     values += 1e-2 * np.arange(2400)[:, None]
     values[1200:] -= 20.0
-    course = drift(values, lines(values))
+    course = drift_course(values, robust_lines(values))
     np.testing.assert_allclose(np.diff(course[:, 0]), 1e-2, atol=2e-4)

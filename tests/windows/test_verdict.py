@@ -7,18 +7,18 @@ import pytest
 
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import StillnessLimits, average
-from fieldcal.windows.cells import Cells, CellTable
-from fieldcal.windows.disturbance import Least, pushes, shakes, steps
-from fieldcal.windows.quiet import QuietNoise, quiet
-from fieldcal.windows.trend import drift, lines
-from fieldcal.windows.verdict import Departure, Verdict, judge
+from fieldcal.windows.cells import CellAccumulator, CellTable
+from fieldcal.windows.disturbance import LeastSpread, pushes, shakes, steps
+from fieldcal.windows.quiet import QuietNoise, estimate_quiet_noise
+from fieldcal.windows.trend import drift_course, robust_lines
+from fieldcal.windows.verdict import Departure, WindowVerdict, judge_window
 from windows.signals import HOME, UNIT, block_of, white
 
 LIMITS = StillnessLimits()
 
 
 def table(block: Block) -> CellTable:
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     return cells.table
 
@@ -27,16 +27,18 @@ def rest(n: int = 3000, seed: int = 0) -> Array:
     return white(np.random.default_rng(seed), n)
 
 
-def verdict(noise: Array, rate: float = 100.0) -> Verdict:
-    return judge(table(block_of(noise, rate, start=100.0)), LIMITS)
+def verdict(noise: Array, rate: float = 100.0) -> WindowVerdict:
+    return judge_window(table(block_of(noise, rate, start=100.0)), LIMITS)
 
 
 def test_rest_is_below_what_is_allowed_and_hands_on_its_noise() -> None:
     found = verdict(rest())
-    assert 0 < found.worst.ratio < 1 and 0 < found.present < 1
+    assert 0 < found.worst.ratio < 1 and 0 < found.ratio_now < 1
     assert found.quiet is not None and found.quiet.cells == 300
     cells = table(block_of(rest(), start=100.0))
-    np.testing.assert_allclose(found.quiet.allan, quiet(cells.means).allan)
+    np.testing.assert_allclose(
+        found.quiet.allan, estimate_quiet_noise(cells.means).allan
+    )
 
 
 @pytest.mark.parametrize("channel", [0, 4])
@@ -81,8 +83,8 @@ def test_a_drift_is_told_by_its_change_over_the_window() -> None:
     assert worst.seconds == pytest.approx(30.0)
     # a change is allowed for by the limit and by what the noise can pretend
     cells = table(block_of(x, start=100.0))
-    longest = quiet(cells.means).allan[-1, 1]
-    laid = lines(cells.means)[:, 1]
+    longest = estimate_quiet_noise(cells.means).allan[-1, 1]
+    laid = robust_lines(cells.means)[:, 1]
     assert worst.size == pytest.approx(laid[-1] - laid[0], rel=1e-9)
     assert worst.noise == pytest.approx(longest)
     assert worst.ratio == pytest.approx(worst.size / (0.1 + 5.8 * longest))
@@ -110,14 +112,14 @@ def test_what_no_device_at_rest_does_is_told_by_the_limit() -> None:
     assert worst.noise == LIMITS.acc and worst.size > 2.0 / np.sqrt(2)
     assert worst.ratio == pytest.approx(worst.size / LIMITS.acc)
     cells = table(block_of(x, start=100.0))
-    assert worst.size == pytest.approx(quiet(cells.means).spread[0, 0])
+    assert worst.size == pytest.approx(estimate_quiet_noise(cells.means).spread[0, 0])
     assert worst.at == cells.times[np.argmax(abs(cells.means[:, 0]))]
 
 
 def test_a_stuck_channel_is_told_with_its_run() -> None:
     block = block_of(rest(), start=100.0)
     block.acc[1800:2600, 0] = block.acc[1800, 0]
-    found = judge(table(block), LIMITS)
+    found = judge_window(table(block), LIMITS)
     worst = found.worst
     assert (worst.kind, worst.channel, worst.size) == ("stuck", 0, 0.0)
     assert worst.ratio == np.inf and worst.noise == pytest.approx(UNIT[0], rel=0.2)
@@ -127,7 +129,7 @@ def test_a_stuck_channel_is_told_with_its_run() -> None:
 def test_a_channel_that_is_dead_beside_noisy_ones_is_stuck() -> None:
     block = block_of(rest(), start=100.0)
     block.gyr[:, 1] = 0.25
-    worst = judge(table(block), LIMITS).worst
+    worst = judge_window(table(block), LIMITS).worst
     assert (worst.kind, worst.channel) == ("stuck", 4)
 
 
@@ -135,7 +137,7 @@ def test_a_device_coarser_than_its_noise_is_not_stuck() -> None:
     block = block_of(rest(), start=100.0)
     block.acc[:] = np.round(block.acc)
     block.gyr[:] = 0.0
-    assert judge(table(block), LIMITS).worst.ratio < 1
+    assert judge_window(table(block), LIMITS).worst.ratio < 1
 
 
 @pytest.mark.parametrize("noise", [0.25, 0.4, 0.55, 0.8])
@@ -163,19 +165,19 @@ def allowed(cells: float) -> float:
 @pytest.mark.parametrize("n", [300, 800, 3000])
 def test_the_ratio_is_the_largest_departure_over_what_is_allowed(n: int) -> None:
     cells = table(block_of(rest(n, seed=n), start=100.0))
-    found = judge(cells, LIMITS)
-    noise, means = quiet(cells.means), cells.means
-    least = Least(np.zeros(6), np.zeros(6), np.ones(6))
+    found = judge_window(cells, LIMITS)
+    noise, means = estimate_quiet_noise(cells.means), cells.means
+    least = LeastSpread(np.zeros(6), np.zeros(6), np.ones(6))
     tests = [
-        *pushes(means - lines(means), noise, least),
-        *steps(means - drift(means, lines(means)), noise, least),
-        *shakes(cells.short, cells.steps, least),
+        *pushes(means - robust_lines(means), noise, least),
+        *steps(means - drift_course(means, robust_lines(means)), noise, least),
+        *shakes(cells.short_lag_variance, cells.step_counts, least),
     ]
     bound = allowed(len(cells))
     largest = max(test.z.max() for test in tests) / bound
     recent = max(test.z[-10:].max() for test in tests if test.cells < 10) / bound
     assert found.worst.ratio == pytest.approx(largest)
-    assert found.present == pytest.approx(recent)
+    assert found.ratio_now == pytest.approx(recent)
 
 
 def test_windows_before_sharpen_the_judgement() -> None:
@@ -183,7 +185,7 @@ def test_windows_before_sharpen_the_judgement() -> None:
     x = rest(400, seed=2)
     x[200:250, 1] += 4.0
     cells = table(block_of(x))
-    alone, after = judge(cells, LIMITS), judge(cells, LIMITS, first.quiet)
+    alone, after = judge_window(cells, LIMITS), judge_window(cells, LIMITS, first.quiet)
     assert alone.worst.ratio < 1 < after.worst.ratio
     assert after.quiet is not None and after.quiet.cells == 640
 
@@ -192,7 +194,7 @@ def test_the_last_cell_does_not_count_while_it_fills() -> None:
     x = rest(3003)
     x[3000:] += 50.0
     found = verdict(x)
-    assert found.worst.ratio < 1 and found.present < 1
+    assert found.worst.ratio < 1 and found.ratio_now < 1
     assert found.quiet is not None and found.quiet.cells == 300
 
 
@@ -200,19 +202,19 @@ def test_the_last_cell_does_not_count_while_it_fills() -> None:
 def test_three_seconds_are_judged_by_their_own_noise(n: int, judged: bool) -> None:
     before = QuietNoise(np.ones((3, 6)), 30)
     cells = table(block_of(rest(n), start=100.0))
-    found = judge(cells, LIMITS, before)
-    assert (found.present > 0) == judged
+    found = judge_window(cells, LIMITS, before)
+    assert (found.ratio_now > 0) == judged
     assert (found.quiet is not before) == judged
     if not judged:
         scatter = cells.means.std(axis=0) / LIMITS.noise
-        assert found.worst.kind == "noise" and found.present == 0.0
+        assert found.worst.kind == "noise" and found.ratio_now == 0.0
         assert found.worst.ratio == pytest.approx(scatter.max())
         assert found.worst.channel == np.argmax(scatter)
 
 
 def test_of_nothing_nothing_is_said() -> None:
-    found = judge(Cells().table, LIMITS)
-    assert (found.worst.ratio, found.present, found.quiet) == (0.0, 0.0, None)
+    found = judge_window(CellAccumulator().table, LIMITS)
+    assert (found.worst.ratio, found.ratio_now, found.quiet) == (0.0, 0.0, None)
     assert np.isnan(found.worst.at)
 
 
@@ -222,18 +224,23 @@ def test_jumps_that_come_of_rounding_are_no_disturbance() -> None:
     block.acc[2000:2001, 1] += 1e-4
     told = np.repeat([0.03, 0.0], 3)
     cells = table(block)
-    alone, with_steps = judge(cells, LIMITS), judge(cells, LIMITS, None, told)
+    alone, with_steps = (
+        judge_window(cells, LIMITS),
+        judge_window(cells, LIMITS, None, told),
+    )
     assert alone.worst.ratio > 1 > with_steps.worst.ratio
     # jumps that the values show themselves are allowed for without being told
     coarse = block_of(rest(), start=100.0)
     coarse.acc[:] = HOME[:3]
     coarse.acc[1500:1530, 1] += 0.3
     for told_or_not in (None, np.zeros(6)):
-        assert judge(table(coarse), LIMITS, None, told_or_not).worst.ratio <= 1.01
+        assert (
+            judge_window(table(coarse), LIMITS, None, told_or_not).worst.ratio <= 1.01
+        )
 
 
 def said(departure: Departure) -> str:
-    moved = departure.error(100.0)
+    moved = departure.as_error(100.0)
     assert moved.at == departure.at
     assert moved.axis == ["ax", "ay", "az", "gx", "gy", "gz"][departure.channel]
     return str(moved)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import CHANNELS, Array, Block, Grain, concat
 from fieldcal.windows import Average, StillnessLimits, Window, average
-from fieldcal.windows.cells import Cells
-from fieldcal.windows.grain import variance
+from fieldcal.windows.cells import CellAccumulator
+from fieldcal.windows.grain import rounding_variance
 from fieldcal.windows.longrun import error_of_mean
 from windows.signals import HOME, UNIT, block_of, flicker, low_passed, markov, white
 
@@ -159,9 +159,9 @@ def test_how_samples_are_cut_into_blocks_does_not_matter(
     whole = Window()
     whole.add(block)
     np.testing.assert_allclose(window.sigma, whole.sigma, rtol=1e-7)
-    assert window.motion == pytest.approx(whole.motion, rel=1e-6)
-    assert window.meter == pytest.approx(whole.meter, rel=1e-6)
-    if window.moved is None:
+    assert window.largest_motion == pytest.approx(whole.largest_motion, rel=1e-6)
+    assert window.motion_now == pytest.approx(whole.motion_now, rel=1e-6)
+    if window.disturbance is None:
         assert same(window.average(), average(block))
 
 
@@ -216,24 +216,24 @@ def test_the_noise_of_one_window_sharpens_the_next() -> None:
     alone, after = Window(), Window(noise=first.noise)
     for window in (alone, after):
         window.add(block_of(x))
-    assert alone.moved is None
-    assert after.moved and after.moved.axis == "ay"
+    assert alone.disturbance is None
+    assert after.disturbance and after.disturbance.axis == "ay"
 
 
 def test_averaging_stops_when_it_is_good_enough_or_useless() -> None:
     rng = np.random.default_rng(9)
     window = Window()
     window.add(block_of(white(rng, 3000)))
-    assert window.done() is None and window.done(5e-4) is None
-    assert "0.002 m/s² was wanted" in (window.done(2e-3) or "")
+    assert window.reason_to_stop() is None and window.reason_to_stop(5e-4) is None
+    assert "0.002 m/s² was wanted" in (window.reason_to_stop(2e-3) or "")
     wandering = Window()
     wandering.add(block_of(flicker(5.0)(rng, 6000)))
-    assert "the bias wanders" in (wandering.done(1e-9) or "")
+    assert "the bias wanders" in (wandering.reason_to_stop(1e-9) or "")
     stopped = 0
     for seed in range(40):
         long = Window()
         long.add(block_of(white(np.random.default_rng(seed), 3000)))
-        stopped += long.done(1e-9) is not None
+        stopped += long.reason_to_stop(1e-9) is not None
     assert stopped <= 1
 
 
@@ -241,16 +241,20 @@ def test_a_window_shows_how_it_goes() -> None:
     block = block_of(white(np.random.default_rng(10), 3000), start=50.0)
     block.acc[2900:2930, 0] += 0.5
     window = Window()
-    assert (window.n, window.elapsed, window.motion) == (0, 0.0, 0.0)
-    assert np.isnan(window.mean).all() and window.done(1.0) is None
+    assert (window.n, window.elapsed, window.largest_motion) == (0, 0.0, 0.0)
+    assert np.isnan(window.mean).all() and window.reason_to_stop(1.0) is None
     window.add(block[:20])
     assert np.isnan(window.sigma).all()
     window.add(block[20:2850])
-    assert window.moved is None and window.meter < 1 and window.motion < 1
+    assert (
+        window.disturbance is None
+        and window.motion_now < 1
+        and window.largest_motion < 1
+    )
     assert window.elapsed == pytest.approx(28.49)
     np.testing.assert_allclose(window.mean, block.six[:2850].mean(axis=0), rtol=1e-12)
     window.add(block[2850:2940])
-    assert window.meter > 1 and window.motion > 1 and window.moved
+    assert window.motion_now > 1 and window.largest_motion > 1 and window.disturbance
     with pytest.raises(Moved, match="on ax"):
         window.average()
 
@@ -293,11 +297,11 @@ def filled(block: Block, **known: Any) -> Window:
 
 def parts_of(block: Block) -> tuple[Array, Array, Array]:
     """Covariance by axes, along the force, and the direction of it."""
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     n = np.nan_to_num(cells.table.mean) * [1, 1, 1, 0, 0, 0]
     n /= np.linalg.norm(n)
-    steady = cells.table.steady
+    steady = cells.table.steady_means
     plain = error_of_mean(steady, cells.table.spacing).covariance
     along = error_of_mean((steady @ n)[:, None], cells.table.spacing).covariance
     return plain, along, n
@@ -321,19 +325,19 @@ def test_the_mean_along_the_force_has_the_error_of_its_own_spectrum() -> None:
 def test_a_device_without_a_force_has_the_covariance_of_its_axes() -> None:
     block = block_of(white(np.random.default_rng(12), 3000))
     gyr = Block.of(block.t, np.full_like(block.acc, np.nan), block.gyr)
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(gyr)
-    plain = error_of_mean(cells.table.steady, cells.table.spacing).covariance
+    plain = error_of_mean(cells.table.steady_means, cells.table.spacing).covariance
     window = filled(gyr)
     np.testing.assert_allclose(window.covariance[3:, 3:], plain[3:, 3:], rtol=1e-6)
-    assert np.isnan(window.sigma[:3]).all() and window.moved is None
+    assert np.isnan(window.sigma[:3]).all() and window.disturbance is None
     assert np.isnan(window.mean[:3]).all()
 
 
 def test_samples_that_are_missing_widen_the_error_by_their_share() -> None:
     block = block_of(white(np.random.default_rng(13), 3000))
     block.gyr[block.t % 0.4 > 0.195, 1] = np.nan
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     share = np.isfinite(cells.table.means[:, 4]).mean()
     assert 0.4 < share < 0.6
@@ -349,11 +353,11 @@ def test_rounding_is_added_to_the_variance_of_each_axis() -> None:
     step = np.array([0.02, 0.02, 0.02, 0.004, 0.004, 0.004])
     six = np.round((HOME + 0.1 * step * white(rng, 3000)) / step) * step
     block = Block.of(np.arange(3000) / 100, six[:, :3], six[:, 3:])
-    cells = Cells()
+    cells = CellAccumulator()
     cells.add(block)
     noise = np.nan_to_num(cells.table.noise)
     for grain in (None, Grain(0.02, 0.004), Grain(0.02, 0.004, cut=True)):
-        added = variance(grain or Grain(), cells.table.mean, noise, step)
+        added = rounding_variance(grain or Grain(), cells.table.mean, noise, step)
         window = filled(block, grain=grain)
         plain, _, _ = parts_of(block)
         found = np.diag(window.covariance) - added
@@ -365,15 +369,15 @@ def test_jumps_that_the_device_announces_are_no_motion() -> None:
     x = white(np.random.default_rng(15), 3000)
     block = block_of(0.001 * x)
     block.acc[1500:1530, 0] += 0.05
-    assert filled(block).moved
-    assert filled(block, grain=Grain(0.1, 0.1)).moved is None
+    assert filled(block).disturbance
+    assert filled(block, grain=Grain(0.1, 0.1)).disturbance is None
     assert average(block, grain=Grain(0.1, 0.1)).n == 3000
     # of what is cut toward zero, a jump across zero is twice as wide
     block.acc[1500:1530, 0] += 0.1
-    assert filled(block, grain=Grain(0.1, 0.1)).moved
-    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).moved is None
+    assert filled(block, grain=Grain(0.1, 0.1)).disturbance
+    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).disturbance is None
     block.acc[:, 0] += 5.0
-    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).moved
+    assert filled(block, grain=Grain(0.1, 0.1, cut=True)).disturbance
 
 
 def test_what_a_window_taught_is_the_noise_and_its_shape() -> None:
@@ -381,14 +385,18 @@ def test_what_a_window_taught_is_the_noise_and_its_shape() -> None:
     first = filled(block_of(flicker(2.0)(rng, 6000)))
     learned = first.noise
     assert learned and learned.quiet and learned.quiet.cells == 600
-    assert learned.spectrum.quiet is None
-    np.testing.assert_array_equal(learned.spectrum.seen, learned.seen)
-    assert learned.seen.shape[1] == 7 and learned.seen.max() == 0
+    assert learned.without_wander.quiet is None
+    np.testing.assert_array_equal(
+        learned.without_wander.shape_likelihood, learned.shape_likelihood
+    )
+    assert (
+        learned.shape_likelihood.shape[1] == 7 and learned.shape_likelihood.max() == 0
+    )
     # the shape is learnt on: it makes the error of a short window a longer one's
     block = block_of(flicker(2.0)(rng, 1000))
-    alone, after = filled(block), filled(block, noise=learned.spectrum)
+    alone, after = filled(block), filled(block, noise=learned.without_wander)
     assert (np.abs(after.sigma / alone.sigma - 1) > 0.02).sum() >= 4
-    assert after.motion == pytest.approx(alone.motion)
+    assert after.largest_motion == pytest.approx(alone.largest_motion)
     assert after.noise and after.noise.quiet and after.noise.quiet.cells == 100
     both = filled(block, noise=learned)
     assert both.noise and both.noise.quiet and both.noise.quiet.cells == 700
@@ -407,7 +415,7 @@ def test_a_window_too_short_to_teach_hands_on_what_was_known() -> None:
 
 def test_limits_are_those_that_are_given() -> None:
     block = block_of(white(np.random.default_rng(18), 3000))
-    assert filled(block, limits=StillnessLimits(gyr=1e-4)).moved
+    assert filled(block, limits=StillnessLimits(gyr=1e-4)).disturbance
     with pytest.raises(Moved, match="no device at rest"):
         average(block, StillnessLimits(gyr=1e-4))
 
@@ -415,14 +423,17 @@ def test_limits_are_those_that_are_given() -> None:
 def test_it_is_told_why_averaging_can_stop() -> None:
     window = filled(block_of(white(np.random.default_rng(9), 3000)))
     reached = window.sigma[:3].max()
-    assert window.done(reached) == (
+    assert window.reason_to_stop(reached) == (
         f"each accelerometer mean is known to {reached:.2g} m/s², "
         f"{reached:.2g} m/s² was wanted"
     )
-    assert window.done(0.999 * reached) is None and window.done() is None
+    assert (
+        window.reason_to_stop(0.999 * reached) is None
+        and window.reason_to_stop() is None
+    )
     wandering = filled(block_of(flicker(20.0)(np.random.default_rng(9), 3000)))
-    told = wandering.done()
-    assert told == wandering.done(1e-9)
+    told = wandering.reason_to_stop()
+    assert told == wandering.reason_to_stop(1e-9)
     largest = wandering.sigma[:3].max()
     found = re.fullmatch(
         r"the bias wanders as much as is averaged out: (\S+) m/s² is reached, and "
@@ -435,8 +446,8 @@ def test_it_is_told_why_averaging_can_stop() -> None:
 
 def test_nothing_is_said_of_more_time_before_it_has_settled() -> None:
     x = flicker(20.0)(np.random.default_rng(9), 3000)
-    assert filled(block_of(x[:1490])).done() is None
-    assert filled(block_of(x[:1501])).done() is not None
+    assert filled(block_of(x[:1490])).reason_to_stop() is None
+    assert filled(block_of(x[:1501])).reason_to_stop() is not None
 
 
 def test_more_time_is_worth_it_as_long_as_one_axis_gains() -> None:
@@ -444,24 +455,28 @@ def test_more_time_is_worth_it_as_long_as_one_axis_gains() -> None:
     x = flicker(20.0)(rng, 3000)
     x[:, 0] = 100 * white(rng, 3000, 1)[:, 0]
     window = filled(block_of(x))
-    assert window.done() is None
+    assert window.reason_to_stop() is None
     # unless that axis is known well enough
     sigma = window.sigma
     assert sigma[0] > sigma[1]
     x[:, 0] /= 1000
     window = filled(block_of(x))
-    assert window.done() is None
-    assert "wanders" in (window.done(1.5 * window.sigma[0]) or "")
+    assert window.reason_to_stop() is None
+    assert "wanders" in (window.reason_to_stop(1.5 * window.sigma[0]) or "")
 
 
 def test_an_axis_that_is_not_measured_has_no_say() -> None:
     block = block_of(flicker(20.0)(np.random.default_rng(20), 3000))
     block.acc[:, 2] = np.nan
     window = filled(block)
-    assert window.done(1.0) is None or "wanders" in str(window.done(1.0))
-    assert f"{np.nanmax(window.sigma[:3]):.2g} m/s² is reached" in str(window.done())
+    assert window.reason_to_stop(1.0) is None or "wanders" in str(
+        window.reason_to_stop(1.0)
+    )
+    assert f"{np.nanmax(window.sigma[:3]):.2g} m/s² is reached" in str(
+        window.reason_to_stop()
+    )
     none = Block.of(block.t, np.full_like(block.acc, np.nan), block.gyr)
-    assert filled(none).done() is None
+    assert filled(none).reason_to_stop() is None
 
 
 def test_averages_say_when_they_were_taken() -> None:
@@ -484,6 +499,6 @@ def test_a_window_one_cell_short_is_told_what_it_needs() -> None:
 
 def test_motion_that_is_just_allowed_is_rest() -> None:
     block = block_of(white(np.random.default_rng(22), 3000))
-    ratio = filled(block).motion
+    ratio = filled(block).largest_motion
     assert 0.3 < ratio < 1
-    assert filled(block).moved is None and average(block).n == 3000
+    assert filled(block).disturbance is None and average(block).n == 3000

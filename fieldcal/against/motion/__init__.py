@@ -1,12 +1,12 @@
-"""A recording in motion, held against a simulator or sensor that follows the motion.
+"""Compares a recording in motion with a simulator or sensor that follows the motion.
 
-`alignment` finds where the two stand beside each other, by their `correlation` at even
-instants (`grid`), `coherence` up to which frequency, and `following` fits them by the
-one model. `shown_effects`, `free_calibration` and `placed` say what differs, `proof`
-predicts stretches that were left out, and `comparison` puts it together. `held` says
-which recordings move.
+`alignment` aligns the two by their `correlation` at even instants (`grid`), `coherence`
+finds the frequency up to which they agree, and `following` explains the recording by
+the model of the diagnosis. `shown_effects`, `free_calibration` and `placed` make the
+differences, `proof` predicts held-out stretches, and `comparison` combines them. `held`
+decides which recordings are in motion.
 """
 
-from fieldcal.against.motion.comparison import compared_in_motion
+from fieldcal.against.motion.comparison import compare_in_motion
 
-__all__ = ["compared_in_motion"]
+__all__ = ["compare_in_motion"]

@@ -1,15 +1,15 @@
-"""Where a recording stands beside a reference: delay, clock rate, axes.
+"""Aligns a recording with a reference of its motion: delay, clock rate, axes.
 
-The shift at which the recording explains most of the reference is the delay; those of
-parts of the recording tell the drift of one clock against the other; and the turn
-between the axes is the one that brings the channels of the reference nearest to the
-triads (Wahba's problem),
+The delay is the shift at which the recording explains most of the reference. The shifts
+of parts of the recording give the drift of one clock against the other. The rotation
+between the axes brings the channels of the reference nearest to the triads (Wahba's
+problem),
 
     R = argmax tr(R^T B),    B = sum of W x z^T over both triads                    (1)
 
-with x the outputs, z the reference, and W one over the variance of what the reference
-does not make of the outputs: of all three together, for which (1) is exact, but of each
-where the reference lacks a channel that they feel. Source: F. Markley 1988.
+with x the outputs, z the reference, and W the inverse variance of the part of the
+outputs that the reference does not explain: of all three axes together, for which (1)
+is exact, or of each axis where the reference lacks a channel. Source: F. Markley 1988.
 """
 
 from __future__ import annotations
@@ -20,39 +20,49 @@ import numpy as np
 from scipy.special import chdtri
 
 from fieldcal.against.motion.coherence import common_hz
-from fieldcal.against.motion.correlation import independent, score, scores
-from fieldcal.against.motion.grid import GRID_HZ, TRIADS, Grid, overlap, shared
+from fieldcal.against.motion.correlation import (
+    explained_score,
+    independent_samples,
+    lag_scores,
+)
+from fieldcal.against.motion.grid import (
+    GRID_HZ,
+    TRIADS,
+    EvenGrid,
+    moving_triads,
+    overlap,
+)
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, Array, Block, Index
 from fieldcal.model.rows.motion import Alignment
 
 PARTS, NEAR_S = 5, 1.0
-"""Parts of a recording that tell the drift, and how far they are sought, s."""
+"""Parts of a recording that give the drift, and their largest further shift, s."""
 
 FEWEST = 3
-"""Parts from which they tell it."""
+"""Fewest parts from which the drift is estimated."""
 
 RARE = 1e-6
-"""Probability that motions which have nothing in common agree as well at some shift."""
+"""Probability of the agreement of unrelated motions at some shift, for a match."""
 
 ALIKE = 1.02
-"""By how much one shift must explain more than any other to be the one."""
+"""Least ratio of the best shift's score to that of any other shift."""
 
 FAR_S = 2.0
-"""From where on a shift is another one, s."""
+"""Least distance of another shift, s."""
 
 EXACT, TINY = 1e-6, 1e-12
-"""Part of its variance, and m^2/s^4 or rad^2/s^2, that a channel is off by at least."""
+"""Least unexplained variance of a channel: part of its variance; m^2/s^4, rad^2/s^2."""
 
 
 @dataclass(frozen=True, slots=True)
 class CommonMotion:
-    """What two recordings have in common.
+    """Alignment of two recordings of one motion.
 
     Attributes
     ----------
-    alignment : where they stand beside each other
-    hz : (6,) frequency up to which the reference says what each output goes through
+    alignment : delay, drift and rotation between them
+    hz : (6,) frequency up to which the reference explains each output
 
     """
 
@@ -60,8 +70,8 @@ class CommonMotion:
     hz: Array
 
 
-def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
-    """Find where a recording stands beside a reference, to some hundredths of a second.
+def align_motion(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
+    """Align a recording with a reference, to some hundredths of a second.
 
     Parameters
     ----------
@@ -74,31 +84,31 @@ def aligned(real: Block, sim: Block, names: tuple[str, str]) -> CommonMotion:
         If they show no common motion, or one that repeats itself.
 
     """
-    one, two = Grid.of(real), Grid.of(sim)
-    if not shared(one, two):
+    one, two = EvenGrid.of(real), EvenGrid.of(sim)
+    if not moving_triads(one, two):
         raise InputError(
             f"{names[0]} and {names[1]} have no moving triad in common: compare"
             " accelerometers with accelerometers or gyroscopes with gyroscopes"
         )
-    lag = _lag(one, two, names)
+    lag = _best_lag(one, two, names)
     middle = one.start + (len(one) - 1) / 2 / GRID_HZ
-    delay, drift = _clock(one, two, lag, middle)
+    delay, drift = _delay_and_drift(one, two, lag, middle)
     x, z = overlap(one, two, lag)
     rotation = _rotation(one, two, x, z)
-    unseen = _unseen(one, two, rotation)
+    unseen = _unseen_gravity(one, two, rotation)
     hz = [common_hz(x[:, triad], z[:, triad], GRID_HZ) for triad in TRIADS]
     return CommonMotion(
         Alignment(delay, drift, middle, rotation, unseen), np.repeat(hz, 3)
     )
 
 
-def _lag(one: Grid, two: Grid, names: tuple[str, str]) -> int:
-    """The shift that explains most, in steps, if it is clearly the one."""
-    lags, told = scores(one, two)
+def _best_lag(one: EvenGrid, two: EvenGrid, names: tuple[str, str]) -> int:
+    """The shift that explains most, in steps; refused if it is not significant."""
+    lags, told = lag_scores(one, two)
     total = told.sum(axis=1)
     best = int(np.argmax(total))
     by_chance = chdtri(3 * told.shape[1], RARE / len(lags))
-    if told[best] @ independent(one, two) < by_chance:
+    if told[best] @ independent_samples(one, two) < by_chance:
         raise InputError(
             f"{names[0]} and {names[1]} show no common motion, or too even a one to"
             " tell: let the simulator follow the motion of this recording"
@@ -110,7 +120,7 @@ def _lag(one: Grid, two: Grid, names: tuple[str, str]) -> int:
 def _check_only_one(
     lags: Index, total: Array, best: int, names: tuple[str, str]
 ) -> None:
-    """Refuse a motion that agrees alike at another shift."""
+    """Refuse a motion that agrees as well at another shift."""
     away = np.abs(lags - lags[best]) > FAR_S * GRID_HZ
     if total[best] > ALIKE * total[away].max(initial=0.0):
         return
@@ -122,10 +132,12 @@ def _check_only_one(
     )
 
 
-def _clock(one: Grid, two: Grid, lag: int, middle: float) -> tuple[float, float]:
-    """Delay in the middle of the recording, s, and drift of its clock, 1."""
+def _delay_and_drift(
+    one: EvenGrid, two: EvenGrid, lag: int, middle: float
+) -> tuple[float, float]:
+    """Delay in the middle of the recording, s, and relative drift of its clock."""
     apart = one.start - two.start
-    parts = [p for p in _parts(one, two, lag) if p is not None]
+    parts = [p for p in _lags_of_parts(one, two, lag) if p is not None]
     if len(parts) < FEWEST:
         return lag / GRID_HZ + apart, 0.0
     at, off = np.array(parts).T
@@ -133,26 +145,28 @@ def _clock(one: Grid, two: Grid, lag: int, middle: float) -> tuple[float, float]
     return float(level) + apart, -float(slope)
 
 
-def _parts(one: Grid, two: Grid, lag: int) -> list[tuple[float, float] | None]:
-    """Middles of parts of the recording, s, and what the shift is in each, s."""
+def _lags_of_parts(
+    one: EvenGrid, two: EvenGrid, lag: int
+) -> list[tuple[float, float] | None]:
+    """Middle and shift of each part of the recording, s."""
     edges = np.linspace(0, len(one), PARTS + 1).astype(int).tolist()
     return [
-        _part(one, two, lag, first, end)
+        _lag_of_part(one, two, lag, first, end)
         for first, end in zip(edges[:-1], edges[1:], strict=True)
     ]
 
 
-def _part(
-    one: Grid, two: Grid, lag: int, first: int, end: int
+def _lag_of_part(
+    one: EvenGrid, two: EvenGrid, lag: int, first: int, end: int
 ) -> tuple[float, float] | None:
-    """The same of one part, if most of it moves and its best shift lies within."""
+    """Middle and shift of one part, s; None if it has too little motion or overlap."""
     near = int(NEAR_S * GRID_HZ)
     begin, stop = max(first - lag, near), min(end - lag, len(two) - near)
     x = one.six[begin + lag : stop + lag]
     if stop - begin < (end - first) / 2 or len(x) < stop - begin or not x.any():
         return None
     steps = range(-near, near + 1)
-    told = [score(x, two.six[begin - k : stop - k]) for k in steps]
+    told = [explained_score(x, two.six[begin - k : stop - k]) for k in steps]
     best = int(np.argmax(told))
     if not 0 < best < len(told) - 1:
         return None
@@ -163,8 +177,8 @@ def _part(
     return middle, shift / GRID_HZ
 
 
-def _rotation(one: Grid, two: Grid, x: Array, z: Array) -> Array:
-    """The turn between the axes of both, (1), of what overlaps of them."""
+def _rotation(one: EvenGrid, two: EvenGrid, x: Array, z: Array) -> Array:
+    """Rotation between the axes of both, (1), from their overlap."""
     b = np.zeros((3, 3))
     for triad in TRIADS:
         mine, theirs = x[:, triad], z[:, triad]
@@ -186,7 +200,7 @@ def _rotation(one: Grid, two: Grid, x: Array, z: Array) -> Array:
     return out
 
 
-def _unseen(one: Grid, two: Grid, rotation: Array) -> Array:
+def _unseen_gravity(one: EvenGrid, two: EvenGrid, rotation: Array) -> Array:
     """Gravity along the axis that stands upright, if the reference lacks it, (6,)."""
     out = np.zeros(6)
     force = rotation.T @ one.mean[ACC]

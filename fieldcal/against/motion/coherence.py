@@ -1,12 +1,13 @@
-"""Up to which frequency a recording and its reference show one motion.
+"""Frequency up to which a recording and its reference show the same motion.
 
 With S the spectra over pieces of both, the share of a channel j of the reference that a
-triad x of the recording makes at a frequency is
+triad x of the recording explains at a frequency is
 
     g_j = s_xj^H S_xx^-1 s_xj / S_jj                                               (1)
 
-less what three inputs make by chance. A body that pitches on its springs, say, is no
-longer what its wheels say. Source: multiple coherence; J. Bendat and A. Piersol 2010.
+less the share that three inputs explain by chance. Above that frequency the reference
+may differ from the motion of the sensor, as wheels do from a body on its springs.
+Source: multiple coherence; J. Bendat and A. Piersol 2010.
 """
 
 from __future__ import annotations
@@ -17,21 +18,21 @@ from fieldcal.core.samples import Array
 
 PIECE_S, HALF = 10.0, 0.5
 """Length of the pieces whose spectra are compared, s, and share of a channel's power
-from which the reference counts as saying what the device goes through."""
+from which reference and device count as moving together."""
 
 EXACT, TINY = 1e-6, 1e-12
-"""Part of all power that an input has for itself at least, and least power of any."""
+"""Least power of an input, as a part of all power, and least power of any channel."""
 
 
 def common_hz(x: Array, z: Array, rate_hz: float) -> float:
-    """Frequency up to which a triad makes the channels that the reference has, Hz.
+    """Frequency up to which a triad explains the channels of the reference, Hz.
 
-    Shares (1) above one half are counted up, and the frequency is where that is most;
-    inf where it is that of all samples, or nothing is seen.
+    It is where the cumulated excess of the shares (1) over one half is largest; inf if
+    that is the highest frequency, or if there is no motion.
 
     Parameters
     ----------
-    x, z : (n, 3) outputs, and the reference's; 0 where it has none
+    x, z : (n, 3) outputs of the device, and of the reference; 0 where missing
     rate_hz : samples a second
 
     """

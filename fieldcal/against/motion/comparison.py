@@ -1,8 +1,8 @@
-"""What a recording in motion has beside what a simulator says of the same motion.
+"""Compares a recording in motion with a simulator that follows the same motion.
 
-Where the simulator follows the motion of the recording, its specific force and rate are
-the reference at every moment: what is found is what the device has beyond it. Of what
-the simulator has itself that is the difference, with the opposite sign.
+The simulator's specific force and rate are the reference at every moment, so that the
+causes found are those that the device has beyond it. Errors that the simulator has
+itself appear with the opposite sign.
 """
 
 from __future__ import annotations
@@ -12,13 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.against.motion.alignment import aligned
-from fieldcal.against.motion.following import Following, follow
-from fieldcal.against.motion.free_calibration import calibration, differing, freed
-from fieldcal.against.motion.placed import placed, turned
-from fieldcal.against.motion.proof import proof
-from fieldcal.against.motion.shown_effects import effects
-from fieldcal.against.motion.wording import aligned_as
+from fieldcal.against.motion.alignment import align_motion
+from fieldcal.against.motion.following import MotionExplanation, explain_motion
+from fieldcal.against.motion.free_calibration import (
+    calibration_differences,
+    determined_calibration,
+    free_calibration_sizes,
+)
+from fieldcal.against.motion.placed import alignment_result, axes_difference
+from fieldcal.against.motion.proof import predict_motion
+from fieldcal.against.motion.shown_effects import effect_differences
+from fieldcal.against.motion.wording import alignment_sentence
 from fieldcal.against.result import Difference, Facts, Match, verdict_of
 from fieldcal.against.wording import paragraph
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
@@ -30,10 +34,10 @@ from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 
 
-def compared_in_motion(
+def compare_in_motion(
     real: tuple[Block, Description], sim: Block, names: tuple[str, str]
 ) -> Match:
-    """Say what a simulator that follows a recording's motion leaves out of it.
+    """Find what a simulator that follows a recording's motion leaves out.
 
     Parameters
     ----------
@@ -48,22 +52,24 @@ def compared_in_motion(
 
     """
     block, about = real
-    found = follow(block, about, Reference(sim), aligned(block, sim, names))
+    found = explain_motion(
+        block, about, Reference(sim), align_motion(block, sim, names)
+    )
     standing = found.posterior.standing()
     wide, _ = found.inferred.search.opened(found.set)
-    state = _sized(found, wide)
-    free = _sized(found, freed(found, wide))
+    state = _with_sizes(found, wide)
+    free = _with_sizes(found, free_calibration_sizes(found, wide))
     every = (
-        *effects(found, standing, state),
-        *differing(found, free),
-        *turned(found, state),
+        *effect_differences(found, standing, state),
+        *calibration_differences(found, free),
+        *axes_difference(found, state),
     )
-    # what is certain stays in the order in which it was found, whatever rounding says
+    # certain differences stay in the order in which they were found
     differences = tuple(sorted(every, key=lambda d: -round(d.probability, 6)))
     verdict = verdict_of(differences)
-    shown = proof(found)
+    shown = predict_motion(found)
     predicted = shown.before, shown.after
-    where = placed(found, state)
+    where = alignment_result(found, state)
     says = paragraph(verdict, differences, predicted, "Stretches")
     return Match(
         verdict,
@@ -74,25 +80,25 @@ def compared_in_motion(
         _facts_of_the_device(block, found, free),
         _facts(sim),
         tuple(_warnings(found, names)),
-        f"{says} {aligned_as(where)}",
+        f"{says} {alignment_sentence(where)}",
         where,
     )
 
 
-def _sized(found: Following, sizes: Array) -> Eliminated:
-    """The set of causes with other sizes."""
+def _with_sizes(found: MotionExplanation, sizes: Array) -> Eliminated:
+    """The best set of causes with other prior sizes."""
     before = found.set.state
     return Eliminated.of(before.rows, before.columns, sizes)
 
 
-def _probability(found: Following, differences: Sequence[Difference]) -> float:
+def _probability(found: MotionExplanation, differences: Sequence[Difference]) -> float:
     if differences:
         return float(np.prod([d.probability for d in differences]))
     return found.posterior.nothing
 
 
 def _facts(block: Block) -> Facts:
-    """What a recording is made of."""
+    """Properties of a recording: rate, steps, start."""
     grids = np.nan_to_num(grids_of(block))
     steps = [float(grids[c : c + 3].max()) or np.nan for c in (0, 3)]
     return Facts(
@@ -105,19 +111,23 @@ def _facts(block: Block) -> Facts:
     )
 
 
-def _facts_of_the_device(block: Block, found: Following, state: Eliminated) -> Facts:
-    """The same with the noise of its samples, and its calibration."""
+def _facts_of_the_device(
+    block: Block, found: MotionExplanation, state: Eliminated
+) -> Facts:
+    """Properties of the device's recording, with its noise and calibration."""
     per_row, bands = found.rows.t.shape[1], found.fit.bands
     part = float(np.sqrt(0.5 / np.sum(found.rows.frequency >= bands.edges[-2])))
     noise: dict[str, Quantity] = {}
     for c, levels in found.fit.levels.items():
         level = float(np.sqrt(np.exp(levels[-1]) * per_row))
         noise[CHANNELS[c]] = Quantity(level, level * part, UNITS[c])
-    return replace(_facts(block), noise=noise, calibration=calibration(found, state))
+    return replace(
+        _facts(block), noise=noise, calibration=determined_calibration(found, state)
+    )
 
 
-def _warnings(found: Following, names: tuple[str, str]) -> Iterator[str]:
-    """What limits the comparison."""
+def _warnings(found: MotionExplanation, names: tuple[str, str]) -> Iterator[str]:
+    """Warnings about what limits the comparison."""
     reference = found.rows.reference
     if len(reference.lost):
         channels = ", ".join(CHANNELS[c] for c in reference.lost)

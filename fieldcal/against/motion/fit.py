@@ -1,8 +1,8 @@
 """Alignment, noise and causes of one recording in motion, fitted in turn.
 
-Where the two stand beside each other, how the sensors follow, the noise's spectrum and
-the values of the causes hang on each other. A set of causes is therefore fitted until
-all of them stay. What the alignment is off by is a column of every fit.
+The alignment, the lag of the sensors, the spectrum of the noise and the values of the
+causes depend on each other, so they are fitted in turn until all of them converge. The
+error of the alignment is a column of every fit.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from fieldcal.model.system.motion_rows import MotionSystem, noise_levels
 from fieldcal.physics.lag import Lag
 
 SETTLED = 12
-"""Linearisations of one set at most."""
+"""Most linearisations of one set."""
 
 NOTHING = 1e-12
-"""Weight of coefficients of which the reference says nothing."""
+"""Weight of coefficients at frequencies that the reference does not explain."""
 
 FINEST = 1e-6
-"""Part of what an output is that nothing is known better than."""
+"""Least noise, as a part of the rms of an output."""
 
 STAYS, STEADY = 0.1, 0.1
-"""Largest step of the alignment, in standard deviations, that counts as none, and
-largest change of ln power."""
+"""Convergence: largest step of the alignment, in standard deviations, and largest
+change of ln power."""
 
 
 class MotionFit:
@@ -50,7 +50,7 @@ class MotionFit:
     system : rows at the alignment, and the power of their noise
     nominal : the state that a simulation starts from
     bands : of the noise
-    hz : (6,) frequency up to which the reference is one
+    hz : (6,) frequency up to which the reference explains each output
 
     Attributes
     ----------
@@ -67,11 +67,11 @@ class MotionFit:
 
     @property
     def rows(self) -> MotionRows:
-        """The rows at the alignment as it is."""
+        """The rows at the present alignment."""
         return self.system.motion
 
-    def searched(self, members: Sequence[Member]) -> Inferred:
-        """The best set of causes, beginning with some."""
+    def search(self, members: Sequence[Member]) -> Inferred:
+        """Search for the best set of causes, beginning with some."""
         found = Inference(self.system, self.nominal).run(members or None)
         # a search for effects first has columns of its own
         system = found.inference.system
@@ -79,15 +79,15 @@ class MotionFit:
             self.system = system
         return found
 
-    def apart(self) -> Self:
-        """The same with columns, rows and noise of its own, as they are now."""
+    def copy(self) -> Self:
+        """A copy with columns, rows and noise of its own."""
         dictionary = MotionDictionary(self.rows, np.abs(self.nominal.scale))
         dictionary.moved(self.rows)
         system = MotionSystem(dictionary, self.system.power.copy())
         return type(self)(system, self.nominal, self.bands, self.hz)
 
     def evidence(self, members: tuple[Member, ...]) -> float:
-        """Ln evidence of causes about which all has settled, the noise's counted."""
+        """Ln evidence of causes after `settle`, including that of the noise."""
         fit = Inference(self.system, self.nominal)
         members = fit.dictionary.like(members)
         *_, found = fit.settled(self.nominal, np.zeros(fit.dictionary.width), members)
@@ -96,7 +96,7 @@ class MotionFit:
         return found.score - 0.5 * float(sum(told))
 
     def settle(self, members: tuple[Member, ...]) -> None:
-        """Fit some causes, the alignment and the noise in turn until all stay."""
+        """Fit some causes, the alignment and the noise in turn until convergence."""
         for _ in range(SETTLED):
             fit = Inference(self.system, self.nominal)
             members = fit.dictionary.like(members)
@@ -112,7 +112,7 @@ class MotionFit:
                 break
 
     def _weigh(self, linear: Sequence[Linear], values: Array, found: Set) -> None:
-        """Give the rows the noise that a fit leaves."""
+        """Set the noise of the rows to that of a fit's residuals."""
         frequency = self.rows.frequency
         self.levels = noise_levels(self.bands, frequency, linear, values, found.state)
         for c, level in self.levels.items():
@@ -121,18 +121,18 @@ class MotionFit:
     def power(self, c: int, level: Array, frequency: Array) -> Array:
         """Power of the noise of one channel's coefficients, (n,).
 
-        What is quicker than the reference tells has none to speak of left to say.
+        Above the frequency that the reference explains, coefficients have no weight.
         """
         power: Array = np.maximum(self.bands.power(level, frequency), self._finest[c])
         power[frequency > self.hz[c]] /= NOTHING
         return power
 
     def _align(self, found: Set, there: State) -> None:
-        """Move the rows to the alignment of a fit, and to how its state lags."""
+        """Move the rows to the alignment of a fit, and to the lags of its state."""
         free = any(lag_of(m).delay for m in found.members)
         acc, gyr = self._responses(there, free)
         alignment = self._alignment(found)
-        # what the accelerometers are late by is the clocks' delay
+        # the lag of the accelerometers counts as delay of the clock
         shared, alike = acc.late, gyr is acc
         alignment = replace(alignment, delay=alignment.delay + shared)
         acc = replace(acc, late=0.0)
@@ -143,10 +143,10 @@ class MotionFit:
         self.system.dictionary.moved(now)
 
     def _alignment(self, found: Set) -> Alignment:
-        """The alignment that a fit has."""
+        """The present alignment, corrected by a fit."""
         d, now = self.system.dictionary, self.rows.alignment
-        (delay, drift), _ = told(found, d.clock, 2)
-        turn, _ = told(found, d.turn, 3)
+        (delay, drift), _ = fixed_column_estimates(found, d.clock, 2)
+        turn, _ = fixed_column_estimates(found, d.turn, 3)
         return replace(
             now,
             delay=now.delay + float(delay),
@@ -156,18 +156,21 @@ class MotionFit:
         )
 
     def _step(self, found: Set, before: MotionRows) -> float:
-        """How far a fit has moved the rows, in its sigmas.
+        """Largest step of the rows by a fit, in its sigmas.
 
-        Time constants count in parts of the least that shows.
+        Changes of time constants are in units of the least one that shows.
         """
         d, now = self.system.dictionary, self.rows
-        steps = [told(found, d.clock, 2), told(found, d.turn, 3)]
+        steps = [
+            fixed_column_estimates(found, d.clock, 2),
+            fixed_column_estimates(found, d.turn, 3),
+        ]
         moved = [np.abs(step / np.sqrt(np.diag(cov))).max() for step, cov in steps]
         followed = [now.acc.apart(before.acc), now.gyr.apart(before.gyr)]
         return float(max(*moved, *followed, abs(now.share - before.share)))
 
     def _responses(self, there: State, free: bool) -> tuple[Response, Response]:
-        """How a state has the triads follow the motion; one and the same if alike."""
+        """Responses of both triads to the motion; the same object if they are equal."""
         lag, rows = there.lag, self.rows
         acc, gyr = (lag.acc, lag.acc_second), (lag.gyr, lag.gyr_second)
         first = rows.acc.towards(rows.reference, 0.0, *acc, free)
@@ -176,32 +179,32 @@ class MotionFit:
         return first, rows.gyr.towards(rows.reference, lag.delay, *gyr, free)
 
     def _unseen(self, found: Set) -> Array:
-        """What a fit adds to gravity along an axis that the reference lacks."""
+        """Correction of gravity along an axis that the reference lacks, (6,)."""
         d = self.system.dictionary
         out: Array = np.zeros(6)
         if len(d.lost):
-            out[d.lost], _ = told(found, d.unseen, len(d.lost))
+            out[d.lost], _ = fixed_column_estimates(found, d.unseen, len(d.lost))
         out[self.rows.alignment.unseen == 0] = 0.0
         return out
 
 
 def lag_of(member: Member) -> Lag:
-    """By how much a cause would make the sensors lag, for one of each parameter."""
+    """Lag of the sensors by a cause, with each parameter equal to 1."""
     _, group = member
     if group.effect is None:
         return Lag()
     return group.effect.lag(np.ones(len(group.effect.params)))
 
 
-def told(found: Set, first: int, count: int) -> tuple[Array, Array]:
-    """Values (k,) and covariance (k, k) of columns that are always there."""
+def fixed_column_estimates(found: Set, first: int, count: int) -> tuple[Array, Array]:
+    """Values (k,) and covariance (k, k) of `count` columns that every set has."""
     state = found.state
     at = [int(np.flatnonzero(state.columns == c)[0])
           for c in range(first, first + count)]  # fmt: skip
     return state.estimate[at], state.inverse[np.ix_(at, at)]
 
 
-def estimates(state: Eliminated, columns: Index) -> tuple[Array, Array, Array]:
-    """Values, covariance and sizes before the rows, of some columns."""
+def column_estimates(state: Eliminated, columns: Index) -> tuple[Array, Array, Array]:
+    """Values, covariance and prior standard deviations of some columns."""
     at = np.array([int(np.flatnonzero(state.columns == c)[-1]) for c in columns])
     return state.estimate[at], state.inverse[np.ix_(at, at)], state.sizes[at]

@@ -1,9 +1,9 @@
-"""A recording fitted to the motion that a reference says, by the one model.
+"""Explains a recording by the motion of a reference, with the model of the diagnosis.
 
-Alignment, noise spectrum and causes hang on each other: with the alignment of
-correlation bias, scale factor and alignment are fitted until they stay, then causes are
-searched, and both again with what was found. What the alignment is off by is a column
-of every fit, so its uncertainty is in all numbers.
+Alignment, noise spectrum and causes depend on each other. Beginning with the alignment
+by correlation, bias, scale factor and alignment are fitted until convergence; then
+causes are searched; then both are repeated with the causes found. The error of the
+alignment is a column of every fit, so its uncertainty is part of all results.
 """
 
 from __future__ import annotations
@@ -29,37 +29,36 @@ from fieldcal.physics.lag import Lag
 from fieldcal.session.description import Description
 
 STRETCHES, SHORTEST_S = 24, 5.0
-"""Stretches of a recording, and how short one is at least, s."""
+"""Number of stretches of a recording, and shortest stretch, s."""
 
 MOST = 40_000
-"""Rows at most: of more, samples are put together."""
+"""Most rows; of longer recordings more samples are combined in a row."""
 
 SLOWEST_HZ, QUICKEST_HZ = 10.0, 50.0
-"""Rows a second: what moves by more than half of that is no motion of a body."""
+"""Least and largest number of rows a second."""
 
 MOVES, OFTEN = 1e-3, 8.0
-"""Part of a motion's power that may be quicker than what counts as its frequency, and
-rows in a period of that."""
+"""Part of a motion's power above its highest frequency, and rows in its period."""
 
 MARGIN_S = 1.0
-"""What is left out at both ends of a reference, where a shift would leave it, s."""
+"""Time left out at both ends of a reference, so that a shift stays within it, s."""
 
 FEWEST_S = 20.0
-"""Shortest common motion that tells anything, s."""
+"""Shortest common motion that is evaluated, s."""
 
 AGAIN = 3
-"""Searches at most."""
+"""Most searches."""
 
 
 @dataclass(frozen=True)
-class Following:
-    """A recording beside its reference, explained.
+class MotionExplanation:
+    """The explanation of a recording in motion by its reference and causes.
 
     Attributes
     ----------
     fit : alignment and noise
-    inferred : set, state and search
-    posterior : probabilities
+    inferred : the best set of causes, its state, and the search
+    posterior : probabilities of all causes
 
     """
 
@@ -69,12 +68,12 @@ class Following:
 
     @property
     def rows(self) -> MotionRows:
-        """At the alignment that was found."""
+        """Rows at the estimated alignment."""
         return self.fit.rows
 
     @property
     def dictionary(self) -> MotionDictionary:
-        """What rows were laid to."""
+        """Columns of all causes."""
         return self.fit.system.dictionary
 
     @property
@@ -83,16 +82,16 @@ class Following:
         return self.inferred.best
 
 
-def follow(
+def explain_motion(
     block: Block, about: Description, reference: Reference, start: CommonMotion
-) -> Following:
+) -> MotionExplanation:
     """Fit a recording to the motion of a reference.
 
     Parameters
     ----------
     block, about : the recording
     reference : of the motion
-    start : where the two stand beside each other, roughly, and what they share
+    start : rough alignment, and the frequencies up to which the motion is common
 
     Raises
     ------
@@ -100,31 +99,31 @@ def follow(
         If both cover too little of the same motion.
 
     """
-    rows = _rows(block, reference, start.alignment)
-    nominal = _nominal(about, int(rows.part[-1]) + 1)
+    rows = _motion_rows(block, reference, start.alignment)
+    nominal = _nominal_state(about, int(rows.part[-1]) + 1)
     dictionary = MotionDictionary(rows, np.abs(nominal.scale))
-    system = MotionSystem(dictionary, _flat(rows, nominal))
+    system = MotionSystem(dictionary, _starting_power(rows, nominal))
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
-    fit = _likeliest(plain, dictionary)
-    found = fit.searched(())
+    fit = _likeliest_fit(plain, dictionary)
+    found = fit.search(())
     for _ in range(AGAIN):
         before, members = found.best.keys, found.best.members
         fit.settle(members)
-        found = fit.searched(members)
+        found = fit.search(members)
         if found.best.keys == before:
             break
     fit, found = _without_idle_lags(fit, found)
-    return Following(fit, found, Posterior(found.search, found.best))
+    return MotionExplanation(fit, found, Posterior(found.search, found.best))
 
 
-def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
-    """A fit settled with late gyroscopes, or with what only motion shows besides.
+def _likeliest_fit(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
+    """The fit to begin the search with: with a filter or another effect of motion.
 
-    What a filter does is linear about a filter like it and not about none. Of those
-    that explain something about none the likeliest is taken, beginning with the one
-    that explains most. An effect that is no filter is passed over if nothing is left
-    for it. Filters of first and second order are both tried, since one leaves little of
-    the other.
+    The effect of a filter is linear about a similar filter, but not about none. Among
+    the effects that show only in motion and that explain something, the likeliest is
+    taken; those that explain most are tried first. An effect other than a filter is
+    skipped if it explains nothing beside the one just tried. Filters of first and of
+    second order are both tried always, since either explains most of the other.
     """
     every = [(c, g) for c in dictionary.causes for g in c.variants[:1]]
     delays = tuple(m for m in every if lag_of(m).delay)
@@ -140,7 +139,7 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
     remain = sorted(explains, key=lambda i: -explains[i])
     while remain:
         one, *remain = remain
-        other, members = fit.apart(), (*delays, every[one])
+        other, members = fit.copy(), (*delays, every[one])
         other.settle(members)
         own = other.evidence(members)
         if own > most:
@@ -154,29 +153,29 @@ def _likeliest(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
 
 
 def _without_idle_lags(fit: MotionFit, found: Inferred) -> tuple[MotionFit, Inferred]:
-    """The same without filters and delays that are no better than none.
+    """Remove filters and delays without which a new fit is at least as likely.
 
-    About a filter its absence looks worse than it is: what it does goes as the square
-    or cube of its time constant.
+    Linearised about a filter, its absence looks worse than it is, since its effect is
+    proportional to the square or cube of its time constant.
     """
     for member in [m for m in found.best.members if lag_of(m) != Lag()]:
         members = found.best.members
         if member[0].key not in found.best.keys:
             continue
         others = tuple(m for m in members if m[0].key != member[0].key)
-        full, lean = fit.apart(), fit.apart()
+        full, lean = fit.copy(), fit.copy()
         full.settle(members)
         lean.settle(others)
         if lean.evidence(others) >= full.evidence(members):
-            fit, found = lean, lean.searched(others)
+            fit, found = lean, lean.search(others)
     return fit, found
 
 
-def _rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:
-    """Rows of about as many a second as a body moves by."""
+def _motion_rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:
+    """Rows of the common motion, at the rate that the motion needs."""
     step = float(np.median(np.diff(block.t)))
     length = float(np.ptp(block.t))
-    per_row = max(int(1 / _rate(reference) / step), -(-len(block) // MOST), 1)
+    per_row = max(int(1 / _row_rate(reference) / step), -(-len(block) // MOST), 1)
     stretch = max(length / STRETCHES, SHORTEST_S)
     rows = rows_in_motion(block, reference, start, per_row, stretch, MARGIN_S)
     if len(rows) * rows.step < FEWEST_S:
@@ -188,7 +187,7 @@ def _rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:
     return rows
 
 
-def _rate(reference: Reference) -> float:
+def _row_rate(reference: Reference) -> float:
     """Rows a second that a motion needs, Hz."""
     t = np.arange(reference.start, reference.end, 0.5 / QUICKEST_HZ)
     six = reference.at(t)[:, reference.observed]
@@ -200,7 +199,7 @@ def _rate(reference: Reference) -> float:
     return float(np.clip(OFTEN * hz, SLOWEST_HZ, QUICKEST_HZ))
 
 
-def _nominal(about: Description, places: int) -> State:
+def _nominal_state(about: Description, places: int) -> State:
     nominal = about.nominal
     return State(
         np.concatenate([nominal["acc_bias"], nominal["gyr_bias"]]),
@@ -210,8 +209,8 @@ def _nominal(about: Description, places: int) -> State:
     )
 
 
-def _flat(rows: MotionRows, nominal: State) -> Array:
-    """White noise as large as all that differs, to begin with."""
+def _starting_power(rows: MotionRows, nominal: State) -> Array:
+    """Initial power of the noise: the variance of all that differs."""
     off = rows.y - nominal.bias - nominal.scale * rows.motion(rows.acc)
     power = np.nanvar(np.where(rows.used, off, 0.0), axis=0)
     return np.tile(np.maximum(power, 1e-12), (len(rows), 1))

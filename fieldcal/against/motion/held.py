@@ -1,7 +1,7 @@
-"""Whether a recording holds positions, or moves: which of the two tells more.
+"""Whether a recording holds positions or is in motion, which decides the comparison.
 
-A car on an even road is as calm as a device at rest, and shows one position however
-often. Where angles, or rates of a table, are stated the device was held in them.
+A car on an even road is as calm as a device at rest, but always in the same position.
+Where angles, or rates of a table, are stated, the device was held in positions.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from fieldcal.model.causes.cause import FEW
 from fieldcal.session.description import Description
 
 APART = np.cos(np.deg2rad(10.0))
-"""Cosine of the angle between forces from which two positions are two."""
+"""Cosine of the least angle between the forces of two different positions."""
 
 
 def holds_positions(block: Block, about: Description) -> bool:
-    """Whether a recording holds as many positions as can be told apart by."""
+    """Whether a recording holds enough different positions."""
     windows = [w for w in about.windows if w is not None]
     if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
         return len(windows) >= FEW

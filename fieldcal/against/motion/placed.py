@@ -1,4 +1,4 @@
-"""Clocks and axes of a recording and its reference: where the two stand."""
+"""The alignment of a recording with its reference, as a result: clocks and axes."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fieldcal.against.joint import differs
-from fieldcal.against.motion.fit import estimates
-from fieldcal.against.motion.following import Following
+from fieldcal.against.joint import probability_of_difference
+from fieldcal.against.motion.fit import column_estimates
+from fieldcal.against.motion.following import MotionExplanation
 from fieldcal.against.result import Aligned, Difference, RealAndSimulated
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import Quantity
@@ -19,41 +19,47 @@ from fieldcal.model.evidence.gram import Eliminated
 PPM = 1e6
 
 
-def placed(found: Following, state: Eliminated) -> Aligned:
-    """Where the two stand beside each other."""
+def alignment_result(found: MotionExplanation, state: Eliminated) -> Aligned:
+    """Delay, drift and rotation with their uncertainty."""
     rows = found.rows
-    _, covariance, _ = estimates(state, found.dictionary.clock + np.arange(2))
+    _, covariance, _ = column_estimates(state, found.dictionary.clock + np.arange(2))
     delay, drift = np.sqrt(np.diag(covariance)).tolist()
     return Aligned(
         delay=Quantity(rows.alignment.delay, delay, "s"),
         drift=Quantity(PPM * rows.alignment.drift, PPM * drift, "ppm"),
-        turn=_angles(*_turn(found, state)),
+        turn=_quantities_in_degrees(*_rotation_vector(found, state)),
         at_s=rows.alignment.middle,
         compared_s=len(rows) * rows.step,
     )
 
 
-def turned(found: Following, state: Eliminated) -> Iterator[Difference]:
-    """Axes that are turned against the reference's."""
-    angle, sigma = _turn(found, state)
-    probability = differs(angle, np.diag(sigma**2), np.full(3, priors.AXES_TURNED))
+def axes_difference(
+    found: MotionExplanation, state: Eliminated
+) -> Iterator[Difference]:
+    """The difference "misalignment", if the axes are rotated against the reference."""
+    angle, sigma = _rotation_vector(found, state)
+    probability = probability_of_difference(
+        angle, np.diag(sigma**2), np.full(3, priors.AXES_TURNED)
+    )
     if probability >= thresholds.NAMED and (sigma < priors.AXES_TURNED).all():
         pairs = {
             axis: RealAndSimulated.of(q, None)
-            for axis, q in _angles(angle, sigma).items()
+            for axis, q in _quantities_in_degrees(angle, sigma).items()
         }
         yield Difference("misalignment", "left_out", probability, pairs)
 
 
-def _turn(found: Following, state: Eliminated) -> tuple[Array, Array]:
-    """The turn from the reference's axes to the device's, (3,) rad, and its sigmas."""
+def _rotation_vector(
+    found: MotionExplanation, state: Eliminated
+) -> tuple[Array, Array]:
+    """Rotation from the reference's axes to the device's, (3,) rad, and its sigmas."""
     rows, first = found.rows, found.dictionary.turn
-    _, covariance, _ = estimates(state, first + np.arange(3))
+    _, covariance, _ = column_estimates(state, first + np.arange(3))
     turn = Rotation.from_matrix(rows.alignment.rotation)
     return turn.as_rotvec(), np.sqrt(np.diag(covariance))
 
 
-def _angles(angle: Array, sigma: Array) -> dict[str, Quantity]:
+def _quantities_in_degrees(angle: Array, sigma: Array) -> dict[str, Quantity]:
     degrees, unsure = np.rad2deg(angle).tolist(), np.rad2deg(sigma).tolist()
     return {
         axis: Quantity(v, s, "deg")

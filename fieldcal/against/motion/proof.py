@@ -1,8 +1,8 @@
-"""Stretches of a recording in motion, predicted from the others.
+"""Predicts stretches of a recording in motion that were held out.
 
-A few stretches on end are left out of everything: alignment, noise, which of the sets
-in question, sizes and values are found again from the rest, in columns that were made
-linear about the fit of all. What a prediction does not know counts as in (1) of
+A few consecutive stretches are held out at a time. Noise, the best of the rival sets,
+its sizes and its values are estimated again from the rest, with the columns linearised
+about the fit of all. The uncertainty of a prediction counts as in (1) of
 `fieldcal.against.prediction`.
 """
 
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.against.motion.following import Following
-from fieldcal.against.prediction import unsure_squares
+from fieldcal.against.motion.following import MotionExplanation
+from fieldcal.against.prediction import chi2_of_uncertain_prediction
 from fieldcal.against.result import SimulatorPrediction
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.sets import Set
@@ -28,20 +28,20 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.motion_rows import noise_levels
 
 FOLDS = 6
-"""Parts that a recording is left out in, each of stretches on end."""
+"""Parts of a recording that are held out in turn, each of consecutive stretches."""
 
 ROUNDS = 2
-"""Times that noise and values are found from each other where a part is left out."""
+"""Alternating estimates of noise and values when a part is held out."""
 
 
 @dataclass(frozen=True)
-class Proof:
-    """A recording as the simulator predicts it, and with what was found.
+class MotionPrediction:
+    """Agreement of a recording with its prediction, without and with the causes found.
 
     Attributes
     ----------
-    before : as the simulator is, nothing being fitted but where the two stand
-    after : each part as the others predict it
+    before : by the simulator alone; only the alignment is fitted
+    after : with the causes found; each part is predicted from the others
 
     """
 
@@ -49,12 +49,12 @@ class Proof:
     after: SimulatorPrediction
 
 
-def proof(found: Following) -> Proof:
+def predict_motion(found: MotionExplanation) -> MotionPrediction:
     """Predict each part of a recording."""
-    return Proof(_before(found), _after(found))
+    return MotionPrediction(_as_simulated(found), _as_explained(found))
 
 
-def _before(found: Following) -> SimulatorPrediction:
+def _as_simulated(found: MotionExplanation) -> SimulatorPrediction:
     system = found.fit.system
     d, nominal = system.dictionary, found.fit.nominal
     nothing = np.zeros(d.width, dtype=bool)
@@ -62,7 +62,7 @@ def _before(found: Following) -> SimulatorPrediction:
     places = np.zeros((d.places, 2))
     bare = State(nominal.bias, nominal.scale, places, np.zeros(3))
     linear = system.linearised(bare, nothing)
-    squares, count, off = 0.0, 0, _Sizes()
+    squares, count, off = 0.0, 0, _ResidualSquares()
     for part in linear:
         told = found.rows.frequency <= found.fit.hz[part.channel]
         off.add(part, part.white, told)
@@ -71,7 +71,7 @@ def _before(found: Following) -> SimulatorPrediction:
     return off.prediction(squares, count)
 
 
-def _after(found: Following) -> SimulatorPrediction:
+def _as_explained(found: MotionExplanation) -> SimulatorPrediction:
     inferred, system = found.inferred, found.fit.system
     visited = list(inferred.search.visited.values())
     sets = in_question(inferred.best, visited)
@@ -79,7 +79,7 @@ def _after(found: Following) -> SimulatorPrediction:
     wanted = inferred.inference.wanted([m for s in sets for m in s.members])
     linear = system.linearised(inferred.state, wanted | (values != 0))
     rows, fold, hz = found.rows, _folds(found), found.fit.hz
-    squares, count, off = 0.0, 0, _Sizes()
+    squares, count, off = 0.0, 0, _ResidualSquares()
     for i in np.unique(fold):
         kept, gone = np.flatnonzero(fold != i), np.flatnonzero(fold == i)
         rest = [_of_stretches(part, rows, kept) for part in linear]
@@ -88,10 +88,10 @@ def _after(found: Following) -> SimulatorPrediction:
             search = Search(d, gram(rest, d, values, (), np.flatnonzero(wanted)))
             best = max((search.evaluated(s.members, s.sizes) for s in sets), key=_score)
             levels = noise_levels(found.fit.bands, frequency, rest, values, best.state)
-            rest = [_weighed(found, p, levels, frequency) for p in rest]
+            rest = [_reweighted(found, p, levels, frequency) for p in rest]
         frequency = frequencies(len(gone) * rows.length, rows.length, rows.step)
         left = [_of_stretches(part, rows, gone) for part in linear]
-        left = [_weighed(found, part, levels, frequency) for part in left]
+        left = [_reweighted(found, part, levels, frequency) for part in left]
         squares += _squares(left, values, best)
         for part in left:
             off.add(part, _residual(part, values, best), frequency <= hz[part.channel])
@@ -99,14 +99,14 @@ def _after(found: Following) -> SimulatorPrediction:
     return off.prediction(squares, count)
 
 
-class _Sizes:
-    """Squares of what is left of each triad, and their number."""
+class _ResidualSquares:
+    """Sums of squared residuals of each triad, and their number."""
 
     def __init__(self) -> None:
         self.square, self.count = np.zeros(2), np.zeros(2)
 
     def add(self, part: Linear, white: Array, told: NDArray[np.bool_]) -> None:
-        """Add coefficients of a channel that are told: their squares are its rows'."""
+        """Add whitened residuals of a channel where `told` (n,) is true."""
         triad = part.channel // 3
         self.square[triad] += float(np.sum((white / part.weight)[told] ** 2))
         self.count[triad] += len(white)
@@ -122,14 +122,14 @@ def _score(one: Set) -> float:
     return one.score
 
 
-def _folds(found: Following) -> Index:
-    """The part that each stretch is left out in, (s,)."""
+def _folds(found: MotionExplanation) -> Index:
+    """The part with which each stretch is held out, (s,)."""
     count = int(found.rows.stretch[-1]) + 1
     return np.arange(count) * min(FOLDS, count) // count
 
 
 def _of_stretches(part: Linear, rows: MotionRows, some: Index) -> Linear:
-    """A channel's coefficients of some stretches alone, weighed as those of all."""
+    """A channel's coefficients of some stretches only, with unchanged weights."""
     every = np.column_stack([part.white, part.design]) / part.weight[:, None]
     raw = rows.of_stretches(every, some)
     weight = part.weight.reshape(-1, rows.length)[some].ravel()
@@ -141,8 +141,11 @@ def _of_stretches(part: Linear, rows: MotionRows, some: Index) -> Linear:
     )  # fmt: skip
 
 
-def _weighed(
-    found: Following, part: Linear, levels: Mapping[int, Array], frequency: Array
+def _reweighted(
+    found: MotionExplanation,
+    part: Linear,
+    levels: Mapping[int, Array],
+    frequency: Array,
 ) -> Linear:
     """A channel's coefficients with another power of the noise."""
     c = part.channel
@@ -155,7 +158,7 @@ def _weighed(
 
 
 def _residual(part: Linear, values: Array, best: Set) -> Array:
-    """What is left of whitened coefficients as a set predicts them."""
+    """Whitened coefficients less those that a set predicts."""
     estimate: Array = np.zeros(len(values))
     np.add.at(estimate, best.state.columns, best.state.estimate)
     step = (values - estimate)[part.columns]
@@ -164,7 +167,7 @@ def _residual(part: Linear, values: Array, best: Set) -> Array:
 
 
 def _squares(left: Sequence[Linear], values: Array, best: Set) -> float:
-    """Squares of what was left out, the prediction's uncertainty counted."""
+    """Chi squared of the held-out part, with the uncertainty of the prediction."""
     state = best.state
     inner = np.zeros((len(state.columns), len(state.columns)))
     pull, square = np.zeros(len(state.columns)), 0.0
@@ -177,4 +180,4 @@ def _squares(left: Sequence[Linear], values: Array, best: Set) -> float:
         inner[np.ix_(here, here)] += design.T @ design
         pull[here] += design.T @ white
         square += float(white @ white)
-    return unsure_squares(square, pull, inner, state.inverse)
+    return chi2_of_uncertain_prediction(square, pull, inner, state.inverse)

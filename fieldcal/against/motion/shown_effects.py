@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.against.motion.fit import estimates
-from fieldcal.against.motion.following import Following
+from fieldcal.against.motion.fit import column_estimates
+from fieldcal.against.motion.following import MotionExplanation
 from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.result import Mismatch, Quantity
@@ -18,10 +18,10 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.posterior.probabilities import Standing
 
 
-def effects(
-    found: Following, standing: Sequence[Standing], state: Eliminated
+def effect_differences(
+    found: MotionExplanation, standing: Sequence[Standing], state: Eliminated
 ) -> Iterator[Difference]:
-    """Causes that are likelier there than not."""
+    """Differences by the causes with a probability above one half."""
     for one in standing:
         pairs: dict[str, RealAndSimulated] = {}
         for _, group in one.members:
@@ -33,17 +33,17 @@ def effects(
             one.probability,
             pairs,
             tuple(n for n in one.aliases if n in catalogue()),
-            tuple(_where(found, one, state)),
+            tuple(_mismatches_of_cause(found, one, state)),
             explained=one.name in catalogue(),
         )
 
 
 def _quantities(group: Group, state: Eliminated) -> dict[str, Quantity]:
-    """Numbers of a cause, as far as the rows determine them."""
+    """Parameters of a cause that the rows determine."""
     effect = group.effect
     if effect is None:
         return {}
-    value, covariance, before = estimates(state, group.columns)
+    value, covariance, before = column_estimates(state, group.columns)
     sigma = np.sqrt(np.diag(covariance))
     out = {
         effect.params[j].name: Quantity(float(v), float(s), effect.params[j].unit)
@@ -57,8 +57,10 @@ def _quantities(group: Group, state: Eliminated) -> dict[str, Quantity]:
     return out
 
 
-def _where(found: Following, one: Standing, state: Eliminated) -> Iterator[Mismatch]:
-    """Channels in which a cause shows, and what it follows there."""
+def _mismatches_of_cause(
+    found: MotionExplanation, one: Standing, state: Eliminated
+) -> Iterator[Mismatch]:
+    """Mismatches in the channels in which a cause is significant."""
     inferred, system = found.inferred, found.fit.system
     wanted = np.zeros(system.dictionary.width, dtype=bool)
     for _, group in one.members:

@@ -1,4 +1,4 @@
-"""Where two recordings of one motion stand beside each other, in a sentence."""
+"""The alignment of two recordings of one motion, in a sentence."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from fieldcal.against.result import Aligned
 from fieldcal.diagnosis.wording.paragraph import with_uncertainty
 
 
-def aligned_as(where: Aligned) -> str:
+def alignment_sentence(where: Aligned) -> str:
     """Delay, clock rate and axes with their ±."""
     turns = ", ".join(
         f"{with_uncertainty(angle)} about {axis}" for axis, angle in where.turn.items()

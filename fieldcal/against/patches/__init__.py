@@ -1,9 +1,10 @@
-"""What was found, in the terms of the user's simulator, one format a file.
+"""Writes the sensor model in the format of the user's simulator, one module a format.
 
-To add one, write patches/<name>.py with ``WHAT`` (a line for the help), ``ENDING``,
-``HOLDS`` (ids of what it can say, among those of `SensorModel.changed`) and
-``text(model)``, which returns the file and what the user must know, a sentence each.
-Sign and order of its convention stand at the top of the file, with where that is from.
+To add a format, write patches/<name>.py with ``WHAT`` (a line for the help), ``ENDING``
+(of the file name), ``HOLDS`` (ids that the format can hold, among those of
+`SensorModel.changed`) and ``text(model)``, which returns the content of the file and a
+list of notices for the user. The top of the module states the sign convention and its
+source.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
 
-from fieldcal.against.sensor_model import SensorModel, told
+from fieldcal.against.sensor_model import SensorModel, effect_with_values
 from fieldcal.core.plugins import names
 from fieldcal.session.folder import write_whole
 
 
 class PatchFormat(Protocol):
-    """What a module of `patches` offers."""
+    """Interface of a module of `patches`."""
 
     WHAT: str
     ENDING: str
@@ -28,7 +29,7 @@ class PatchFormat(Protocol):
 
 
 def formats() -> tuple[str, ...]:
-    """Names of the formats there are."""
+    """Names of all formats."""
     return names(__path__)
 
 
@@ -38,9 +39,9 @@ def patch_format(name: str) -> PatchFormat:
 
 
 def write(name: str, model: SensorModel, path: Path) -> list[str]:
-    """Write a patch whole or not at all; what the user must know.
+    """Write a patch whole or not at all; returns notices for the user.
 
-    What the format cannot hold is among that.
+    They name everything that the format cannot hold.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def write(name: str, model: SensorModel, path: Path) -> list[str]:
     content, says = module.text(model)
     lost = [one for one in model.changed if one not in module.HOLDS]
     for one in lost:
-        what = told(one.replace("_", " "), model.effects.get(one, {}))
+        what = effect_with_values(one.replace("_", " "), model.effects.get(one, {}))
         says.append(f"{name} has nothing for {what}: it is not in {path.name}")
     write_whole(path, content)
     return says

@@ -1,4 +1,4 @@
-"""Residuals of one model: what was fitted, and what was predicted."""
+"""Residuals of one model: of its fit, and of its predictions of held-out positions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.rows.reduce import Rows
 
@@ -15,51 +15,53 @@ UNITS = ("m/s^2", "rad/s")
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class ModelResiduals:
     """Residuals of one model.
 
     Attributes
     ----------
-    rows : they belong to
-    residual, ahead : (n, 6) of what was fitted, and of what was predicted
-    lines, lines_ahead : (6,) mean squares at the lines' frequencies, and as predicted
+    rows : rows that the residuals belong to
+    residual : (n, 6) of the fit
+    predicted_residual : (n, 6) of held-out positions
+    lines, lines_predicted : (6,) mean squares at the frequencies of lines, of fit and
+        prediction
     chi2_per_dof : of the residual
 
     """
 
     rows: Rows
     residual: Array
-    ahead: Array
+    predicted_residual: Array
     lines: Array
-    lines_ahead: Array
+    lines_predicted: Array
     chi2_per_dof: float
 
     @property
     def rms(self) -> Array:
-        """Root mean squares over parts of windows, (6,)."""
-        return rms(self.rows, self.residual)
+        """Root mean squares of the fit's residuals over parts of windows, (6,)."""
+        return rms_over_parts(self.rows, self.residual)
 
     @property
-    def held_out(self) -> Array:
-        """The same of what was predicted."""
-        return rms(self.rows, self.ahead)
+    def held_out_rms(self) -> Array:
+        """Root mean squares of the predicted residuals, (6,)."""
+        return rms_over_parts(self.rows, self.predicted_residual)
 
     @property
-    def whole(self) -> Array:
-        """Root mean squares with what there is of lines, (6,)."""
+    def rms_with_lines(self) -> Array:
+        """Root mean squares of the fit's residuals and of lines together, (6,)."""
         return np.sqrt(self.rms**2 + self.lines)
 
     def quality(self, triad: int) -> Quality:
-        """In the unit of one triad: 0 accelerometers, 1 gyroscopes."""
+        """Quality in the unit of one triad: 0 accelerometers, 1 gyroscopes."""
         part = slice(3 * triad, 3 * triad + 3)
-        held_out = np.sqrt(self.held_out**2 + self.lines_ahead)
+        held_out = np.sqrt(self.held_out_rms**2 + self.lines_predicted)
         by_channel = {
             n: float(v)
             for n, v in zip(CHANNELS, held_out, strict=True)
             if np.isfinite(v)
         }
         return Quality(
-            rms=_mean(self.whole[part]),
+            rms=_mean(self.rms_with_lines[part]),
             chi2_per_dof=self.chi2_per_dof,
             held_out_rms=_mean(held_out[part]),
             by_channel=by_channel,

@@ -12,16 +12,21 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.model_average import of_columns
 from fieldcal.model.posterior.reported import reported
 
-GROUPS = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s", "gyr_scale": "1"}
+GROUP_UNITS = {
+    "acc_bias": "m/s^2",
+    "acc_scale": "1",
+    "gyr_bias": "rad/s",
+    "gyr_scale": "1",
+}
 
 
-def with_effects(explanation: Explanation) -> dict[str, CalibrationGroup]:
-    """Groups that the recording determines, in the unit of the outputs."""
+def calibration_groups(explanation: Explanation) -> dict[str, CalibrationGroup]:
+    """Groups of the calibration that the recording determines, in output units."""
     about = explanation.prepared.source.about
     nominal, gauge = about.nominal, about.gauge
-    found = averaged(explanation)
+    found = averaged_calibration(explanation)
     out = {}
-    for group, unit in GROUPS.items():
+    for group, unit in GROUP_UNITS.items():
         value, sigma = np.full(3, np.nan), np.full(3, np.nan)
         for i, axis in enumerate("xyz"):
             if f"{group}.{axis}" in found:
@@ -36,32 +41,34 @@ def with_effects(explanation: Explanation) -> dict[str, CalibrationGroup]:
     return out
 
 
-def calibrated(
+def calibration_of_set(
     explanation: Explanation, one: Set
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
-    found = one  # of what was found the numbers are taken already
+    found = one  # the best set has its reported sizes already
     if one is not explanation.best.set:
         found = reported(explanation.posterior.search, one)
-    at = _columns(explanation)
+    at = _calibration_columns(explanation)
     left = explanation.dictionary.unfitted
-    return _named(explanation, at, *of_columns([(found, 1.0)], at, left))
+    return _values_by_name(explanation, at, *of_columns([(found, 1.0)], at, left))
 
 
-def averaged(explanation: Explanation) -> dict[str, tuple[float, float, float]]:
-    """The same over all sets that count."""
-    at = _columns(explanation)
-    return _named(explanation, at, *explanation.average.of_columns(at))
+def averaged_calibration(
+    explanation: Explanation,
+) -> dict[str, tuple[float, float, float]]:
+    """Bias and scale factor averaged over sets, as `calibration_of_set`."""
+    at = _calibration_columns(explanation)
+    return _values_by_name(explanation, at, *explanation.model_average.of_columns(at))
 
 
-def _columns(explanation: Explanation) -> Index:
+def _calibration_columns(explanation: Explanation) -> Index:
     """Columns of biases and scale factors that every set has."""
     d = explanation.dictionary
     every = np.concatenate([d.bias + np.arange(6), d.scale + np.arange(6)])
     return every[np.isin(every, explanation.best.set.state.columns)]
 
 
-def _named(
+def _values_by_name(
     explanation: Explanation, at: Index, mean: Array, covariance: Array
 ) -> dict[str, tuple[float, float, float]]:
     """Value, sigma and scale factor of columns of the calibration, by full name."""
@@ -80,8 +87,8 @@ def _named(
     return out
 
 
-def moved(explanation: Explanation, less: Set) -> dict[str, Quantity]:
-    """By how much a calibration changes when a cause is taken into account.
+def calibration_changes(explanation: Explanation, less: Set) -> dict[str, Quantity]:
+    """Change of the calibration when a cause is taken into account.
 
     Parameters
     ----------
@@ -90,19 +97,22 @@ def moved(explanation: Explanation, less: Set) -> dict[str, Quantity]:
 
     Returns
     -------
-    by full name: value with the cause less value without it, and the sigma that is told
-    of the calibration, in the unit of the outputs; what either leaves open is absent
+    by full name: value with the cause less value without it, with the sigma of the
+    averaged calibration, in the unit of the outputs; parameters that either set does
+    not determine are absent
 
     """
     gauge = explanation.prepared.source.about.gauge
-    now, before = (calibrated(explanation, s) for s in (explanation.best.set, less))
-    told, out = averaged(explanation), {}
+    now, before = (
+        calibration_of_set(explanation, s) for s in (explanation.best.set, less)
+    )
+    told, out = averaged_calibration(explanation), {}
     for name, (value, _, size) in now.items():
         sigma = told[name][1]
         group = name.partition(".")[0]
         allowed = thresholds.USEFUL[group] * size
         was, sigma_was, _ = before.get(name, (np.nan, np.inf, 1.0))
         if 0 < sigma < allowed and sigma_was < allowed:
-            part, unit = gauge.of(group) or (1.0, GROUPS[group])
+            part, unit = gauge.of(group) or (1.0, GROUP_UNITS[group])
             out[name] = Quantity(part * (value - was), part * sigma, unit)
     return out

@@ -1,4 +1,4 @@
-"""The candidates that were tried on a recording, and why each was rejected."""
+"""The effects that were tried on a recording, and why each was rejected."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
@@ -17,39 +17,39 @@ from fieldcal.model.posterior.held_out import held_out
 from fieldcal.model.search.offer import Offer
 from fieldcal.physics.effect import Scatter
 
-LARGEST = 40.0
+LARGEST_LOG_ODDS = 40.0
 """Largest log odds that are stated."""
 
-FOLLOWED = 1
-"""Losers whose predictions are worked out: each costs a fit for every position."""
+PREDICTED_LOSERS = 1
+"""Rejected effects whose predictions are calculated: each needs a fit per position."""
 
 
-def candidates(
+def tried_candidates(
     explanation: Explanation, found: Sequence[FoundEffect]
 ) -> tuple[Candidate, ...]:
-    """Every effect that was tried on the rows, the one that takes most first."""
+    """Every effect that was tried on the rows, by decreasing fall of chi squared."""
     posterior = explanation.posterior
     search, best = posterior.search, posterior.best
     nothing = search.evaluated(())
-    alone = _best(search.offers(nothing))
-    beside = _best(search.offers(best))
+    alone = _best_offer_by_effect(search.offers(nothing))
+    beside = _best_offer_by_effect(search.offers(best))
     taken = {f.id: f for f in found}
     rows = int(explanation.rows.used.sum())
     losers = (i for i in alone if i in catalogue() and i not in taken)
-    followed = list(losers)[:FOLLOWED]
+    followed = list(losers)[:PREDICTED_LOSERS]
     out = []
     for id_ in dict.fromkeys(c.name for c in explanation.dictionary.causes):
         effect = catalogue().get(id_)
         if effect is None or isinstance(effect, Scatter):
             continue
         offer = alone.get(id_)
-        delta = 2 * _rise(offer, nothing) if offer else 0.0
+        delta = 2 * _evidence_rise(offer, nothing) if offer else 0.0
         width = len(offer.member[1].columns) if offer else 0
         one = taken.get(id_)
-        why = "" if one else _why(id_, explanation, offer, beside.get(id_))
+        why = "" if one else _reason_rejected(id_, explanation, offer, beside.get(id_))
         gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
         if one is None and offer is not None and id_ in followed:
-            gain = _alone(explanation, search.taken(nothing, offer))
+            gain = _held_out_gain_alone(explanation, search.taken(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
         out.append(
@@ -66,11 +66,11 @@ def candidates(
     return tuple(sorted(out, key=lambda c: -c.delta_chi2))
 
 
-def _alone(explanation: Explanation, there: Set) -> float:
-    """Part of the held-out rms that goes with a set, in the channel where most goes."""
+def _held_out_gain_alone(explanation: Explanation, there: Set) -> float:
+    """Part of the held-out rms that a set removes, in the channel that changes most."""
     best, nothing = explanation.best, explanation.posterior.search.evaluated(())
-    before = rms(best.rows, explanation.held_out.residual([nothing]))
-    after = rms(best.rows, held_out(replace(best, set=there), [there]))
+    before = rms_over_parts(best.rows, explanation.held_out.residual([nothing]))
+    after = rms_over_parts(best.rows, held_out(replace(best, set=there), [there]))
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)
     if not known.any():
         return np.nan
@@ -79,40 +79,40 @@ def _alone(explanation: Explanation, there: Set) -> float:
     return float(1 - after[c] / before[c])
 
 
-def _best(offers: Sequence[Offer]) -> Mapping[str, Offer]:
-    """Of an effect's parts the one that does most."""
+def _best_offer_by_effect(offers: Sequence[Offer]) -> Mapping[str, Offer]:
+    """The offer with the highest evidence of each effect; offers come best first."""
     found: dict[str, Offer] = {}
     for offer in offers:
         found.setdefault(offer.member[0].name, offer)
     return found
 
 
-def _rise(offer: Offer, there: Set) -> float:
-    """Rise of the evidence with a cause, its chance left out, ln; 0 at least."""
+def _evidence_rise(offer: Offer, there: Set) -> float:
+    """Rise of ln Z with a cause, without its prior probability; 0 at least."""
     cause = offer.member[0]
     chance = np.log(cause.chance / len(cause.variants))
     return max(offer.score - there.score - float(chance), 0.0)
 
 
-def _why(
+def _reason_rejected(
     id_: str, explanation: Explanation, alone: Offer | None, beside: Offer | None
 ) -> str:
     posterior = explanation.posterior
     best = posterior.best
     names = " and ".join(dict.fromkeys(c.name for c, _ in best.members))
-    for standing in explanation.standing:
+    for standing in explanation.probable_causes:
         if id_ in standing.aliases:
             return (
                 f"explains it about as well as {standing.name}; this recording cannot"
                 " tell"
             )
-    rise = _rise(alone, posterior.search.evaluated(())) if alone else 0.0
+    rise = _evidence_rise(alone, posterior.search.evaluated(())) if alone else 0.0
     if rise < thresholds.TAKES_LITTLE or alone is None:
         return "takes no more than chance would"
     odds = _odds(alone.score - posterior.search.evaluated(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
-    if beside is not None and _rise(beside, best) > thresholds.TAKES_LITTLE:
+    if beside is not None and _evidence_rise(beside, best) > thresholds.TAKES_LITTLE:
         return f"beside {names} it takes a little, at odds of {odds}"
     return f"{names} takes it: beside that nothing is left for it"
 
@@ -124,9 +124,9 @@ def _odds(gain: float) -> str:
     ('1 to 1', '1 to 20', 'below 1 to 2e+17')
     """
     if gain > 0:
-        more = np.exp(min(gain, LARGEST))
-        return f"{'above ' if gain > LARGEST else ''}{more:.2g} to 1"
-    more = np.exp(min(-gain, LARGEST))
-    if gain < -LARGEST:
+        more = np.exp(min(gain, LARGEST_LOG_ODDS))
+        return f"{'above ' if gain > LARGEST_LOG_ODDS else ''}{more:.2g} to 1"
+    more = np.exp(min(-gain, LARGEST_LOG_ODDS))
+    if gain < -LARGEST_LOG_ODDS:
         return f"below 1 to {more:.0e}"
     return f"1 to {more:.2g}"

@@ -1,4 +1,7 @@
-"""Names of quantities with which a residual without a known effect may correlate."""
+"""Functions of a covariate with which a residual without a known effect may correlate.
+
+The names are those that the sentences show.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,14 @@ from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
 
 
-def courses(name: str, x: Experience, channel: int) -> Mapping[str, Array]:
-    """Courses (n,) of a covariate that a residual of a channel could follow."""
+def covariate_functions(name: str, x: Experience, channel: int) -> Mapping[str, Array]:
+    """Functions (n,) of a covariate that a residual of a channel could follow."""
     if name == "force and time":
         force, t = x.f[:, channel % 3], x.since_start
         return {f"force*time^{k}": force * t**k for k in (1, 2, 3)}
     if name == "time":
         t = x.since_start
-        return {"time": t, "time^2": t**2, "time^3": t**3} | _waves(t)
+        return {"time": t, "time^2": t**2, "time^3": t**3} | _sinusoids(t)
     if name == "temperature":
         return {"temperature": x.warming, "temperature^2": x.warming**2}
     if name == "since turn":
@@ -27,13 +30,13 @@ def courses(name: str, x: Experience, channel: int) -> Mapping[str, Array]:
         names = [f"f_{a}" for a in "xyz"]
         forces = dict(zip(names, x.f.T, strict=True))
         return {f"{n}^{k}": f**k for n, f in forces.items() for k in (1, 2, 3, 4)}
-    one, two = _of_angle("alpha", x.alpha), _of_angle("beta", x.beta)
+    one, two = _angle_functions("alpha", x.alpha), _angle_functions("beta", x.beta)
     if name == "joints":
         return {f"{a}*{b}": one[a] * two[b] for a in one for b in two}
     return one if name == "alpha" else two
 
 
-def _of_angle(name: str, angle: Array) -> dict[str, Array]:
+def _angle_functions(name: str, angle: Array) -> dict[str, Array]:
     out = {name: angle}
     for k in (1, 2, 3, 4):
         inner = f"{k}*{name}" if k > 1 else name
@@ -42,7 +45,7 @@ def _of_angle(name: str, angle: Array) -> dict[str, Array]:
     return out
 
 
-def _waves(t: Array) -> dict[str, Array]:
+def _sinusoids(t: Array) -> dict[str, Array]:
     span = float(np.ptp(t))
     out = {}
     for cycles in np.arange(1.0, 12.01, 0.25):

@@ -13,33 +13,35 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import Agreement
-from fieldcal.diagnosis.findings.stretch_means import averages
+from fieldcal.diagnosis.findings.agreement import ModelResiduals
+from fieldcal.diagnosis.findings.stretch_means import part_means
 from fieldcal.diagnosis.result import Curve, Mismatch
 from fieldcal.model.rows.reduce import Rows
 
 
-def curves(
+def residual_curves(
     explanation: Explanation,
     mismatch: Sequence[Mismatch],
-    first: Agreement,
-    then: Agreement,
+    first: ModelResiduals,
+    then: ModelResiduals,
 ) -> Iterator[Curve]:
-    """One curve for each channel and covariate in which the windows part."""
+    """One curve for each channel and covariate of the mismatches in the windows."""
     source = explanation.prepared.source
     start = source.warmth.start_c
     done = set()
     for m in mismatch:
-        name, unit = NAMES.get(m.kind, ("", ""))
+        name, unit = CURVE_AXES.get(m.kind, ("", ""))
         if not name or m.channel not in CHANNELS or (m.channel, name) in done:
             continue
         done.add((m.channel, name))
         c = CHANNELS.index(m.channel)
         rows = first.rows
-        before, sd, position = averages(rows, first.residual)
-        after = averages(then.rows, then.residual)[0]
+        before, sd, position = part_means(rows, first.residual)
+        after = part_means(then.rows, then.residual)[0]
         position = np.array(source.about.numbered(position))
-        x = _mean(rows, COVARIATES[name](rows)) + (start if unit == "°C" else 0.0)
+        x = _covariate_means(rows, COVARIATES[name](rows)) + (
+            start if unit == "°C" else 0.0
+        )
         if name == "position":
             x = position.astype(float)
         yield Curve(
@@ -47,14 +49,14 @@ def curves(
         )
 
 
-NAMES: Mapping[str, tuple[str, str]] = {
+CURVE_AXES: Mapping[str, tuple[str, str]] = {
     "position": ("position", ""),
     "samples": ("time", "s"),
     "time": ("time", "s"),
     "temperature": ("temperature", "°C"),
     "transient": ("time since the turn", "s"),
 }
-"""What the residual of a kind of mismatch is drawn over, and its unit."""
+"""Axis and its unit over which the residual of a kind of mismatch is drawn."""
 
 COVARIATES: Mapping[str, Callable[[Rows], Array]] = {
     "position": lambda rows: rows.x.position.astype(float),
@@ -64,10 +66,10 @@ COVARIATES: Mapping[str, Callable[[Rows], Array]] = {
 }
 
 
-def _mean(rows: Rows, values: Array) -> Array:
-    """Means of something known in each row over the same parts of windows."""
+def _covariate_means(rows: Rows, values: Array) -> Array:
+    """Means of a covariate over the same parts of windows as the residuals."""
     six = np.broadcast_to(values[:, None], rows.y.shape)
-    mean = averages(rows, six)[0]
+    mean = part_means(rows, six)[0]
     known = np.isfinite(mean)
     weight = np.where(known, mean, 0.0).sum(axis=1)
     out: Array = weight / np.maximum(known.sum(axis=1), 1)

@@ -1,8 +1,8 @@
 """Filters of the sensors, as the turns between known positions show them.
 
 A turn shows the variance v of an impulse response, (1) of `filtered_turns`. A low-pass
-of first order with tau^2 = v has the same, so it is told as one: tau = sqrt(v), and its
-sigma is that of v over 2 tau.
+of first order with tau^2 = v has the same variance, so the filter is reported as one:
+tau = sqrt(v), and the sigma of tau is that of v over 2 tau.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.filtered_turns import FILTERED
 
 
-def of_filters(explanation: Explanation) -> Iterator[FoundEffect]:
-    """The filter that is likelier there than not, if there is one."""
+def found_filters(explanation: Explanation) -> Iterator[FoundEffect]:
+    """The filter, if it is more likely present than not."""
     group = explanation.dictionary.filters
     if group is None:
         return
     chance = catalogue()[FILTERED].chance(explanation.dictionary.x)
-    rise = explanation.raised(group.columns.tolist())
+    rise = explanation.evidence_gain(group.columns.tolist())
     odds = rise + np.log(chance) - np.log1p(-chance)
     probability = float(of_odds(odds))
     state = explanation.best.set.state
@@ -38,7 +38,7 @@ def of_filters(explanation: Explanation) -> Iterator[FoundEffect]:
 
 
 def time_constants(square: Array, sigma: Array) -> dict[str, Quantity]:
-    """Of the triads whose impulse response is clearly no pulse.
+    """Time constants of the triads whose filter is significant.
 
     Parameters
     ----------

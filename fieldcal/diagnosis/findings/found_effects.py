@@ -9,12 +9,12 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.agreement import Agreement
-from fieldcal.diagnosis.findings.calibrated import moved
-from fieldcal.diagnosis.findings.instant import instant
-from fieldcal.diagnosis.findings.stretch_means import rms
+from fieldcal.diagnosis.findings.agreement import ModelResiduals
+from fieldcal.diagnosis.findings.calibrated import calibration_changes
+from fieldcal.diagnosis.findings.instant import estimate_instant
+from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.diagnosis.result import FoundEffect, Quantity
-from fieldcal.diagnosis.signal.line import Tone
+from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
@@ -29,57 +29,62 @@ from fieldcal.physics.recording import Fault
 
 
 @dataclass(frozen=True, slots=True)
-class Removed:
-    """What is lost when one cause is taken out.
+class CauseRemoval:
+    """What changes when one cause is removed from the best set.
 
     Attributes
     ----------
-    set : without it
-    residual : (n, 6) of that
-    squares : (6,) by how much the whitened squares of each channel rise
-    turned : by how much those of the turns do
+    set : the best set without the cause
+    residual : (n, 6) of that set
+    squares : (6,) rise of the whitened squares of each channel
+    turn_squares : rise of the whitened squares of all turns
 
     """
 
     set: Set
     residual: Array
     squares: Array
-    turned: float
+    turn_squares: float
 
 
-def in_turns(lost: Removed) -> bool:
-    """Whether windows lose nothing with a cause, or less than turns do."""
+def shows_mainly_in_turns(lost: CauseRemoval) -> bool:
+    """Whether a cause explains nothing in windows, or less than it does in turns."""
     windows = float(np.nan_to_num(lost.squares).max())
-    return windows < max(thresholds.STANDS_OUT**2, lost.turned)
+    return windows < max(thresholds.STANDS_OUT**2, lost.turn_squares)
 
 
-def rms_of(values: Array) -> float:
-    """Root mean square; nan of nothing."""
+def root_mean_square(values: Array) -> float:
+    """Root mean square of values (n,); nan if there are none."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
 
 
-def removed(explanation: Explanation, standing: Standing) -> Removed:
-    """Take a cause out, and see what its columns had taken."""
+def remove_cause(explanation: Explanation, standing: Standing) -> CauseRemoval:
+    """Remove a cause, and calculate what its columns had explained."""
     best = explanation.best
     less = explanation.posterior.without(standing.name)
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, less)
     residual = there.residual(there.certain)
     now = best.squares_of(best.residual(best.certain))
-    turned = _of_turns(explanation, there) - _of_turns(explanation, best)
-    return Removed(less, residual, best.squares_of(residual) - now, turned)
+    turned = _squares_of_turns(explanation, there) - _squares_of_turns(
+        explanation, best
+    )
+    return CauseRemoval(less, residual, best.squares_of(residual) - now, turned)
 
 
-def _of_turns(explanation: Explanation, fitted: Fitted) -> float:
+def _squares_of_turns(explanation: Explanation, fitted: Fitted) -> float:
     """Whitened squares of all turns."""
     values = fitted.estimate
     parts = (turn_residual(t, values) for t in explanation.inferred.turned)
     return float(sum(part @ part for part in parts))
 
 
-def of_rows(
-    explanation: Explanation, standing: Standing, lost: Removed, then: Agreement
+def effect_of_cause(
+    explanation: Explanation,
+    standing: Standing,
+    lost: CauseRemoval,
+    then: ModelResiduals,
 ) -> FoundEffect:
-    """A cause of the catalogue that windows or turns show."""
+    """The effect of a probable cause of the catalogue, with numbers and evidence."""
     posterior = explanation.posterior
     delta = 2 * (
         posterior.best.state.score - _score_at_instability(lost.set, posterior.best)
@@ -97,30 +102,32 @@ def of_rows(
     known = tuple(n for n in standing.aliases if n in catalogue())
     return FoundEffect(
         standing.name,
-        parameters(explanation, standing),
+        parameter_estimates(explanation, standing),
         known,
         evidence,
         standing.probability,
-        moved(explanation, lost.set),
+        calibration_changes(explanation, lost.set),
     )
 
 
 def _score_at_instability(less: Set, best: Set) -> float:
-    """Score of a set at the instabilities of another."""
+    """Log evidence of a set with the instabilities of another."""
     rows = best.state.rows
     return type(less.state).of(rows, less.state.columns, less.state.sizes).score
 
 
-def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
-    """Numbers of a cause, as far as the rows determine them."""
+def parameter_estimates(
+    explanation: Explanation, standing: Standing
+) -> dict[str, Quantity]:
+    """Parameters of a cause that the rows determine, averaged over sets."""
     effect = catalogue()[standing.name]
     if isinstance(effect, Scatter):
-        return sizes(explanation, standing)
+        return random_sizes(explanation, standing)
     out: dict[str, Quantity] = {}
     for member in standing.members:
         group = member[1]
-        value, covariance = explanation.average.of_member(member)
-        _, _, prior = estimates(explanation.best.set, group.columns)
+        value, covariance = explanation.model_average.of_member(member)
+        _, _, prior = column_estimates(explanation.best.set, group.columns)
         own: dict[str, Quantity] = {}
         sigma = np.sqrt(np.diag(covariance))
         for j, v, s, wide in zip(group.params, value, sigma, prior, strict=True):
@@ -128,36 +135,38 @@ def parameters(explanation: Explanation, standing: Standing) -> dict[str, Quanti
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
         if explanation.dictionary.free.all():
-            own = whatever_turned(group, value, covariance, prior, own)
-        out |= _since_arrival(own, group)
+            own = merge_turned_parameters(group, value, covariance, prior, own)
+        out |= _with_arrival_uncertainty(own, group)
     for shape in effect.shapes:
         known = [m for m in standing.members if shape.name in m[1].shape]
         if shape.kind == "instant":
-            known = known[:1]  # by all channels already
-        found = [shape_of(explanation, m) for m in known]
+            known = known[:1]  # estimated from all channels together
+        found = [shape_estimate(explanation, m) for m in known]
         weight = np.array([1 / max(error, 1e-12) ** 2 for _, error in found])
         at = float(weight @ [at for at, _ in found] / weight.sum())
         out[shape.name] = Quantity(at, float(weight.sum() ** -0.5), shape.unit)
     return out
 
 
-def whatever_turned(
+def merge_turned_parameters(
     group: Group,
     value: Array,
     covariance: Array,
     prior: Array,
     own: dict[str, Quantity],
 ) -> dict[str, Quantity]:
-    """Numbers of a device of which nobody knows how it stands.
+    """Replace two parameters by their sum where only the sum is determined.
 
-    What a turn of the whole device makes of two parameters is seen by their sum: where
-    that is better known than either, it is in the place of both.
+    If the orientation of the device is unknown, a turn of the whole device changes some
+    parameters into each other, and only their sum is seen. Where the sum is better
+    determined than either, it takes the place of both.
 
     Parameters
     ----------
     group : of an effect
-    value, covariance, prior : (k,), (k, k), (k,) of its parameters; their sizes before
-    own : its numbers by name
+    value, covariance, prior : (k,), (k, k), (k,) of its parameters; `prior` is their
+        standard deviation before the rows
+    own : its parameters by name
 
     """
     effect, out = group.effect, dict(own)
@@ -176,8 +185,10 @@ def whatever_turned(
     return out
 
 
-def _since_arrival(found: dict[str, Quantity], group: Group) -> dict[str, Quantity]:
-    """Amplitudes with the uncertainty of the instant that they are counted from."""
+def _with_arrival_uncertainty(
+    found: dict[str, Quantity], group: Group
+) -> dict[str, Quantity]:
+    """Add the uncertainty of the end of the turn to amplitudes that decay from it."""
     shapes = group.effect.shapes if group.effect else ()
     fading = (group.shape[s.name] for s in shapes if s.kind in ("turn", "joint"))
     tau = next(fading, np.inf)
@@ -189,61 +200,68 @@ def _since_arrival(found: dict[str, Quantity], group: Group) -> dict[str, Quanti
     }
 
 
-def shape_of(explanation: Explanation, member: Member) -> tuple[float, float]:
-    """A shape parameter and its standard uncertainty; an instant from the samples."""
+def shape_estimate(explanation: Explanation, member: Member) -> tuple[float, float]:
+    """A shape parameter and its standard uncertainty.
+
+    An instant is estimated from the samples, other shapes by the search.
+    """
     _, group = member
     (value,) = group.shape.values()
     (shape,) = group.effect.shapes  # type: ignore[union-attr]
     if shape.kind == "instant":
-        return instant(explanation, member)
+        return estimate_instant(explanation, member)
     return value, min(group.unsure, value)
 
 
-def estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
-    """Values, sigmas and sizes before the rows of some columns of a set."""
-    at = _places(found, columns)
+def column_estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
+    """Value, sigma and prior standard deviation of some columns of a set."""
+    at = _column_indices(found, columns)
     value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
     return value, sigma, found.state.sizes[at]
 
 
-def _places(found: Set, columns: Index) -> Index:
-    """Where columns stand in a set; a member's come last."""
+def _column_indices(found: Set, columns: Index) -> Index:
+    """Indices of columns in a set; the last one, since a member's come last."""
     return np.array(
         [int(np.flatnonzero(found.state.columns == c)[-1]) for c in columns]
     )
 
 
-def sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
-    """Sizes of what is random, each with its uncertainty.
+def random_sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
+    """Sizes of a random effect, each with its uncertainty.
 
-    By the likeliest set alone: a covariance that is averaged over several sizes tells
-    none of them.
+    They are those of the likeliest set: a covariance averaged over several sizes
+    determines none of them.
     """
     best, out = explanation.posterior.best, dict[str, Quantity]()
     for member in standing.members:
         tried = float(priors.SIZES[best.sizes.members[best.members.index(member)]])
-        out |= sizes_of(best, explanation.dictionary, member[1], tried)
+        out |= random_sizes_of_group(best, explanation.dictionary, member[1], tried)
     return out
 
 
-def sizes_of(found: Set, d: Dictionary, group: Group, v: float) -> dict[str, Quantity]:
-    """Sizes of a random group that has the size v in a set, axis by axis.
+def random_sizes_of_group(
+    found: Set, d: Dictionary, group: Group, v: float
+) -> dict[str, Quantity]:
+    """Sizes of a random group, axis by axis, given that its size in a set is v.
 
-    Their uncertainty is from the information on ln v.
+    Their uncertainty follows from the information on ln v.
     """
     out = {}
-    whole = likeliest(found.state, _places(found, group.columns), v)
-    for param, at in _scattered(d, group):
+    whole = likeliest(found.state, _column_indices(found, group.columns), v)
+    for param, at in _scattered_columns(d, group):
         size, part = whole
         if len(at) < len(group.columns):
-            size, part = likeliest_of_axis(found.state, _places(found, at), v, whole)
+            size, part = likeliest_of_axis(
+                found.state, _column_indices(found, at), v, whole
+            )
         size *= param.typical
         out[param.name] = Quantity(size, size * part, param.unit)
     return out
 
 
-def _scattered(d: Dictionary, group: Group) -> Iterator[tuple[Param, Index]]:
-    """Parameters of something random, with the columns that each scatters."""
+def _scattered_columns(d: Dictionary, group: Group) -> Iterator[tuple[Param, Index]]:
+    """Parameters of a random effect, with the columns that each one scatters."""
     params = group.effect.params if group.effect else ()
     if not group.params:
         yield from ((one, group.columns) for one in params)
@@ -252,45 +270,50 @@ def _scattered(d: Dictionary, group: Group) -> Iterator[tuple[Param, Index]]:
 
 
 def _held_out_gain(
-    explanation: Explanation, standing: Standing, lost: Removed, then: Agreement
+    explanation: Explanation,
+    standing: Standing,
+    lost: CauseRemoval,
+    then: ModelResiduals,
 ) -> float:
-    """Part of the held-out rms that goes with a cause.
+    """Part of the held-out rms that a cause removes.
 
-    What is random foretells no value but how far values lie apart: of it, the part by
-    which an rms would be less where what is left out is as much likelier.
+    A random effect predicts no value, but the scatter of values. For it, the gain is
+    that reduction of an rms which would raise the density of the held-out rows as much.
     """
     if not isinstance(catalogue()[standing.name], Scatter):
-        return gain(explanation, lost, then)
+        return held_out_rms_gain(explanation, lost, then)
     held_out, there = explanation.held_out, explanation.best.set
     rise = held_out.density(there) - held_out.density(lost.set)
-    channels = [c for _, g in standing.members for c in _channels(g)]
+    channels = [c for _, g in standing.members for c in _scattered_channels(g)]
     rows = int(explanation.rows.used[:, np.unique(channels)].sum())
     return float(1 - np.exp(-rise / rows))
 
 
-def _channels(group: Group) -> tuple[int, ...]:
-    """Outputs that something random scatters: its own, or those that feel angles."""
+def _scattered_channels(group: Group) -> tuple[int, ...]:
+    """Channels that a random effect scatters: its own, or the accelerometers."""
     effect = group.effect
     of_outputs = effect is not None and len(effect.params) == len(CHANNELS)
     return group.params if of_outputs else (0, 1, 2)
 
 
-def gain(explanation: Explanation, lost: Removed, then: Agreement) -> float:
-    """Part of the held-out rms that goes, in the channel where the effect is most."""
+def held_out_rms_gain(
+    explanation: Explanation, lost: CauseRemoval, then: ModelResiduals
+) -> float:
+    """Part of the held-out rms that is removed, in the channel with the most effect."""
     best, turned = explanation.best, explanation.inferred.turned
     there = Fitted(best.rows, best.dictionary, best.linear, best.values, lost.set)
-    if in_turns(lost):
-        without = rms_of(turns_held_out(there, turned))
-        return float(1 - rms_of(explanation.turns_held_out) / without)
-    ahead = rms(best.rows, explanation.held_out.residual([lost.set]))
-    now = then.held_out
+    if shows_mainly_in_turns(lost):
+        without = root_mean_square(turns_held_out(there, turned))
+        return float(1 - root_mean_square(explanation.turns_held_out) / without)
+    ahead = rms_over_parts(best.rows, explanation.held_out.residual([lost.set]))
+    now = then.held_out_rms
     share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)
     c = int(np.argmax(share))
     return float(1 - now[c] / ahead[c]) if share[c] > 0 else np.nan
 
 
-def of_tone(tone: Tone, gained: float) -> FoundEffect:
-    """A line in the spectrum."""
+def effect_of_line(tone: SpectralLine, gained: float) -> FoundEffect:
+    """The effect of a line in the spectrum."""
     values = {
         n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
         for n, v in tone.values.items()
@@ -299,8 +322,8 @@ def of_tone(tone: Tone, gained: float) -> FoundEffect:
     return FoundEffect(tone.effect.id, values, evidence=evidence)
 
 
-def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
-    """Effects on samples; steps of both triads are one."""
+def effects_of_faults(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
+    """Effects on samples; quantisation of both triads is reported once."""
     steps: dict[str, Quantity] = {}
     for name, fault in faults:
         if not fault.values:
@@ -309,7 +332,7 @@ def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
         units = {p.name: p.unit for p in effect.params}
         units |= {s.name: s.unit for s in effect.shapes}
         values = {
-            n: Quantity(v, fault.sigmas.get(n), _unit(n, fault, units))
+            n: Quantity(v, fault.sigmas.get(n), _unit_of_value(n, fault, units))
             for n, v in fault.values.items()
         }
         if name == "quantisation":
@@ -320,7 +343,7 @@ def of_samples(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
         yield FoundEffect("quantisation", steps)
 
 
-def _unit(name: str, fault: Fault, units: dict[str, str]) -> str:
+def _unit_of_value(name: str, fault: Fault, units: dict[str, str]) -> str:
     if name == "limit":
         return "m/s^2" if fault.channel in CHANNELS[:3] else "rad/s"
     if name == "needed_s":  # of a window

@@ -1,7 +1,7 @@
 """The instant of a change, from the samples around it.
 
 With z the samples less the output of the model before the change, and A_i the change of
-each channel as the device then lies, the instant k is that at which
+each channel in the position of sample i, the instant k is that at which
 
     S(k) = sum_{i<k} z_i^2 + sum_{i>=k} (z_i - A_i)^2
 
@@ -26,20 +26,20 @@ from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
 
 
-def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
+def estimate_instant(explanation: Explanation, member: Member) -> tuple[float, float]:
     """Instant of a change, s of device time, and its standard uncertainty."""
     _, group = member
     (at,) = group.shape.values()
     rows, block = explanation.rows, explanation.prepared.source.block
-    known = _known(explanation, member)
-    plain = rows.y - explanation.best.residual() - _outputs(rows.x, known)
-    change = _outputs(rows.x, known, dict.fromkeys(group.shape, -np.inf))
+    known = _fitted_changes(explanation, member)
+    plain = rows.y - explanation.best.residual() - _change_of_outputs(rows.x, known)
+    change = _change_of_outputs(rows.x, known, dict.fromkeys(group.shape, -np.inf))
     seen = np.where(rows.used, rows.y - plain, np.nan)
-    low, high = _possible(explanation, _squares(seen, change, rows.sd), at)
+    low, high = _possible_instants(explanation, _squares(seen, change, rows.sd), at)
     part = slice(*np.searchsorted(block.t, [low, np.nextafter(high, np.inf)]))
     t, six = block.t[part], block.six[part]
     row = np.clip(np.searchsorted(rows.span[:, 1], t), 0, len(rows.x.t) - 1)
-    held = _held(explanation, t)[:, None] & explanation.prepared.source.usable[part]
+    held = _at_rest(explanation, t)[:, None] & explanation.prepared.source.usable[part]
     z = np.where(held, six - plain[row], np.nan)
     noise = np.where(rows.noise > 0, rows.noise, np.inf)
     squares, edges = _squares(z, change[row], noise), np.concatenate([t, [high]])
@@ -53,11 +53,11 @@ def instant(explanation: Explanation, member: Member) -> tuple[float, float]:
 
 
 def _squares(z: Array, change: Array, noise: Array) -> Array:
-    """S before each of some instants and after the last, (n + 1,), but for a constant.
+    """S of changes before each instant and after the last, (n + 1,), less a constant.
 
     Parameters
     ----------
-    z : (n, 6) what is seen without the change, nan where nothing is
+    z : (n, 6) samples less the model without the change; nan where missing
     change : (n, 6)
     noise : (6,) or (n, 6) standard deviations
 
@@ -66,10 +66,10 @@ def _squares(z: Array, change: Array, noise: Array) -> Array:
     return np.concatenate([np.cumsum(gained[::-1])[::-1], [0.0]])
 
 
-def _possible(
+def _possible_instants(
     explanation: Explanation, squares: Array, at: float
 ) -> tuple[float, float]:
-    """Between what instants it can have been, s, by S before each row."""
+    """First and last possible instant of the change, s, by S before each row."""
     span = explanation.rows.span
     near = int(np.searchsorted(explanation.rows.x.t, at))
     some = np.append(
@@ -79,16 +79,18 @@ def _possible(
     return float(span[first, 0]), float(span[last, 1])
 
 
-def _held(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
-    """Samples at rest, in one of the rows, (n,)."""
+def _at_rest(explanation: Explanation, t: Array) -> NDArray[np.bool_]:
+    """Whether samples at times t (n,) lie within a row, (n,)."""
     span = explanation.rows.span
     row = np.clip(np.searchsorted(span[:, 1], t), 0, len(span) - 1)
     inside: NDArray[np.bool_] = (t >= span[row, 0]) & (t <= span[row, 1])
     return inside
 
 
-def _known(explanation: Explanation, member: Member) -> list[tuple[Group, Array]]:
-    """The change as each triad has it, and its parameters, (k,)."""
+def _fitted_changes(
+    explanation: Explanation, member: Member
+) -> list[tuple[Group, Array]]:
+    """Groups of the change, one for each triad, with their parameters (k,)."""
     estimate = explanation.best.estimate
     return [
         (group, estimate[group.columns])
@@ -97,12 +99,12 @@ def _known(explanation: Explanation, member: Member) -> list[tuple[Group, Array]
     ]
 
 
-def _outputs(
+def _change_of_outputs(
     x: Experience,
     known: list[tuple[Group, Array]],
     shape: Mapping[str, float] | None = None,
 ) -> Array:
-    """What the change makes of rows, (n, 6), from its own instant on or another one."""
+    """Outputs (n, 6) that the change adds to rows, at its instant or another one."""
     out = np.zeros((len(x), 6))
     for group, values in known:
         if isinstance(group.effect, Sensor):

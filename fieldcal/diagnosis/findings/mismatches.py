@@ -1,7 +1,7 @@
 """Where recording and simulation differ: channel, positions, time, covariate.
 
-For a cause these follow from the residual without it, with all other causes fitted: the
-channels whose squares it explains, and the positions in which it is significant.
+For a cause these follow from the residual of the fit without it: the channels whose
+squares the cause explains, and the positions in which it is significant.
 """
 
 from __future__ import annotations
@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.correlates import courses
-from fieldcal.diagnosis.findings.found_effects import Removed, in_turns
-from fieldcal.diagnosis.findings.stretch_means import averages
-from fieldcal.diagnosis.findings.unknown_mismatch import mistakes
+from fieldcal.diagnosis.findings.correlates import covariate_functions
+from fieldcal.diagnosis.findings.found_effects import (
+    CauseRemoval,
+    shows_mainly_in_turns,
+)
+from fieldcal.diagnosis.findings.stretch_means import part_means
+from fieldcal.diagnosis.findings.unknown_mismatch import single_errors
 from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
@@ -28,18 +31,18 @@ from fieldcal.physics.recording import Fault
 
 
 def of_cause(
-    explanation: Explanation, standing: Standing, lost: Removed
+    explanation: Explanation, standing: Standing, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that an effect of the catalogue accounts for."""
     effect = catalogue()[standing.name]
-    if in_turns(lost):
+    if shows_mainly_in_turns(lost):
         yield from _of_turns(explanation, standing, lost)
         return
     yield from _of_residual(explanation, lost, effect.seen_in, effect.covariate)
 
 
 def _of_residual(
-    explanation: Explanation, lost: Removed, kind: Kind, covariate: str
+    explanation: Explanation, lost: CauseRemoval, kind: Kind, covariate: str
 ) -> Iterator[Mismatch]:
     squares = lost.squares
     most = float(np.nanmax(squares))
@@ -52,16 +55,19 @@ def _of_residual(
 
 def _in_windows(
     explanation: Explanation,
-    lost: Removed,
+    lost: CauseRemoval,
     c: int,
     positions: tuple[int, ...],
     kind: Kind,
     covariate: str,
 ) -> Mismatch:
-    """What windows have without a cause in a channel: at some positions, or where."""
-    mean, sd, position = averages(explanation.rows, lost.residual)
-    at = positions or standing_out(mean[:, c] / sd[:, c], position)
-    start, end = stretch(explanation, at)
+    """Mismatch of one channel in windows without a cause.
+
+    If no positions are given, they are those whose residuals stand out.
+    """
+    mean, sd, position = part_means(explanation.rows, lost.residual)
+    at = positions or outstanding_positions(mean[:, c] / sd[:, c], position)
+    start, end = time_span(explanation, at)
     inside = np.isin(position, at)
     return Mismatch(
         channel=CHANNELS[c],
@@ -75,8 +81,8 @@ def _in_windows(
     )
 
 
-def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
-    """Positions whose residuals stand out; the largest, if none does."""
+def outstanding_positions(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
+    """Positions with a significant residual; that of the largest, if there is none."""
     size = np.nan_to_num(np.abs(z))
     out = np.unique(position[size > thresholds.STANDS_OUT])
     if not len(out):
@@ -84,7 +90,9 @@ def standing_out(z: Array, position: NDArray[np.intp]) -> tuple[int, ...]:
     return tuple(int(p) for p in out)
 
 
-def stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float, float]:
+def time_span(
+    explanation: Explanation, positions: Sequence[int]
+) -> tuple[float, float]:
     """Device time from the first to the last sample of some positions, s."""
     source = explanation.prepared.source
     windows = spans(source.block, source.about)[list(positions)]
@@ -93,9 +101,9 @@ def stretch(explanation: Explanation, positions: Sequence[int]) -> tuple[float, 
 
 
 def _of_turns(
-    explanation: Explanation, standing: Standing, lost: Removed
+    explanation: Explanation, standing: Standing, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
-    """What a cause does while the device is turned, channel by channel."""
+    """Mismatches that a cause makes in turns, one for each channel."""
     turned = explanation.inferred.turned
     if not turned:
         return
@@ -116,7 +124,7 @@ def _of_turns(
     gaps = [(windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in some)]
     effect = catalogue()[standing.name]
     delta = 2 * (explanation.posterior.best.state.score - lost.set.state.score)
-    for channel, size in shown(explanation, standing).items():
+    for channel, size in largest_turn_outputs(explanation, standing).items():
         yield Mismatch(
             channel=channel,
             kind="turn",
@@ -129,7 +137,9 @@ def _of_turns(
         )
 
 
-def shown(explanation: Explanation, standing: Standing) -> dict[str, float]:
+def largest_turn_outputs(
+    explanation: Explanation, standing: Standing
+) -> dict[str, float]:
     """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
     inference = explanation.inferred.inference
     out: dict[str, float] = {}
@@ -147,16 +157,16 @@ def shown(explanation: Explanation, standing: Standing) -> dict[str, float]:
 
 
 def of_unknown(
-    explanation: Explanation, standing: Standing, lost: Removed
+    explanation: Explanation, standing: Standing, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that no effect in the catalogue accounts for."""
     for member in standing.members:
-        for group in mistakes(explanation, member):
+        for group in single_errors(explanation, member):
             yield from _of_group(explanation, member[0], group, lost)
 
 
 def _of_group(
-    explanation: Explanation, cause: Cause, group: Group, lost: Removed
+    explanation: Explanation, cause: Cause, group: Group, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that a group accounts for, on its channels, in its positions."""
     positions = (group.position,) if group.position >= 0 else group.together
@@ -170,7 +180,9 @@ def _of_group(
     )
     for c in channels:
         kind = KINDS.get(cause.name, "position")
-        covariate, correlation, share = followed(explanation, cause, c, lost.residual)
+        covariate, correlation, share = best_correlate(
+            explanation, cause, c, lost.residual
+        )
         one = _in_windows(explanation, lost, c, positions, kind, covariate)
         yield replace(one, correlation=correlation, share=share)
 
@@ -184,7 +196,7 @@ KINDS: dict[str, Kind] = {
 """Kind of mismatch of functions that no effect makes; the others go by position."""
 
 
-def followed(
+def best_correlate(
     explanation: Explanation, cause: Cause, channel: int, residual: Array
 ) -> tuple[str, float, float]:
     """Covariate of an unexplained residual, its correlation, and the share of variance.
@@ -197,7 +209,7 @@ def followed(
     x, off = explanation.rows.x, residual[:, channel]
     known = np.isfinite(off)
     best, correlation = name, np.nan
-    for label, course in courses(name, x, channel).items():
+    for label, course in covariate_functions(name, x, channel).items():
         spread = course[known].std()
         if spread > 1e-9:
             one = float(np.corrcoef(course[known], off[known])[0, 1])
@@ -214,7 +226,7 @@ def followed(
 def of_faults(
     t: Array, windows: NDArray[np.intp], faults: Sequence[tuple[str, Fault]]
 ) -> Iterator[Mismatch]:
-    """What happened to samples."""
+    """Mismatches by faults of samples."""
     for name, fault in faults:
         inside = [
             p
@@ -236,10 +248,10 @@ def of_faults(
 
 
 def of_tones(explanation: Explanation) -> Iterator[Mismatch]:
-    """Lines in the spectrum."""
+    """Mismatches by lines in the spectrum."""
     positions = tuple(int(p) for p in explanation.dictionary.held)
-    start, end = stretch(explanation, positions)
-    for tone in explanation.prepared.tones:
+    start, end = time_span(explanation, positions)
+    for tone in explanation.prepared.spectral_lines:
         for name in tone.channels:
             size = float(tone.amplitude[CHANNELS.index(name)])
             yield Mismatch(

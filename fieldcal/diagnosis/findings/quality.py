@@ -1,6 +1,6 @@
-"""Agreement of recording and simulation, before and after.
+"""Agreement of recording and simulation, without and with the effects found.
 
-Lines average out in means over a second. Their mean squares, at their own frequency,
+Lines average out in means over a second, so their mean squares at their own frequency
 are added.
 """
 
@@ -12,10 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import Explanation, base_of, inference_of
-from fieldcal.diagnosis.findings.agreement import Agreement
-from fieldcal.diagnosis.findings.found_effects import rms_of
-from fieldcal.diagnosis.prepare import Prepared
+from fieldcal.diagnosis.explain import (
+    Explanation,
+    build_inference,
+    fit_calibration_only,
+)
+from fieldcal.diagnosis.findings.agreement import ModelResiduals
+from fieldcal.diagnosis.findings.found_effects import root_mean_square
+from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
 from fieldcal.model.posterior.held_out import held_out, turn_residual, turns_held_out
 from fieldcal.model.rows.hand_tremor import rows_of
@@ -23,16 +27,16 @@ from fieldcal.model.rows.reduce import reduce
 from fieldcal.model.system.fitted import Fitted
 from fieldcal.model.system.turn_rows import TurnRows
 
-OF_TURNS = "standard deviations, in turns"
+TURN_UNIT = "standard deviations, in turns"
 
 
-def _agreement(
+def _model_residuals(
     fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
-) -> Agreement:
-    """Residuals of a fit; squares are weighted with the instability of another fit."""
+) -> ModelResiduals:
+    """Residuals of a fit; its chi squared has the instability of another fit."""
     same = fitted.rows.y.shape == weighed.rows.y.shape
     squares = weighed.squares_of(fitted.residual()) if same else fitted.squares
-    return Agreement(
+    return ModelResiduals(
         fitted.rows,
         fitted.residual(fitted.certain),
         ahead,
@@ -42,69 +46,76 @@ def _agreement(
     )
 
 
-def before(block: Block, explanation: Explanation) -> Agreement:
-    """The simulation alone, compared with the samples as recorded."""
+def simulation_residuals(block: Block, explanation: Explanation) -> ModelResiduals:
+    """Residuals of the simulation alone, against the samples as recorded."""
     prepared = explanation.prepared
-    base = raw(block, explanation)
-    lines = sum((r.before for r in prepared.remains), np.zeros(6))
+    base = fit_recorded_samples(block, explanation)
+    lines = sum((r.before for r in prepared.line_remainders), np.zeros(6))
     ahead = held_out(base, [base.set])
-    return _agreement(base, ahead, lines, lines, explanation.best)
+    return _model_residuals(base, ahead, lines, lines, explanation.best)
 
 
-def after(explanation: Explanation) -> Agreement:
-    """The simulation with the effects found; alone, if the rows show none."""
-    remains, best = explanation.prepared.remains, explanation.best
+def explained_residuals(explanation: Explanation) -> ModelResiduals:
+    """Residuals of the simulation with the effects found, if any were found."""
+    remains, best = explanation.prepared.line_remainders, explanation.best
     lines = sum((r.after for r in remains), np.zeros(6))
     predicted = sum((r.held_out for r in remains), np.zeros(6))
-    if not best.set.members and not explanation.sees_earth:
-        base = explanation.base
+    if not best.set.members and not explanation.each_window_shows_earth_rate:
+        base = explanation.calibration_only
         ahead = held_out(base, [base.set])
-        return _agreement(base, ahead, lines, predicted, best)
-    ahead = explanation.held_out.residual(explanation.in_question)
-    return _agreement(best, ahead, lines, predicted, best)
+        return _model_residuals(base, ahead, lines, predicted, best)
+    ahead = explanation.held_out.residual(explanation.rival_sets)
+    return _model_residuals(best, ahead, lines, predicted, best)
 
 
-def in_turns(explanation: Explanation) -> tuple[Quality, Quality]:
-    """The turns without and with the effects found, in standard deviations."""
+def turn_quality(explanation: Explanation) -> tuple[Quality, Quality]:
+    """Quality in the turns without and with the effects, in standard deviations."""
     best, turned = explanation.best, explanation.inferred.turned
     nothing = explanation.posterior.search.evaluated(())
     plain = replace(best, set=nothing)
     return (
-        _of_turns(plain, turned, turns_held_out(plain, turned)),
-        _of_turns(best, turned, explanation.turns_held_out),
+        _quality_of_turns(plain, turned, turns_held_out(plain, turned)),
+        _quality_of_turns(best, turned, explanation.turns_held_out),
     )
 
 
-def _of_turns(fitted: Fitted, turned: Sequence[TurnRows], ahead: Array) -> Quality:
+def _quality_of_turns(
+    fitted: Fitted, turned: Sequence[TurnRows], ahead: Array
+) -> Quality:
     residual = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
-    return Quality(rms_of(residual), float(np.mean(residual**2)), rms_of(ahead))
+    return Quality(
+        root_mean_square(residual), float(np.mean(residual**2)), root_mean_square(ahead)
+    )
 
 
-def raw(block: Block, explanation: Explanation) -> Fitted:
+def fit_recorded_samples(block: Block, explanation: Explanation) -> Fitted:
     """Fit of bias and scale factor alone to the samples as recorded."""
-    prepared: Prepared = explanation.prepared
+    prepared: PreparedRecording = explanation.prepared
     if block is prepared.source.block and not prepared.checked.ids:
-        return explanation.base
+        return explanation.calibration_only
     source = replace(
         prepared.source,
         block=block,
         usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
-    # a device that was touched is not held by hand for that: rows of the same kind
+    # rows of the same kind as before: by-hand or not is not decided again
     in_hand = prepared.rows.wander.any()
     rows = rows_of(source) if in_hand else reduce(source)
-    return base_of(inference_of(source, rows, prepared), rows)
+    return fit_calibration_only(build_inference(source, rows, prepared), rows)
 
 
-def parted(one: Agreement, other: Agreement) -> int:
-    """The triad in which two models differ most, in residuals or predictions: 0 or 1.
+def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:
+    """The triad, 0 or 1, in which two models differ most, by residuals or predictions.
 
     A random effect does not reduce the residuals, but it improves predictions.
     """
     sizes = []
     for triad in (0, 1):
         part, gains = slice(3 * triad, 3 * triad + 3), [0.0]
-        for pair in ((one.whole, other.whole), (one.held_out, other.held_out)):
+        for pair in (
+            (one.rms_with_lines, other.rms_with_lines),
+            (one.held_out_rms, other.held_out_rms),
+        ):
             first, then = (np.nan_to_num(some[part]) for some in pair)
             gain = float((first**2 - then**2).max())
             gains.append(gain / max(float(then.max()) ** 2, 1e-300))

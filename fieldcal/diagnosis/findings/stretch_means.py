@@ -12,7 +12,7 @@ PARTS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Ends of the parts of a window over which residuals are averaged."""
 
 
-def averages(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Means over parts of the windows.
 
     Returns
@@ -38,9 +38,9 @@ def averages(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.intp
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 
 
-def rms(rows: Rows, residual: Array) -> Array:
+def rms_over_parts(rows: Rows, residual: Array) -> Array:
     """Root mean square over the parts of windows, (6,); nan where there is none."""
-    mean, _, _ = averages(rows, residual)
+    mean, _, _ = part_means(rows, residual)
     count = np.isfinite(mean).sum(axis=0)
     squares = np.nansum(mean**2, axis=0)
     return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))

@@ -1,4 +1,4 @@
-"""Mismatches without an effect of the catalogue, as input of the sentences."""
+"""Mismatches that no effect of the catalogue explains, as input of the sentences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.found_effects import estimates
+from fieldcal.diagnosis.findings.found_effects import column_estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
@@ -20,60 +20,64 @@ JOINTS = ("α", "β")
 Places = tuple[int, ...]
 """Positions, from 0."""
 
-Errors = tuple[tuple[str, Quantity], ...]
+AngleErrors = tuple[tuple[str, Quantity], ...]
 """Joints, each with the error of its angle, deg."""
 
 
 @dataclass(frozen=True, slots=True)
-class Unknown:
-    """A mismatch without an effect.
+class UnknownMismatch:
+    """A mismatch that no effect explains.
 
     Attributes
     ----------
     cause : name of the model's cause: "time", "alpha", "window", "misset" ...
     mismatch : channel, positions and time
-    turned : joints, each with the error of its angle that would explain the mismatch
+    angle_errors : joints, each with the error of its angle that would explain it
 
     """
 
     cause: str
     mismatch: Mismatch
-    turned: tuple[tuple[str, Quantity], ...] = ()
+    angle_errors: tuple[tuple[str, Quantity], ...] = ()
 
 
-def unknown(
+def unknown_mismatches(
     explanation: Explanation, standing: Standing, found: Sequence[Mismatch]
-) -> list[Unknown]:
+) -> list[UnknownMismatch]:
     """Mismatches of one cause, each with the angle errors that would explain it."""
     turned = angle_errors(explanation, standing)
-    return [Unknown(standing.name, m, turned.get(m.positions, ())) for m in found]
+    return [
+        UnknownMismatch(standing.name, m, turned.get(m.positions, ())) for m in found
+    ]
 
 
-def angle_errors(explanation: Explanation, standing: Standing) -> dict[Places, Errors]:
-    """Errors of angles that were set wrongly, by the positions that have them.
+def angle_errors(
+    explanation: Explanation, standing: Standing
+) -> dict[Places, AngleErrors]:
+    """Errors of wrongly set angles, by the positions that have them.
 
-    Only those that stand out of their ±; empty for a cause of another kind.
+    Only significant errors are included; empty for a cause of another kind.
     """
     if standing.kind != "position":
         return {}
     return {
         one.together or (one.position,): _errors(explanation, one)
         for member in standing.members
-        for one in mistakes(explanation, member)
+        for one in single_errors(explanation, member)
     }
 
 
-def mistakes(explanation: Explanation, member: Member) -> list[Group]:
-    """The single mistakes of a member; of several, those that stand out of their ±."""
+def single_errors(explanation: Explanation, member: Member) -> list[Group]:
+    """The single setting errors of a member; of several, only the significant ones."""
     cause, group = member
     parts = [*cause.parts_of(group)]
     if len(parts) == 1:
-        return parts  # which need not be of angles
+        return parts  # it may be an error other than of an angle
     return [one for one in parts if _errors(explanation, one)] or parts
 
 
-def _errors(explanation: Explanation, group: Group) -> Errors:
-    values, sigmas, _ = estimates(explanation.best.set, group.columns)
+def _errors(explanation: Explanation, group: Group) -> AngleErrors:
+    values, sigmas, _ = column_estimates(explanation.best.set, group.columns)
     pairs = zip(group.params, np.rad2deg(values), np.rad2deg(sigmas), strict=True)
     return tuple(
         (JOINTS[joint], Quantity(float(v), float(s), "deg"))
@@ -82,10 +86,10 @@ def _errors(explanation: Explanation, group: Group) -> Errors:
     )
 
 
-def listed(positions: Sequence[int], most: int | None = None) -> str:
-    """Name positions by their numbers, which begin at 1, up to so many.
+def list_positions(positions: Sequence[int], most: int | None = None) -> str:
+    """Name positions by their numbers, counted from 1; at most `most` of them.
 
-    >>> listed([3]), listed([0, 1, 2], most=2)
+    >>> list_positions([3]), list_positions([0, 1, 2], most=2)
     ('position 4', 'positions 1, 2…')
     """
     word = "position" if len(positions) == 1 else "positions"

@@ -31,16 +31,16 @@ from fieldcal.windows.noise import ChannelNoise
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
-    """A recording after the checks of its chain.
+class CheckedRecording:
+    """A recording after the checks of its signal chain.
 
     Attributes
     ----------
-    block : samples put right
-    usable : (n, 6) samples that can be used
-    faults : what was found, by the effect's id
+    block : corrected samples
+    usable : (n, 6) whether a sample can be used
+    faults : faults found, each with the id of its effect
     noise : (6,) standard deviation of one usable sample in the windows
-    unused : sentences about sensors of which an axis tells nothing at all
+    unused : sentences about sensors with an axis without a signal
 
     """
 
@@ -52,36 +52,35 @@ class Checked:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """What was found and has a name in the catalogue, each once."""
+        """Ids of the effects found, each once."""
         return tuple(dict.fromkeys(i for i, fault in self.faults if fault.values))
 
     @property
-    def angles(self) -> float:
-        """What the stated angles are to be multiplied by."""
+    def angle_factor(self) -> float:
+        """Factor by which the stated angles must be multiplied."""
         return float(np.prod([fault.angles for _, fault in self.faults]))
 
     @property
-    def pace(self) -> float:
-        """Seconds of the device's clock in a true second."""
+    def clock_pace(self) -> float:
+        """Seconds of the device's clock per true second."""
         found = [f.values["ppm"] for i, f in self.faults if i == "clock_skew"]
         return 1 + 1e-6 * float(found[0]) if found else 1.0
 
 
-def check(block: Block, about: Description) -> Checked:
-    """Look for every fault of the chain, and act on what is found.
+def check_chain(block: Block, about: Description) -> CheckedRecording:
+    """Look for every fault of the signal chain, and correct or leave out samples.
 
-    Of means alone nothing of the chain is to be seen: from one row to the next the
-    device was turned.
+    A session of means only cannot be checked: its rows are different positions.
     """
     usable = np.isfinite(block.six)
     if about.means_only:
-        return Checked(block, usable, (), median_sigma(about.mean_sigma))
+        return CheckedRecording(block, usable, (), median_sigma(about.mean_sigma))
     faults: list[tuple[str, Fault]] = []
     dead = dead_sensors(block.six)
     for sensor in dead:
-        # of one that sends nothing at all nothing is stuck either
+        # a sensor without any signal is not reported as stuck as well
         usable[:, sensor.channels] &= not sensor.absent
-    block, samples = _corrected(block, usable, about, faults)
+    block, samples = _correct(block, usable, about, faults)
     for name in _ids_by_treatment("mask"):
         before = len(faults)
         found = _find(name, samples)
@@ -89,50 +88,54 @@ def check(block: Block, about: Description) -> Checked:
             if name == "saturation" and _is_stuck(fault, faults):
                 continue
             faults.append((name, fault))
-            _mask(name, fault, usable, samples.windows)
+            _mark_unusable(name, fault, usable, samples.windows)
         if len(faults) > before:
-            samples = recording(block, usable, about)
+            samples = samples_to_check(block, usable, about)
     for sensor in dead:
         usable[:, sensor.channels] = False
     if dead:
-        samples = recording(block, usable, about)
+        samples = samples_to_check(block, usable, about)
     for name in _ids_by_treatment("note"):
         faults += [(name, fault) for fault in _find(name, samples)]
     unused = tuple(sensor.says for sensor in dead)
-    return Checked(
+    return CheckedRecording(
         block, usable, tuple(_without_rail_runs(faults)), samples.noise, unused
     )
 
 
-def _corrected(
+def _correct(
     block: Block,
     usable: NDArray[np.bool_],
     about: Description,
     faults: list[tuple[str, Fault]],
 ) -> tuple[Block, CheckedSamples]:
-    """Samples with what can be undone undone; what it was is added to `faults`."""
-    samples = recording(block, usable, about)
+    """Correct the faults that can be undone; they are appended to `faults`."""
+    samples = samples_to_check(block, usable, about)
     for name in _ids_by_treatment("mend"):
         for fault in _find(name, samples):
             faults.append((name, fault))
             if fault.mended is not None:
-                six = _mended(block, fault)
+                six = _mend_samples(block, fault)
                 block = replace(block, acc=six[:, :3], gyr=six[:, 3:])
-                samples = recording(block, usable, about)
+                samples = samples_to_check(block, usable, about)
     return block, samples
 
 
-def found_first(name: str, block: Block, about: Description) -> list[Fault]:
-    """What one effect does to samples as they were recorded, before any is mended."""
+def find_in_recorded_samples(
+    name: str, block: Block, about: Description
+) -> list[Fault]:
+    """Faults of one effect in the samples as recorded, before any correction."""
     if about.means_only:
         return []
-    return _find(name, recording(block, np.isfinite(block.six), about))
+    return _find(name, samples_to_check(block, np.isfinite(block.six), about))
 
 
-def checked_again(checked: Checked, block: Block, about: Description) -> Checked:
-    """The same with what lines in the spectrum can feign looked at without them."""
+def recheck_without_lines(
+    checked: CheckedRecording, block: Block, about: Description
+) -> CheckedRecording:
+    """Repeat the check of the noise level, which lines in the spectrum can mislead."""
     faults = [(n, f) for n, f in checked.faults if n != "noise_level"]
-    samples = recording(block, checked.usable, about)
+    samples = samples_to_check(block, checked.usable, about)
     faults += [("noise_level", f) for f in _find("noise_level", samples)]
     return replace(checked, faults=tuple(faults))
 
@@ -151,7 +154,7 @@ def _find(name: str, samples: CheckedSamples) -> list[Fault]:
     return effect.find(samples)
 
 
-def _mended(block: Block, fault: Fault) -> Array:
+def _mend_samples(block: Block, fault: Fault) -> Array:
     if fault.mended is None:
         return block.six
     if "channel" not in fault.values:
@@ -161,7 +164,7 @@ def _mended(block: Block, fault: Fault) -> Array:
     return six
 
 
-def _mask(
+def _mark_unusable(
     name: str, fault: Fault, usable: NDArray[np.bool_], windows: NDArray[np.intp]
 ) -> None:
     if name == "bump":
@@ -177,9 +180,9 @@ def _mask(
 
 
 def _off_rails(found: list[Fault], samples: CheckedSamples) -> list[Fault]:
-    """Runs of equal values less those at a rail that a channel returns to.
+    """Runs of equal values without those at a limit to which a channel returns.
 
-    What stands still does so once and anywhere; what is clipped always stops there.
+    A stuck channel stops once and anywhere; a clipped one always stops at its limit.
     """
     if not found:
         return found
@@ -198,7 +201,7 @@ def _is_stuck(fault: Fault, faults: list[tuple[str, Fault]]) -> bool:
 
 
 def _without_rail_runs(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault]]:
-    """Without runs of equal values that are the rail of a clipped channel."""
+    """Leave out runs of equal values that are the limit of a clipped channel."""
     clipped = {
         f.channel: {int(r) for r in f.rows} for n, f in faults if n == "saturation"
     }
@@ -211,10 +214,10 @@ def _without_rail_runs(faults: list[tuple[str, Fault]]) -> list[tuple[str, Fault
     ]
 
 
-def recording(
+def samples_to_check(
     block: Block, usable: NDArray[np.bool_], about: Description
 ) -> CheckedSamples:
-    """What the checks look at."""
+    """Samples and facts that the checks are given."""
     windows, rate = spans(block, about), rate_of(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
     unknown = np.full(6, np.nan)

@@ -17,13 +17,13 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
 from fieldcal.diagnosis.signal.periodogram import LONGEST
-from fieldcal.diagnosis.signal.pieces import Complex, Pieces
+from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Line
 
 FEW, STRETCHES, FOLDS = 3, 5, 12
-"""Windows below which stretches of them are left out instead, how many of each, and
-parts of the recording that are left out in turn."""
+"""Number of windows below which stretches of them are held out in place of windows;
+stretches of each window; parts of the recording that are held out in turn."""
 
 SLOW = 30.0
 """Periods in a window up to which a slope takes a part of a line: 0.07 % here."""
@@ -33,7 +33,7 @@ AT_ONCE = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Tone:
+class SpectralLine:
     """A line with its explanation.
 
     Attributes
@@ -42,9 +42,9 @@ class Tone:
     hz : frequency
     causes : (m,) complex amplitudes of the effect's causes
     values, sigmas : by parameter name
-    channels : outputs in which it stands out
+    channels : outputs in which it is significant
     amplitude : (6,) mean amplitude in the outputs
-    chi2 : by how much the squares fall with it
+    chi2 : decrease of the whitened squares
     gain : rise of ln Z, for a prior as wide as the causes are large
 
     """
@@ -60,13 +60,13 @@ class Tone:
     gain: float
 
     @property
-    def clear(self) -> list[int]:
-        """Indices of the channels in which it stands out."""
+    def clear_channels(self) -> list[int]:
+        """Indices of the channels in which it is significant."""
         return [CHANNELS.index(name) for name in self.channels]
 
 
 @dataclass(frozen=True, slots=True)
-class Remains:
+class LineRemainder:
     """Mean squares of the outputs at the frequency of a line, (6,) each.
 
     Attributes
@@ -74,8 +74,7 @@ class Remains:
     before : as recorded
     after : less the line
     held_out : less what the rest of the recording predicts of it
-    predictive_score : by how much the squares of the samples, whitened, fall with
-        that
+    predictive_score : decrease of the whitened squares by that prediction
 
     """
 
@@ -85,45 +84,49 @@ class Remains:
     predictive_score: Array
 
     def gain(self, clear: list[int]) -> float:
-        """Part of the held-out rms that goes, in the channel that shows it best."""
+        """Part of the held-out rms that it removes, in the channel with most effect."""
         most = clear[int(np.argmax(self.predictive_score[clear]))]
         return float(1 - np.sqrt(self.held_out[most] / self.before[most]))
 
 
-def tuned(pieces: Pieces, effect: Line, moments: Moments) -> Tone:
-    """The effect at the frequency, near that of the sums, at which it takes most."""
+def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> SpectralLine:
+    """Fit an effect at the frequency near that of the moments that explains most."""
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
-    tone = _at_best(pieces, effect, moments, offsets, step, 3)
+    tone = _line_at_best_frequency(pieces, effect, moments, offsets, step, 3)
     if not pieces.usable or tone.hz * shortest > SLOW:
         return tone
     amplitude = effect.response(pieces.x, tone.hz) @ tone.causes
     again = moments_of(pieces.with_whole_line(tone.hz, amplitude), tone.hz)
-    return _at_best(pieces, effect, again, np.linspace(-step, step, 11), step / 5, 2)
+    return _line_at_best_frequency(
+        pieces, effect, again, np.linspace(-step, step, 11), step / 5, 2
+    )
 
 
-def remains(pieces: Pieces, tone: Tone) -> Remains:
-    """What is left of a line, fitted to it or predicted from the rest."""
+def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
+    """Mean squares that are left of a line, after its fit and after its prediction."""
     many = len(pieces.samples) >= FEW
     moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
     groups = np.arange(len(moments.counts))
     fold = groups % (FOLDS if many else STRETCHES)
-    seen = moments.seen(np.zeros(1))[0]
+    seen = moments.amplitudes(np.zeros(1))[0]
     fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
     ahead = seen.copy()
     span = max(float(np.ptp(moments.middle)), 1 / tone.hz)
     for i in np.unique(fold):
-        rest = moments.only(fold != i)
+        rest = moments.select(fold != i)
         step = 0.2 / span
-        near = _at_best(pieces, tone.effect, rest, np.array([-step, 0, step]), step, 2)
-        # amplitudes are those of the wave at tone.hz; one a little off turns against it
-        left = moments.only(fold == i)
+        near = _line_at_best_frequency(
+            pieces, tone.effect, rest, np.array([-step, 0, step]), step, 2
+        )
+        # a wave at a slightly different frequency rotates against that at tone.hz
+        left = moments.select(fold == i)
         told = (tone.effect.response(pieces.x, near.hz) @ near.causes)[left.window]
-        ahead[fold == i] -= told * _turning(left, near.hz - tone.hz)
+        ahead[fold == i] -= told * _mean_rotation(left, near.hz - tone.hz)
     noise = np.where(np.nan_to_num(pieces.noise) > 0, pieces.noise, np.inf)
     fallen = np.abs(seen) ** 2 - np.abs(ahead) ** 2
-    return Remains(
+    return LineRemainder(
         _mean_square(seen),
         _mean_square(seen - fitted),
         _mean_square(ahead),
@@ -131,7 +134,7 @@ def remains(pieces: Pieces, tone: Tone) -> Remains:
     )
 
 
-def _turning(moments: Moments, offset: float) -> Complex:
+def _mean_rotation(moments: Moments, offset: float) -> Complex:
     """Mean of exp(2 pi i offset t) over each group, (g, 1)."""
     turned = np.exp(2j * np.pi * offset * moments.middle)
     mean: Complex = np.add.reduceat(turned, moments.bound[:-1]).astype(complex)
@@ -143,27 +146,27 @@ def _mean_square(amplitude: Complex) -> Array:
     return square
 
 
-def _at_best(
-    pieces: Pieces,
+def _line_at_best_frequency(
+    pieces: WindowSamples,
     effect: Line,
     moments: Moments,
     offsets: Array,
     step: float,
     rounds: int,
-) -> Tone:
+) -> SpectralLine:
     for _ in range(rounds):
         some = np.array_split(offsets, -(-len(offsets) // AT_ONCE))
         chi2 = np.concatenate(
-            [_fitted(pieces, effect, moments, each)[2] for each in some]
+            [_fit_causes(pieces, effect, moments, each)[2] for each in some]
         )
-        near = _top(offsets, chi2)
+        near = _parabola_peak(offsets, chi2)
         offsets = near + np.linspace(-step, step, 11)
         step /= 5
-    return _tone(pieces, effect, moments, near)
+    return _line_at(pieces, effect, moments, near)
 
 
-def _top(offsets: Array, chi2: Array) -> float:
-    """Where evenly spaced values are highest, by the parabola of three of them."""
+def _parabola_peak(offsets: Array, chi2: Array) -> float:
+    """Position of the maximum of evenly spaced values, by a parabola through three."""
     top = int(np.argmax(chi2))
     if not 0 < top < len(chi2) - 1:
         return float(offsets[top])
@@ -172,23 +175,23 @@ def _top(offsets: Array, chi2: Array) -> float:
     return float(offsets[top] + (offsets[1] - offsets[0]) * (above - below) / 2 / bend)
 
 
-def _fitted(
-    pieces: Pieces, effect: Line, moments: Moments, offset: Array
+def _fit_causes(
+    pieces: WindowSamples, effect: Line, moments: Moments, offset: Array
 ) -> tuple[Complex, Array, Array]:
-    """The effect at frequencies a little off, (o,), whatever its causes.
+    """Fit the causes of an effect at slightly different frequencies, `offset` (o,) Hz.
 
     Returns
     -------
     causes : (o, m)
     sigma : (o, m) their standard deviation
-    chi2 : (o,) by how much the squares fall
+    chi2 : (o,) decrease of the whitened squares
 
     """
     count, size = len(offset), 6 * len(moments.counts)
-    seen = moments.seen(offset).reshape(count, size, 1)
+    seen = moments.amplitudes(offset).reshape(count, size, 1)
     each = [effect.response(pieces.x, hz) for hz in moments.near + offset]
     response = np.array(each)[:, moments.window].reshape(count, size, -1)
-    # a channel that never changes tells nothing
+    # a channel that never changes has no weight
     heard = np.nan_to_num(pieces.noise) > 0
     weight = np.where(heard, 1 / np.where(heard, pieces.noise, 1.0) ** 2, 0.0)
     weight = np.outer(moments.counts / 2, weight).ravel()
@@ -199,17 +202,19 @@ def _fitted(
     causes = np.linalg.solve(normal, weighted @ seen)[..., 0]
     own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
     sigma = np.sqrt(own.real)
-    if effect.kind == "sensor":  # outputs of their own: those without it have none
+    if effect.kind == "sensor":  # each output has its own cause: drop those at noise
         causes = np.where(np.abs(causes) > thresholds.LINE * sigma, causes, 0.0)
     left = seen - response @ causes[..., None]
     fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
     return causes, sigma, fallen[..., 0] @ weight
 
 
-def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone:
-    """The effect at one frequency, with what it explains."""
+def _line_at(
+    pieces: WindowSamples, effect: Line, moments: Moments, offset: float
+) -> SpectralLine:
+    """The line at one frequency, with its amplitudes and what it explains."""
     hz = moments.near + offset
-    found = _fitted(pieces, effect, moments, np.array([offset]))
+    found = _fit_causes(pieces, effect, moments, np.array([offset]))
     causes, sigma, chi2 = found[0][0], found[1][0], float(found[2][0])
     response = effect.response(pieces.x, hz)[moments.window]
     strength = np.abs(causes / sigma) ** 2
@@ -220,11 +225,11 @@ def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone
         for c, a, e in zip(CHANNELS, amplitude, error, strict=True)
         if a > thresholds.LINE * e
     ]
-    values, sigmas = _named(effect, causes, sigma)
+    values, sigmas = _named_amplitudes(effect, causes, sigma)
     values["hz"] = float(hz)
     spread = float(np.concatenate(pieces.times).std())
     sigmas["hz"] = float(1 / (2 * np.pi * spread * np.sqrt(max(chi2, 1.0))))
-    return Tone(
+    return SpectralLine(
         effect,
         float(hz),
         causes,
@@ -237,7 +242,7 @@ def _tone(pieces: Pieces, effect: Line, moments: Moments, offset: float) -> Tone
     )
 
 
-def _named(
+def _named_amplitudes(
     effect: Line, causes: Complex, sigma: Array
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Amplitudes by name: one for each cause, or one for all of them."""

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.signal.periodogram import LONGEST
-from fieldcal.diagnosis.signal.pieces import Complex, Pieces
+from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 
 PARTS, LEAST = 15, 4
-"""Parts of a window, or of as much of it as a periodogram has, whose sums are kept, so
-that a frequency can be shifted by what that leaves open; fewest samples in one."""
+"""Parts per window (or per length of a periodogram) whose sums are kept, so that the
+frequency can be shifted within a periodogram's resolution; fewest samples in a part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +46,15 @@ class Moments:
     window: NDArray[np.intp]
     counts: Array
 
-    def seen(self, offset: Array) -> Complex:
-        """Amplitudes (o, g, 6) of each group at frequencies a little off, (o,)."""
+    def amplitudes(self, offset: Array) -> Complex:
+        """Amplitudes (o, g, 6) of each group at `near` plus `offset` (o,), Hz."""
         wave = np.exp(-2j * np.pi * offset[:, None] * self.middle)
         parts = [wave[:, a:b] @ self.sums[a:b] for a, b in pairwise(self.bound)]
         amplitude: Complex = 2 / self.counts[:, None] * np.stack(parts, axis=1)
         return amplitude
 
-    def only(self, groups: NDArray[np.bool_]) -> Moments:
-        """Some of the groups."""
+    def select(self, groups: NDArray[np.bool_]) -> Moments:
+        """The moments of some groups only, `groups` (g,)."""
         size = np.diff(self.bound)
         parts = np.repeat(groups, size)
         return Moments(
@@ -67,15 +67,15 @@ class Moments:
         )
 
 
-def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
+def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moments:
     """Sums over windows, each divided into stretches that are groups of their own."""
     sums, middle, bound = [], [], [0]
     counts: list[float] = []
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        for first, last in pairwise(_cuts(0, len(t), stretches)):
+        for first, last in pairwise(_part_bounds(0, len(t), stretches)):
             most = PARTS * max((last - first) // LONGEST, 1)
             parts = min(most, max((last - first) // LEAST, 1))
-            for a, b in pairwise(_cuts(first, last, parts)):
+            for a, b in pairwise(_part_bounds(first, last, parts)):
                 turned = 2 * np.pi * near * t[a:b]
                 real, imaginary = (
                     np.stack([np.cos(turned), np.sin(turned)]) @ (samples[a:b])
@@ -95,7 +95,7 @@ def moments_of(pieces: Pieces, near: float, stretches: int = 1) -> Moments:
     )
 
 
-def _cuts(first: int, last: int, parts: int) -> list[int]:
+def _part_bounds(first: int, last: int, parts: int) -> list[int]:
     """Bounds of parts of nearly equal length, the longer ones first."""
     each, more = divmod(last - first, parts)
     return [first + i * each + min(i, more) for i in range(parts + 1)]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.signal.pieces import Complex, Pieces
+from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.model import thresholds
 from fieldcal.physics.recording import medians
 
@@ -32,7 +32,7 @@ BESIDE = 40
 """Neighbours that give the floor, to either side."""
 
 CLOSE, FAR = 5, 12
-"""Neighbours that the taper does not reach and that are still close."""
+"""Nearest and furthest neighbours beyond the taper's reach; they give the slope."""
 
 SURE = 200
 """Periodograms whose mean tells the level of noise, to 7 %."""
@@ -47,15 +47,15 @@ SLOPE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
 BURST, BURSTS = 0.5, 0.01
-"""Sampling periods, less than which no device takes from sample to sample, and part of
-the steps that are as short where stamps are those of arrival."""
+"""Time step, in sampling periods, below which a step cannot be the device's own, and
+part of the steps that are so short where times are those of arrival."""
 
 HUMP = 2.0
 """Times the floor down to which the power about a peak belongs to it."""
 
 FINER = 4
-"""Places on the grid of samples to a sampling period: what is out of place by an eighth
-of a period loses 3 % of its power at most below 0.4 of the rate, by a half a third."""
+"""Grid points per sampling period for samples at uneven times: an error of an eighth of
+a period costs 3 % of the power at most below 0.4 of the rate, one of a half a third."""
 
 NEAR = 2.0
 """Distance between two lines, in cycles of the shortest window."""
@@ -64,15 +64,15 @@ LOOKS = 16
 """Spectra looked at."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
-"""Channels of one phase that are looked at together."""
+"""Channels that are searched together for a line of one phase."""
 
 COHERENT = 1 << 18
-"""Samples up to which windows are put together with one phase."""
+"""Most samples of a recording that is searched for lines of one phase throughout."""
 
 
 GRID = 1 << 20
-"""Periods from the first sample to the last up to which that is done: over longer
-pauses no clock keeps the phase of a line."""
+"""Longest such recording, in sampling periods: over longer pauses no clock keeps the
+phase of a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Spectrum:
     power : (6, m)
     count : periodograms summed in it
     hz : (m,)
-    together : channels in whose sums a line may stand out
+    channel_groups : channels in whose sums a line may stand out
     level : (6, m) mean power of noise, where it is known otherwise
 
     """
@@ -92,21 +92,21 @@ class Spectrum:
     power: Array
     count: int
     hz: Array
-    together: tuple[tuple[int, ...], ...]
+    channel_groups: tuple[tuple[int, ...], ...]
     level: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """Where the power stands out, Hz.
+    """A peak of the power spectrum, Hz.
 
     Attributes
     ----------
-    hz : where it is highest
+    hz : where it is highest_peak
     low, high : between which it is above the floor; a line's own are its frequency
     noise : (6,) standard deviation of a sample of white noise as strong as what is
         beside it: filters and bearings make noise that is not white
-    channels : in which, together
+    channels : in which, channel_groups
 
     """
 
@@ -117,13 +117,13 @@ class Peak:
     channels: tuple[int, ...] = ()
 
 
-def highest(
-    pieces: Pieces, spectra: Sequence[Spectrum], taken: Sequence[Peak]
+def highest_peak(
+    pieces: WindowSamples, spectra: Sequence[Spectrum], taken: Sequence[Peak]
 ) -> Peak | None:
     """The most significant peak, None if there is none.
 
-    One that has one phase throughout, if there is any: what trembles is louder, and is
-    no line. Peaks close to one that was taken already are ignored.
+    Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
+    close to those in `taken` are ignored.
     """
     shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
     low, reach = max(0.05, CYCLES / shortest), NEAR / shortest
@@ -150,7 +150,7 @@ def _significant(
     passed: Sequence[Peak] = (),
 ) -> Peak | None:
     """The most significant peak of some spectra, None if chance makes as high ones."""
-    found = [_highest(s, low, reach, taken, passed) for s in spectra]
+    found = [_highest_in_spectrum(s, low, reach, taken, passed) for s in spectra]
     odds, peak = min(filter(None, found), key=itemgetter(0), default=(0.0, None))
     return peak if odds < np.log(thresholds.LINE_BY_CHANCE) else None
 
@@ -164,7 +164,7 @@ def _may_last(one_phase: Sequence[Spectrum], peak: Peak, reach: float) -> bool:
     for spectrum in one_phase:
         near = (spectrum.hz >= low) & (spectrum.hz <= high)
         stands = [_stands(spectrum, c, near) for c in peak.channels]
-        odds = _beyond(float(np.max(stands)), 1) + np.log(near.sum())
+        odds = _log_gamma_tail(float(np.max(stands)), 1) + np.log(near.sum())
         if odds < np.log(thresholds.LINE_BY_CHANCE):
             return True
     return False
@@ -174,12 +174,12 @@ def _stands(spectrum: Spectrum, channel: int, band: NDArray[np.bool_]) -> Array:
     """Power in that of the noise, by frequency, summed over the periodograms."""
     power = spectrum.power[channel, band]
     known = None if spectrum.level is None else spectrum.level[channel, band]
-    level = _level(power, spectrum.count, known)
+    level = _noise_level(power, spectrum.count, known)
     out: Array = power / level * spectrum.count
     return out
 
 
-def _highest(
+def _highest_in_spectrum(
     spectrum: Spectrum,
     low: float,
     reach: float,
@@ -193,17 +193,17 @@ def _highest(
     """
     band, count = spectrum.hz >= low, spectrum.count
     hz = spectrum.hz[band]
-    used = sorted({c for some in spectrum.together for c in some})
+    used = sorted({c for some in spectrum.channel_groups for c in some})
     stands = {c: _stands(spectrum, c, band) for c in used}
     best: tuple[float, Peak] | None = None
-    for some in spectrum.together:
+    for some in spectrum.channel_groups:
         there = [*taken, *(p for p in passed if set(p.channels) & set(some))]
         free = _away_from(hz, there, reach)
         if free.sum() < 4 * BESIDE:
             continue
         total = np.sum([stands[c] for c in some], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
-        odds = _beyond(float(total[at]), count * len(some))
+        odds = _log_gamma_tail(float(total[at]), count * len(some))
         odds += np.log(LOOKS * len(total))
         if best is None or odds < best[0]:
             peak = _peak_at(hz, total / (count * len(some)), at)
@@ -219,22 +219,22 @@ def _away_from(hz: Array, peaks: Sequence[Peak], reach: float) -> NDArray[np.boo
     return free
 
 
-def _level(power: Array, count: int, known: Array | None = None) -> Array:
+def _noise_level(power: Array, count: int, known: Array | None = None) -> Array:
     """Mean power of noise at each frequency, of the sum of some periodograms (m,)."""
     if known is None:
         # median of Gamma(W) over its mean, by Wilson and Hilferty
-        known = _floor(power) / (1 - 1 / (9 * count)) ** 3
-    return _on_a_slope(power, known)
+        known = _median_floor(power) / (1 - 1 / (9 * count)) ** 3
+    return _floor_on_slope(power, known)
 
 
 def noise_near(spectrum: Spectrum, hz: float, white: Array) -> Array:
-    """White noise as strong as the spectrum near a frequency, (6,).
+    """Deviation of white noise with the spectrum's power near a frequency, (6,).
 
-    That of the samples, `white`, for outputs of which nothing is looked at.
+    For channels that the spectrum does not contain it is `white`.
     """
     noise, at = white.copy(), int(np.argmin(np.abs(spectrum.hz - hz)))
-    for c in sorted({c for some in spectrum.together for c in some}):
-        level = _level(spectrum.power[c], spectrum.count)[at]
+    for c in sorted({c for some in spectrum.channel_groups for c in some}):
+        level = _noise_level(spectrum.power[c], spectrum.count)[at]
         noise[c] = np.sqrt(level / spectrum.count)
     return noise
 
@@ -253,8 +253,8 @@ def _peak_at(hz: Array, power: Array, at: int) -> Peak:
     return Peak(float(hz[at]), float(hz[first]), float(hz[last]), np.zeros(6))
 
 
-def spectra_of(pieces: Pieces) -> list[Spectrum]:
-    """Spectra in which a line may stand out.
+def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
+    """Spectra that are searched for lines.
 
     Channel by channel window by window; and with one phase throughout, channels and
     triads in the device's axes and, where the angles are known, triads in the base's.
@@ -262,7 +262,7 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
     tapered: what settles at the start of each is no line, though it comes as often.
     Stamps of arrival keep no phase.
     """
-    power, count, hz = _power(pieces)
+    power, count, hz = _power_by_window(pieces)
     used = np.flatnonzero(power.any(axis=1)).tolist()
     windows = Spectrum(power, count, hz, tuple((c,) for c in used))
     out = [windows]
@@ -275,19 +275,19 @@ def spectra_of(pieces: Pieces) -> list[Spectrum]:
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
     triads = [some for some in TRIADS if set(some) <= set(used)]
     # electronics may be heard in one output alone, what shakes the base in none
-    each = [(*windows.together, *triads), tuple(triads)]
+    each = [(*windows.channel_groups, *triads), tuple(triads)]
     beside = _beside(windows, pieces)
-    for frame, together in zip(frames, each, strict=False):
-        power, unsteady, hz = _one_phase(pieces, frame)
+    for frame, channel_groups in zip(frames, each, strict=False):
+        power, unsteady, hz = _coherent_power(pieces, frame)
         level = np.array([np.interp(hz, windows.hz, row) for row in beside])
         level = _turned_level(pieces, frame, level)
         sure = 1 + SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
         level = np.where(unsteady > sure * level, unsteady, level)
-        out.append(Spectrum(power, 1, hz, together, level))
+        out.append(Spectrum(power, 1, hz, channel_groups, level))
     return out
 
 
-def _beside(windows: Spectrum, pieces: Pieces) -> Array:
+def _beside(windows: Spectrum, pieces: WindowSamples) -> Array:
     """Variance of a sample of noise at each frequency, by its neighbours, (6, m).
 
     In windows side by side noise is known far better than in their sum with one phase:
@@ -306,7 +306,7 @@ def _beside(windows: Spectrum, pieces: Pieces) -> Array:
     return out
 
 
-def _turned_level(pieces: Pieces, frame: Array, level: Array) -> Array:
+def _turned_level(pieces: WindowSamples, frame: Array, level: Array) -> Array:
     """Mean power with one phase of noise of a variance (6, m), windows turned."""
     length = [len(samples) for samples in pieces.samples]
     square = np.array([(np.hanning(n) ** 2).sum() for n in length])
@@ -314,7 +314,7 @@ def _turned_level(pieces: Pieces, frame: Array, level: Array) -> Array:
     return np.vstack([shares @ level[:3], shares @ level[3:]])
 
 
-def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array, Array]:
+def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, Array]:
     """Power (6, m) of the whole recording, windows turned into a frame; Hz, (m,).
 
     And between them the power of noise as strong as what has no one phase: of W
@@ -326,34 +326,34 @@ def _one_phase(pieces: Pieces, frame: Array) -> tuple[Array, Array, Array]:
         tapered = (np.hanning(len(samples))[:, None] * samples).T
         turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
     t, rate, count = np.concatenate(pieces.times), pieces.rate, len(turned)
-    n = _fast(2 * round((t[-1] - t[0]) * rate) + 2)
-    power = _square(_transformed(np.hstack(turned), t, rate, n))
+    n = _next_fast_length(2 * round((t[-1] - t[0]) * rate) + 2)
+    power = _squared_magnitude(_fourier_sums(np.hstack(turned), t, rate, n))
     hz = np.fft.rfftfreq(n, 1 / rate)
     if count == 1:
         return power, np.zeros_like(power), hz
-    short = 2 * _fast(max(map(len, pieces.times)))
+    short = 2 * _next_fast_length(max(map(len, pieces.times)))
     each = np.zeros((6, short // 2 + 1))
     for values, at in zip(turned, pieces.times, strict=True):
-        each += _square(_transformed(values, at, rate, short))
+        each += _squared_magnitude(_fourier_sums(values, at, rate, short))
     coarse = np.fft.rfftfreq(short, 1 / rate)
     total = np.array([np.interp(hz, coarse, row) for row in each])
     return power, (count * total - power) / (count - 1), hz
 
 
-def _fast(n: int) -> int:
-    """The next length, of factors 2, 3 and 5, that takes no long transform.
+def _next_fast_length(n: int) -> int:
+    """The next length with factors 2, 3 and 5 only, for a fast transform.
 
-    `scipy.fft.next_fast_len` knows more; it takes a fifth of a second to import.
+    `scipy.fft.next_fast_len` knows more lengths, but importing it takes 0.2 s.
 
-    >>> _fast(1000), _fast(1001), _fast(4097)
+    >>> _next_fast_length(1000), _next_fast_length(1001), _next_fast_length(4097)
     (1000, 1024, 4320)
     """
     odd = [int(3**i * 5**j) for i in range(5) for j in range(4)]
     return min(m << (-(-n // m) - 1).bit_length() for m in odd)
 
 
-def _power(pieces: Pieces) -> tuple[Array, int, Array]:
-    """Of all channels, window by window, as in `Spectrum`."""
+def _power_by_window(pieces: WindowSamples) -> tuple[Array, int, Array]:
+    """Power, count and frequencies of all channels, summed over windows."""
     length = min(LONGEST, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
@@ -362,17 +362,17 @@ def _power(pieces: Pieces) -> tuple[Array, int, Array]:
         for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
             tapered = samples[part].T * taper
-            spectrum = _transformed(tapered, t[part], pieces.rate, n)
-            total += _square(spectrum) / (taper @ taper)
+            spectrum = _fourier_sums(tapered, t[part], pieces.rate, n)
+            total += _squared_magnitude(spectrum) / (taper @ taper)
             count += 1
     return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
-def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
-    """Fourier sums of samples (c, m) at the multiples of rate / n up to its half.
+def _fourier_sums(values: Array, t: Array, rate: float, n: int) -> Complex:
+    """Fourier sums of samples (c, m) at the multiples of rate / n up to half the rate.
 
-    At the times that they have: a log's samples come late, or are missing. As if they
-    came evenly where the times are those of arrival.
+    They are taken at the times t (m,) of the samples, which in a log may be uneven. If
+    the times are those of arrival, samples count as evenly spaced.
     """
     at = (t - t[0]) * rate
     even = np.ptp(at - np.arange(len(at))) < 0.5 / FINER
@@ -385,17 +385,17 @@ def _transformed(values: Array, t: Array, rate: float, n: int) -> Complex:
 
 
 def _in_bursts(t: Array, rate: float) -> bool:
-    """Whether times are those of arrival: many follow faster than a device samples."""
+    """Whether times are those of arrival: many steps are shorter than a device's."""
     return bool(np.mean(np.diff(t) * rate < BURST) > BURSTS)
 
 
-def _square(spectrum: Complex) -> Array:
+def _squared_magnitude(spectrum: Complex) -> Array:
     square: Array = spectrum.real**2 + spectrum.imag**2
     return square
 
 
-def _floor(power: Array) -> Array:
-    """Running median, by stretches."""
+def _median_floor(power: Array) -> Array:
+    """Running median (m,) of the power, interpolated between stretches."""
     parts = max(1, len(power) // (2 * BESIDE))
     each = len(power) // parts
     level = medians(power[: parts * each].reshape(parts, each))
@@ -404,11 +404,11 @@ def _floor(power: Array) -> Array:
     return np.maximum(floor, 1e-300)
 
 
-def _on_a_slope(power: Array, floor: Array) -> Array:
-    """The floor, or what lies close to either side where that is far above it.
+def _floor_on_slope(power: Array, floor: Array) -> Array:
+    """The floor, raised to the power close by where that is far above it.
 
-    What settles or drifts has the more power the lower the frequency; a line stands out
-    of that, too.
+    Drift and settling have more power at lower frequencies. A line must stand out of
+    that slope, too.
     """
     n = len(power)
     # sums up to and including each; beyond the ends there is nothing to add
@@ -424,7 +424,7 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
         )
         sides.append(np.where(count > 0, mean, np.inf))
     below, above = sides
-    # beyond the lowest frequency there is but more of a slope
+    # at either end of the spectrum only one side has neighbours
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
     beside = np.where(np.isfinite(below), beside, above)
     falls = (beside > STEEP * floor) & (below > SLOPE * power)
@@ -432,7 +432,7 @@ def _on_a_slope(power: Array, floor: Array) -> Array:
     return level
 
 
-def _beyond(x: float, count: int) -> float:
+def _log_gamma_tail(x: float, count: int) -> float:
     """Probability (ln) that Gamma(count) exceeds x: e^-x sum_k x^k / k!."""
     k = np.arange(count)
     terms = k * np.log(max(x, 1e-300)) - np.concatenate(

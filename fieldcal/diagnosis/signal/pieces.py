@@ -18,27 +18,27 @@ from fieldcal.physics.experience import Experience
 Complex = NDArray[np.complexfloating]
 
 AT_ONCE = 1 << 16
-"""Samples that a line is taken out of at once."""
+"""Samples of which a line is subtracted at once."""
 
 ROUNDED = 1e-12
-"""Part of a value that taking out a mean and a slope leaves of it by rounding."""
+"""Relative rounding error that removing a mean and a slope leaves of a constant."""
 
 SHORTEST = 64
-"""Samples of a window from which it is looked at."""
+"""Fewest samples of a window that is searched for lines."""
 
 
 @dataclass(frozen=True, slots=True)
-class Pieces:
-    """Samples of each window about their mean, and where the device was in it.
+class WindowSamples:
+    """Samples of each window without mean and slope, and the orientations.
 
     Attributes
     ----------
-    x : one row for each window
-    samples, times : (n, 6) without means and slope, (n,) s, of each window
+    x : orientation and forces, one row for each window
+    samples, times : (n, 6) without mean and slope, (n,) s, of each window
     noise : (6,) of one sample
     rate : Hz
-    usable : (n, 6) of each window, samples that say something; all if not given
-    cuts : s, instants at which a bias jumps: there is a mean for each side
+    usable : (n, 6) of each window, whether a sample can be used; all if not given
+    cuts : s, instants at which a bias jumps; either side has a mean of its own
 
     """
 
@@ -50,23 +50,24 @@ class Pieces:
     usable: tuple[NDArray[np.bool_], ...] = ()
     cuts: Array = field(default_factory=lambda: np.zeros(0))
 
-    def with_whole_line(self, hz: float, amplitude: Complex) -> Pieces:
-        """The same with what means and slopes have taken of a line, (w, 6).
+    def with_whole_line(self, hz: float, amplitude: Complex) -> WindowSamples:
+        """Restore the part of a line that means and slopes have removed.
 
         A wave of n periods loses up to 6 / (pi n)^2 of its power to a slope.
+        `amplitude` (w, 6) is that of the line in each window.
         """
         samples = []
         for own, t, known, one in zip(
             self.samples, self.times, self.usable, amplitude, strict=True
         ):
-            line = line_of(t, hz, one)
+            line = evaluate_line(t, hz, one)
             samples.append(own + np.where(known, line, 0.0))
-            samples[-1] -= _flat(t, line, known, self.cuts)
+            samples[-1] -= _detrended(t, line, known, self.cuts)
         return replace(self, samples=tuple(samples))
 
 
-def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
-    """Windows that are long enough: the first of their rows, and their bounds."""
+def long_windows(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
+    """Windows that are long enough: index of their first row, and sample bounds."""
     first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
     bounds = enumerate(spans(source.block, source.about))
     return [
@@ -76,28 +77,30 @@ def held_in(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
     ]
 
 
-def pieces_of(source: RowSource, rows: Rows) -> Pieces:
-    """Windows of a recording that are long enough.
+def samples_of_windows(source: RowSource, rows: Rows) -> WindowSamples:
+    """Samples of the windows of a recording that are long enough.
 
-    Outputs of which rows say nothing, as of gravity on a table that turns, are zero. A
-    bias that jumps is taken out: it has power at every frequency.
+    Outputs that the rows do not use, such as accelerometers on a table that turns, are
+    zero. Jumps of a bias are removed, since they have power at every frequency.
     """
-    block, held = source.block, held_in(source, rows)
+    block, held = source.block, long_windows(source, rows)
     times = tuple(block.t[a:b] for _, a, b in held)
     cuts = np.ravel(clear_jumps(rows))
     samples, usable = [], []
     for (row, a, b), t in zip(held, times, strict=True):
         values = np.hstack([block.acc[a:b], block.gyr[a:b]])
         usable.append(source.usable[a:b] & rows.used[row] & np.isfinite(values))
-        samples.append(_flat(t, values, usable[-1], cuts))
-    return Pieces(
-        places_of(rows, held), tuple(samples), times, rows.noise, rate_of(block),
-        tuple(usable), cuts,
+        samples.append(_detrended(t, values, usable[-1], cuts))
+    return WindowSamples(
+        experience_in_windows(rows, held), tuple(samples), times, rows.noise,
+        rate_of(block), tuple(usable), cuts,
     )  # fmt: skip
 
 
-def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
-    """Where the device is in windows that `held_in` gives."""
+def experience_in_windows(
+    rows: Rows, held: Sequence[tuple[int, int, int]]
+) -> Experience:
+    """Orientation and forces in the windows of `long_windows`."""
     x, some = rows.x, np.array([row for row, _, _ in held], dtype=np.intp)
     return Experience.at_rest(
         x.alpha[some],
@@ -109,8 +112,10 @@ def places_of(rows: Rows, held: Sequence[tuple[int, int, int]]) -> Experience:
     )
 
 
-def _flat(t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array) -> Array:
-    """Samples without slope and the means between cuts, (n, 6); zero if not usable."""
+def _detrended(
+    t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array
+) -> Array:
+    """Samples less slope and means between cuts, (n, 6); zero if not usable."""
     s = (t - t.mean()) / max(np.ptp(t), 1e-9)
     first = np.unique(np.append(0, np.searchsorted(t, cuts[cuts < t[-1]])))
     long = np.diff(np.append(first, len(t)))
@@ -131,21 +136,21 @@ def _flat(t: Array, values: Array, usable: NDArray[np.bool_], cuts: Array) -> Ar
     return out
 
 
-def line_of(t: Array, hz: float, amplitude: Complex) -> Array:
-    """Line of some complex amplitudes, Re(amplitude exp(2 pi i hz t)), (n, c)."""
+def evaluate_line(t: Array, hz: float, amplitude: Complex) -> Array:
+    """Samples of a line, Re(amplitude exp(2 pi i hz t)), (n, c)."""
     turned = 2 * np.pi * hz * t
     both = np.array([amplitude.real, -amplitude.imag])
     line: Array = np.column_stack([np.cos(turned), np.sin(turned)]) @ both
     return line
 
 
-def take_out(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
-    """Take a line out of samples, (n, c), in place."""
-    for some in stretches(0, len(t)):
-        values[some] -= line_of(t[some], hz, amplitude)
+def subtract_line(values: Array, t: Array, hz: float, amplitude: Complex) -> None:
+    """Subtract a line from samples (n, c), in place."""
+    for some in chunks(0, len(t)):
+        values[some] -= evaluate_line(t[some], hz, amplitude)
 
 
-def stretches(first: int, last: int) -> Iterator[slice]:
-    """Samples a part at a time: what is made of them takes memory, too."""
+def chunks(first: int, last: int) -> Iterator[slice]:
+    """Slices of at most `AT_ONCE` samples, to limit memory."""
     for start in range(first, last, AT_ONCE):
         yield slice(start, min(start + AT_ONCE, last))

@@ -1,4 +1,4 @@
-"""What to do in the field now."""
+"""What to do in the field next, in sentences."""
 
 from __future__ import annotations
 
@@ -9,27 +9,30 @@ import numpy as np
 from fieldcal.core.positions import ladder
 from fieldcal.core.sentences import join
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
+from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch, list_positions
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
-from fieldcal.diagnosis.wording.deciding_position import deciding_position, extent
-from fieldcal.diagnosis.wording.paragraph import MOST, off_by
+from fieldcal.diagnosis.wording.deciding_position import (
+    deciding_position,
+    ladder_extent,
+)
+from fieldcal.diagnosis.wording.paragraph import MOST_PLACES, angle_errors_text
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
-LESS_THAN = 3
-"""Positions below which none can be held out."""
+FEWEST_POSITIONS = 3
+"""Fewest positions of which one can be held out."""
 
 
 def advice(
     explanation: Explanation,
     effects: Sequence[FoundEffect],
-    unknown: Sequence[Unknown],
+    unknown: Sequence[UnknownMismatch],
     mismatch: Sequence[Mismatch],
     odd: Sequence[str],
 ) -> Iterator[str]:
     """Sentences, the most urgent first; `mismatch` names positions as listed.
 
-    `odd` are facts of the recording that cannot be.
+    `odd` are impossible facts of the recording.
     """
     if odd:
         yield (
@@ -37,13 +40,13 @@ def advice(
             " (axes, signs, units, angles), and diagnose again: until then no other"
             " effect can be found."
         )
-    yield from about_mismatches(unknown)
+    yield from advice_on_mismatches(unknown)
     if explanation.undecided:
         yield (
             "Record again with more positions, or longer ones: the simulation leaves"
             " something out, but too weakly to name it."
         )
-    yield from _deciding(explanation, effects)
+    yield from _how_to_decide(explanation, effects)
     for name in dict.fromkeys(f.id for f in effects):
         yield _cure(name, mismatch)
     known = dict.fromkeys(f.id for f in effects if not f.aliases and _deterministic(f))
@@ -56,12 +59,12 @@ def advice(
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
         yield "Hold more positions, or hold them longer: random errors average out."
     held = len(explanation.dictionary.held)
-    if held < LESS_THAN:
+    if held < FEWEST_POSITIONS:
         yield f"Record more than {held} position{'s' * (held > 1)}: so few show little."
 
 
 def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
-    """What to do about an effect, and where it was if it is one on samples."""
+    """What to do about an effect; for a fault of samples, also where it was."""
     effect = catalogue()[name]
     places = {
         p
@@ -71,13 +74,13 @@ def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
     }
     if not isinstance(effect, Chain) or not places:
         return f"{name}: {effect.cure}"
-    return f"{name} at {listed(sorted(places), MOST)}: {effect.cure}"
+    return f"{name} at {list_positions(sorted(places), MOST_PLACES)}: {effect.cure}"
 
 
-def _deciding(
+def _how_to_decide(
     explanation: Explanation, effects: Sequence[FoundEffect]
 ) -> Iterator[str]:
-    """How to tell an effect from its aliases: one sentence for each way to do it."""
+    """How to distinguish an effect from its aliases, one sentence for each way."""
     for one in effects:
         ways: dict[str, list[str]] = {}
         open_ = []
@@ -107,11 +110,11 @@ def _none_in_reach(explanation: Explanation) -> str:
     positions = explanation.prepared.source.about.positions
     if not explanation.rows.x.oriented.all() or not ladder(positions):
         return "To decide: "
-    return f"No position {extent(positions)} decides; what does: "
+    return f"No position {ladder_extent(positions)} decides; what does: "
 
 
-def about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
-    """What to do about mismatches without an effect, channels alike in one sentence."""
+def advice_on_mismatches(unknown: Sequence[UnknownMismatch]) -> Iterator[str]:
+    """What to do about unexplained mismatches, one sentence for each remedy."""
     alike: dict[tuple[str, str], list[str]] = {}
     for mystery in unknown:
         alike.setdefault(_remedy(mystery), []).append(mystery.mismatch.channel)
@@ -125,7 +128,7 @@ def about_mismatches(unknown: Sequence[Unknown]) -> Iterator[str]:
         )
 
 
-WAYS = {
+MISMATCH_REMEDIES = {
     "time": (
         "Hold one position for longer, and record the temperature",
         "the time, as biases do that follow a temperature",
@@ -150,24 +153,24 @@ WAYS = {
     "beta": ("Hold more angles β at one angle α", "the angle β"),
     "joints": ("Hold each angle α with each angle β", "both angles together"),
 }
-"""What to do about a function that no effect makes, and what it is a function of."""
+"""Remedy for a mismatch by the covariate that it follows, and that covariate."""
 
 
-def _remedy(unknown: Unknown) -> tuple[str, str]:
-    """What to do about a mismatch, and why, with room for the channels."""
-    places = listed(unknown.mismatch.positions)
-    if unknown.turned and len(unknown.mismatch.positions) > 1:
-        joints = join([joint for joint, _ in unknown.turned], "and")
+def _remedy(unknown: UnknownMismatch) -> tuple[str, str]:
+    """Remedy for a mismatch, and its reason with placeholders for the channels."""
+    places = list_positions(unknown.mismatch.positions)
+    if unknown.angle_errors and len(unknown.mismatch.positions) > 1:
+        joints = join([joint for joint, _ in unknown.angle_errors], "and")
         return (
             f"Set the angle {joints} of {places} again and repeat these positions",
-            f": {off_by(unknown.turned)} in each of them.",
+            f": {angle_errors_text(unknown.angle_errors)} in each of them.",
         )
-    if unknown.turned:
+    if unknown.angle_errors:
         return (
             f"Set {places} again and repeat it",
-            f": {off_by(unknown.turned)} there.",
+            f": {angle_errors_text(unknown.angle_errors)} there.",
         )
-    what, follows = WAYS.get(unknown.cause, ("", ""))
+    what, follows = MISMATCH_REMEDIES.get(unknown.cause, ("", ""))
     if not what or not np.isfinite(unknown.mismatch.correlation):
         return (
             f"Repeat {places}, and look for what was different there",

@@ -25,9 +25,9 @@ class DecidingPosition:
 
     Attributes
     ----------
-    alpha_deg, beta_deg : where
-    apart : by how many standard deviations of a window's mean they differ there
-    number : of the position of the session that it is, from 1; 0 for a new one
+    alpha_deg, beta_deg : its angles
+    apart : difference of the explanations there, standard deviations of a window's mean
+    number : number of that position in the session, from 1; 0 for a new position
 
     """
 
@@ -45,8 +45,8 @@ class DecidingPosition:
         return f"add the position {angles}"
 
 
-def extent(positions: Sequence[Position]) -> str:
-    """How far the ladder of a session was turned, for a sentence."""
+def ladder_extent(positions: Sequence[Position]) -> str:
+    """Largest angles of the session's ladder, for a sentence."""
     a, b = (max(map(abs, joint)) for joint in zip(*ladder(positions), strict=True))
     return f"within |α| ≤ {a:g}°, |β| ≤ {b:g}°"
 
@@ -56,7 +56,7 @@ def deciding_position(
 ) -> DecidingPosition | None:
     """Position of the session's ladder at which two explanations differ most.
 
-    None if no position that it has decides, or angles are not known.
+    None if no position of the ladder decides, or if the angles are not known.
     """
     rows, instead = explanation.rows, explanation.posterior.instead.get(one, {})
     if other not in instead or not rows.x.oriented.all():
@@ -82,6 +82,6 @@ def deciding_position(
 
 
 def _state(explanation: Explanation, found: Set) -> State:
-    """The state at a set's estimates, orientations as they are."""
+    """The state at a set's estimates, without errors of single orientations."""
     state, _ = explanation.inferred.inference.moved(found)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))

@@ -13,20 +13,21 @@ from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line, Scatter
 
 UNITS = frozenset({"hz", "ppm", "seconds", "relative"})
-"""Names of parameters that tell nothing but their unit."""
+"""Names of parameters that say no more than their unit does."""
 
 TREATED = {
     "mend": "nothing: corrected",
     "mask": "nothing: left out",
     "note": "nothing known",
 }
-"""What faults of samples do to a calibration, by what is done about them."""
+"""Effect of faults of samples on a calibration, by their treatment."""
 
 
 def by_impact(effects: Iterable[FoundEffect]) -> list[FoundEffect]:
-    """Effects, those first that move the calibration by most of its sigmas.
+    """Effects by decreasing change of the calibration, in its sigmas.
 
-    Then those that only widen it, and last what is corrected, left out or subtracted.
+    Random effects, which only widen it, come next. Those that are corrected, left out
+    or subtracted come last.
     """
     return sorted(effects, key=_impact, reverse=True)
 
@@ -41,8 +42,8 @@ def _impact(found: FoundEffect) -> tuple[int, float]:
     return 2, max(map(_significance, found.moves.values()), default=0.0)
 
 
-def lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
-    """One line for each effect; one that happened often has one with its largest."""
+def effect_lines(effects: Sequence[FoundEffect]) -> tuple[EffectLine, ...]:
+    """One line for each effect; of repeated ones, the largest."""
     alike: dict[str, list[FoundEffect]] = {}
     for found in effects:
         alike.setdefault(found.id, []).append(found)
@@ -59,19 +60,22 @@ def _line(name: str, found: Sequence[FoundEffect]) -> EffectLine:
         what += f", or {' or '.join(o.replace('_', ' ') for o in others)}"
     sure = format_probability(min(f.probability for f in found))
     return EffectLine(
-        what, size(largest.parameters), sure, _calibration_change(largest)
+        what, clearest_parameter(largest.parameters), sure, _calibration_change(largest)
     )
 
 
-def size(parameters: Mapping[str, Quantity]) -> str:
-    """The clearest parameter of an effect, and how many more there are.
+def clearest_parameter(parameters: Mapping[str, Quantity]) -> str:
+    """The most significant parameter of an effect, and the number of further ones.
 
-    When it happened is no size: an instant stands for it only where nothing else does.
+    Times are used only where the effect has no other parameter.
 
-    >>> size({"k12": Quantity(0.008, 1e-4, "1"), "k13": Quantity(0.0, 1e-4, "1")})
+    >>> k12, k13 = Quantity(0.008, 1e-4, "1"), Quantity(0.0, 1e-4, "1")
+    >>> clearest_parameter({"k12": k12, "k13": k13})
     'k12 0.00800 ± 0.00010'
-    >>> size({"hz": Quantity(28.25, 0.01, "Hz")}), size({"at_s": Quantity(4, 1, "s")})
-    ('28.250 ± 0.010 Hz', 'at 4.0 ± 1.0 s')
+    >>> clearest_parameter({"hz": Quantity(28.25, 0.01, "Hz")})
+    '28.250 ± 0.010 Hz'
+    >>> clearest_parameter({"at_s": Quantity(4, 1, "s")})
+    'at 4.0 ± 1.0 s'
     """
     if not parameters:
         return "not known"
@@ -88,14 +92,14 @@ def size(parameters: Mapping[str, Quantity]) -> str:
 
 
 def pretty_quantity(quantity: Quantity) -> str:
-    """A value with its uncertainty, its unit with raised figures."""
+    """A value with its uncertainty and its unit with superscripts."""
     text = with_uncertainty(quantity)
     unit = quantity.unit
     return text.removesuffix(unit) + format_unit(unit) if unit != "1" else text
 
 
 def _significance(quantity: Quantity) -> float:
-    """By how many standard deviations a value stands out; text not at all."""
+    """Size of a value in standard deviations; 0 of a text."""
     if isinstance(quantity.value, str) or not quantity.sigma:
         return 0.0
     return abs(quantity.value) / quantity.sigma
@@ -122,10 +126,10 @@ def _calibration_change(found: FoundEffect) -> str:
     return f"{parameter_title(name)} {by} ({sigmas:.0f} σ)"
 
 
-def of_verdict(verdict: str, probability: float, named: int) -> str:
+def verdict_probability(verdict: str, probability: float, named: int) -> str:
     """Probability of a verdict that names some effects, in words.
 
-    >>> of_verdict("left_out", 0.51, 3)
+    >>> verdict_probability("left_out", 0.51, 3)
     'probability 0.51 for all of it together'
     """
     together = (

@@ -10,17 +10,17 @@ import numpy as np
 
 from fieldcal.core.sentences import join
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.unknown_mismatch import Unknown, listed
+from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch, list_positions
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
-EACH = 3
-"""Number of times up to which an effect is named each time."""
+MOST_EACH = 3
+"""Most occurrences of an effect that are listed one by one."""
 
-MOST = 6
-"""Places that a paragraph names, and positions that a sentence does."""
+MOST_PLACES = 6
+"""Most places that a paragraph lists, and positions that a sentence lists."""
 
 
 def with_uncertainty(quantity: Quantity) -> str:
@@ -41,8 +41,8 @@ def with_uncertainty(quantity: Quantity) -> str:
     return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
 
 
-def named(found: FoundEffect) -> str:
-    """An effect with the parameters that stand out."""
+def effect_with_parameters(found: FoundEffect) -> str:
+    """An effect with its significant parameters."""
     parts = []
     for name, q in found.parameters.items():
         if (
@@ -58,15 +58,15 @@ def paragraph(
     verdict: Verdict,
     effects: Sequence[FoundEffect],
     mismatch: Sequence[Mismatch],
-    unknown: Sequence[Unknown],
+    unknown: Sequence[UnknownMismatch],
     quality: tuple[Quality, Quality, str],
     explanation: Explanation,
     notes: Sequence[str],
     odd: Sequence[str] = (),
 ) -> str:
-    """Say verdict, effects, improvement and doubts; what to do is in `advice`.
+    """Verdict, effects, improvement and doubts in sentences; remedies are in `advice`.
 
-    `odd` are facts of the recording that cannot be.
+    `odd` are impossible facts of the recording.
     """
     out = [_wrong_description(odd)] if odd else []
     if mismatch or not odd:
@@ -108,10 +108,12 @@ def _opening(
 
 
 def _listed(effects: Sequence[FoundEffect]) -> str:
-    """The effects; one that happened often in a word."""
+    """List of the effects; repeated ones are named once."""
     often = Counter(f.id for f in effects)
     names = [
-        named(f) if often[f.id] <= EACH else f"{f.id} ({often[f.id]} times)"
+        effect_with_parameters(f)
+        if often[f.id] <= MOST_EACH
+        else f"{f.id} ({often[f.id]} times)"
         for f in effects
     ]
     return " and ".join(dict.fromkeys(names))
@@ -121,12 +123,16 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
     """Where they differ, the largest difference first."""
     clearest = sorted(mismatch, key=lambda m: -m.sigma)
     places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
-    more = len(places) - MOST
-    return "; ".join(places[:MOST]) + (f"; {more} more places" if more > 0 else "")
+    more = len(places) - MOST_PLACES
+    return "; ".join(places[:MOST_PLACES]) + (
+        f"; {more} more places" if more > 0 else ""
+    )
 
 
 def _where(m: Mismatch) -> str:
-    return f"{listed(m.positions, MOST)}, {m.from_s:.0f} to {m.to_s:.0f} s"
+    return (
+        f"{list_positions(m.positions, MOST_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
+    )
 
 
 def _is_random(found: FoundEffect) -> bool:
@@ -141,7 +147,7 @@ def _how_random(found: FoundEffect) -> str:
 
 
 def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
-    """By how much the residuals fall; nothing if the held-out rms does not fall."""
+    """Decrease of the residuals; empty if the held-out rms does not decrease."""
     if not after.held_out_rms < before.held_out_rms:
         return []
     fell = ""
@@ -153,8 +159,8 @@ def _improvement(before: Quality, after: Quality, unit: str) -> list[str]:
     ]
 
 
-def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
-    """A mismatch in a sentence, which names all channels that are off there."""
+def _unexplained(one: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
+    """A mismatch in a sentence that names all channels with the same mismatch."""
     where = one.mismatch
     if np.isfinite(where.correlation):
         return (
@@ -162,9 +168,9 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
             f" {where.correlation:+.2f}); a smooth function of {one.cause} explains"
             f" {100 * where.share:.0f} % of its variance."
         )
-    places = listed(where.positions)
-    if one.turned:
-        angles = off_by(one.turned, "had been")
+    places = list_positions(where.positions)
+    if one.angle_errors:
+        angles = angle_errors_text(one.angle_errors, "had been")
         if len(where.positions) > 1:
             return (
                 f"{places.capitalize()} are off in the same way, as if {angles} in each"
@@ -181,26 +187,26 @@ def _unexplained(one: Unknown, all_: Sequence[Unknown]) -> str:
     return f"{channels} {verb} off in {places} only."
 
 
-def off_by(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:
+def angle_errors_text(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:
     """Joints with the error of each angle, deg, as part of a sentence.
 
-    >>> off_by([("α", Quantity(0.21, 0.02, "deg"))])
+    >>> angle_errors_text([("α", Quantity(0.21, 0.02, "deg"))])
     'α was off by 0.210 ± 0.020 deg'
     """
     return " and ".join(f"{j} {verb} off by {with_uncertainty(a)}" for j, a in turned)
 
 
-def of_the_setup(explanation: Explanation) -> list[str]:
-    """What happened to turns and base that is no effect of the device, in sentences."""
+def setup_notes(explanation: Explanation) -> list[str]:
+    """Sentences about turns and base that are no effects of the device."""
     numbered = explanation.prepared.source.about.numbered
-    ways = [numbered(pair) for pair in explanation.lost_ways]
+    ways = [numbered(pair) for pair in explanation.untracked_turns]
     said = [
         f"The turn from position {start + 1} to {end + 1} is not the one that the"
         " gyroscopes measured: samples may be lost there, or an output ran against its"
         " range; it has no weight"
         for start, end in ways
     ]
-    if explanation.sinks:
+    if explanation.base_sinks:
         said.append(
             "The base turned slowly while it was used, as what it stands on gives way:"
             " each ± includes it; set it on firm ground"
@@ -224,11 +230,11 @@ def _undecided(explanation: Explanation) -> str:
 
 
 def notes(explanation: Explanation, left: Sequence[str]) -> list[str]:
-    """What else a person should know."""
+    """Further sentences for the user; `left` are parameters left undetermined."""
     out = [_undecided(explanation)] if explanation.undecided else []
-    if explanation.shows_earth and not explanation.sees_earth:
+    if explanation.shows_earth_rate and not explanation.each_window_shows_earth_rate:
         out.append("The gyroscopes show the Earth's rate, which is taken into account.")
-    out += [f"{sentence}." for sentence in of_the_setup(explanation)]
+    out += [f"{sentence}." for sentence in setup_notes(explanation)]
     if left:
         out.append(f"These positions do not determine {', '.join(left)}.")
     return out

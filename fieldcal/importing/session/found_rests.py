@@ -10,14 +10,14 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.files.spool import SpooledRows
-from fieldcal.windows.cells import Between, CellTable
-from fieldcal.windows.jumps import Jumps
-from fieldcal.windows.knocks import Rest, joined_rests
-from fieldcal.windows.stretch_ends import reasons
+from fieldcal.windows.cells import CellTable, SamplesBetween
+from fieldcal.windows.jumps import JumpFinder
+from fieldcal.windows.knocks import RestPeriod, join_rests
+from fieldcal.windows.stretch_ends import stretch_end_reasons
 from fieldcal.windows.stretches import (
+    cell_rows,
+    explain_no_stretch,
     still_stretches_of_file,
-    summary,
-    why_none,
 )
 
 ONLY_RESTS = (
@@ -41,7 +41,7 @@ class FoundRests(NamedTuple):
 
     """
 
-    rests: list[Rest]
+    rests: list[RestPeriod]
     ends: list[list[tuple[str, str]]]
     forces: Array
     how: str
@@ -53,8 +53,8 @@ class FoundRests(NamedTuple):
         out = []
         for rest in self.rests:
             table: dict[str, Any] = {"start_s": rest.start, "end_s": rest.end}
-            if rest.without:
-                table["without_s"] = [list(gap) for gap in rest.without]
+            if rest.gaps:
+                table["without_s"] = [list(gap) for gap in rest.gaps]
             out.append({key: np.round(v, 6).tolist() for key, v in table.items()})
         return out
 
@@ -67,8 +67,8 @@ class FoundRests(NamedTuple):
                 "event": "still", "start_s": rest.start, "end_s": rest.end,
                 "began": ends[0][0], "ended": ends[-1][1],
             }  # fmt: skip
-            if rest.without:
-                mark["without_s"] = [list(gap) for gap in rest.without]
+            if rest.gaps:
+                mark["without_s"] = [list(gap) for gap in rest.gaps]
                 mark["bumped"] = [ended for _, ended in ends[:-1]]
             out.append(mark)
         return out
@@ -76,7 +76,7 @@ class FoundRests(NamedTuple):
     @property
     def left_out(self) -> str:
         """What is left out of rests, as a sentence; nothing if nothing is."""
-        gaps = [gap for rest in self.rests for gap in rest.without]
+        gaps = [gap for rest in self.rests for gap in rest.gaps]
         if not gaps:
             return ""
         some = ", ".join(f"{start:.1f}" for start, _ in gaps[:NAMED])
@@ -89,23 +89,27 @@ class FoundRests(NamedTuple):
 
 
 def rests_of(
-    jumps: Jumps, rows: SpooledRows, rest: CellTable, between: Between, still: float
+    jumps: JumpFinder,
+    rows: SpooledRows,
+    rest: CellTable,
+    between: SamplesBetween,
+    still: float,
 ) -> FoundRests:
     """Where the device rested for so long, s; `rest` are the cells not in rows yet."""
-    rows.add(summary(rest))
+    rows.add(cell_rows(rest))
     if still == np.inf:  # of means
         return FoundRests([], [], np.empty((0, 3)), "", "")
     if held := jumps.positions:
         how = f"{ONLY_RESTS}: it jumps {len(held) - 1} times"
-        found = [Rest(*span) for span in held]
+        found = [RestPeriod(*span) for span in held]
     else:
         how, spans = "", still_stretches_of_file(rows, rest.origin, between, still)
-        found = joined_rests(rows, rest.origin, between, spans)
-    why = "" if found else why_none(rows, rest.origin)
+        found = join_rests(rows, rest.origin, between, spans)
+    why = "" if found else explain_no_stretch(rows, rest.origin)
     forces = [_mean_of(chain(*(between(*p) for p in one.pieces))) for one in found]
     return FoundRests(
         found,
-        [reasons(rows, rest.origin, one.pieces) for one in found],
+        [stretch_end_reasons(rows, rest.origin, one.pieces) for one in found],
         np.array(forces).reshape(-1, 3),
         how,
         f"no still stretch was found: {why}" if why else "",

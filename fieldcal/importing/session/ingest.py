@@ -23,11 +23,11 @@ from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.windows.cells import Cells
-from fieldcal.windows.jumps import Jumps
-from fieldcal.windows.knocks import Rest
+from fieldcal.windows.cells import CellAccumulator
+from fieldcal.windows.jumps import JumpFinder
+from fieldcal.windows.knocks import RestPeriod
 from fieldcal.windows.spikes import without_spikes
-from fieldcal.windows.stretches import summary
+from fieldcal.windows.stretches import cell_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class ImportedSession:
 
     folder: Path
     facts: StreamFacts
-    rests: list[Rest]
+    rests: list[RestPeriod]
     says: list[str]
     forces: Array
 
@@ -136,7 +136,12 @@ def _fill(
     import tomlkit
 
     judge = RowValidator(str(recording.path), recording.place, recording.repair)
-    facts, cells, clock, jumps = StreamFacts(), Cells(), SteadyClock(), Jumps()
+    facts, cells, clock, jumps = (
+        StreamFacts(),
+        CellAccumulator(),
+        SteadyClock(),
+        JumpFinder(),
+    )
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
         for block in _steadied(clock, recording.blocks(stream)):
             good = judge.good(block)
@@ -145,7 +150,7 @@ def _fill(
                 cells.add(without_spikes(good))
                 if recording.wanted.rate_hz:
                     jumps.add(good)
-                rows.add(summary(cells.take_complete()))
+                rows.add(cell_rows(cells.take_complete()))
                 written.add(good)
         _refuse_useless(recording, facts)
         facts.left_out = judge.left_out

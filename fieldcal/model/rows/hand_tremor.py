@@ -47,7 +47,7 @@ from fieldcal.model.rows.hand_drift import TREMBLES, drift, turning
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import grain_of
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce
-from fieldcal.windows.noise import quickest, to_and_fro
+from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
 WANDERS = 6.0
 """Standard deviations of what the squares across the force have too many."""
@@ -204,7 +204,7 @@ def _quickest(rates: Array) -> Array:
     out = np.full(3, np.nan)
     some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
     if some.any():
-        out[some] = quickest([rates[:, some]])
+        out[some] = quickest_noise([rates[:, some]])
     return out
 
 
@@ -214,13 +214,13 @@ def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | Non
     `pieces` are the (n_i, 6) samples of windows, `least` (6,) that of rounding.
     """
     free = ~rows.x.oriented.any() and len(pieces) >= FEWEST
-    if not free or not to_and_fro([piece[:, GYR] for piece in pieces]):
+    if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
     # where a hand is quick, differences of samples show it as well
     each = np.ma.masked_invalid([_quickest(piece[:, GYR]) for piece in pieces])
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
     quiet = np.argsort(loud)[: max(round(QUIET * len(pieces)), 1)]
-    beside: Array = np.fmax(quickest([pieces[i] for i in quiet]), least)
+    beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
     return beside
 
 

@@ -10,13 +10,23 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
-from fieldcal.windows.noise import SHOWN, ChannelNoise, short_lag, steps_of
-from fieldcal.windows.rounding import least, of_few, of_mean, of_two_means
+from fieldcal.windows.noise import (
+    STEP_SAMPLES,
+    ChannelNoise,
+    short_lag_noise,
+    smallest_steps,
+)
+from fieldcal.windows.rounding import (
+    covariance_of_two_means,
+    least_deviation,
+    variance_of_few_values,
+    variance_of_mean,
+)
 
 
 def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> ChannelNoise:
     """Noise of one sample of each output inside windows, (6,)."""
-    acc, gyr = (noise.noise_of(p, rate_hz) for p in _pieces(block, windows))
+    acc, gyr = (noise.measure_noise(p, rate_hz) for p in _pieces(block, windows))
     return ChannelNoise(
         np.concatenate([acc.white, gyr.white]), np.concatenate([acc.quick, gyr.quick])
     )
@@ -24,7 +34,7 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Channel
 
 def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
     """Deviation that rounding alone makes, from the least change, (6,)."""
-    return least(np.concatenate(steps_in(block, windows)))
+    return least_deviation(np.concatenate(steps_in(block, windows)))
 
 
 def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
@@ -32,8 +42,15 @@ def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
     off = []
     steps = steps_in(block, windows)
     for step, pieces in zip(steps, _pieces(block, windows), strict=True):
-        differences = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
-        off.append(np.maximum(of_mean(step, differences), of_few(step, differences)))
+        differences = np.nan_to_num(
+            [short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces]
+        )
+        off.append(
+            np.maximum(
+                variance_of_mean(step, differences),
+                variance_of_few_values(step, differences),
+            )
+        )
     deviation: Array = np.sqrt(np.concatenate(off, axis=1))
     return deviation
 
@@ -48,13 +65,13 @@ def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array
     step = steps_in(block, windows)[1]
     _, pieces = _pieces(block, windows)
     mean = np.array([_mean_of_known(piece) for piece in pieces])
-    sampled = np.nan_to_num([short_lag(piece[:SHOWN]) for piece in pieces])
+    sampled = np.nan_to_num([short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces])
     pairs = np.triu_indices(len(pieces), 1)
     for c in np.flatnonzero(step > 0):
         apart = mean[pairs[0], c] - mean[pairs[1], c]
         apart = apart[np.isfinite(apart)]
         usual = float(np.median(sampled[:, c]))
-        *shared, own = of_two_means(step[c], usual, np.append(apart, 0.0))
+        *shared, own = covariance_of_two_means(step[c], usual, np.append(apart, 0.0))
         if len(shared) and own > 0:
             share = max(float(np.mean(shared)) / own, 0.0)
             out[3 + c] = np.sqrt(share * np.mean(off[:, 3 + c] ** 2))
@@ -71,7 +88,7 @@ def _mean_of_known(piece: Array) -> Array:
 
 def steps_in(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
     """Steps of both triads, (3,) each; of what stands in all windows, as on the way."""
-    held = np.concatenate([steps_of(p) for p in _pieces(block, windows)])
+    held = np.concatenate([smallest_steps(p) for p in _pieces(block, windows)])
     if not (held > 0).all():
         held = np.where(held > 0, held, grids_of(block))
     return held[:3], held[3:]

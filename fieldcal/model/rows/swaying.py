@@ -21,9 +21,9 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.bounds import spans
 from fieldcal.session.description import Description
-from fieldcal.windows.sway import waves_of
-from fieldcal.windows.sway_process import needed
-from fieldcal.windows.sway_waves import Waves
+from fieldcal.windows.sway import find_sway
+from fieldcal.windows.sway_process import needed_seconds
+from fieldcal.windows.sway_waves import SwayWaves
 
 WIDE = float(np.deg2rad(0.2))
 """Turning from which it is taken out so, rad. What is less moves gravity by less than
@@ -93,12 +93,12 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     found = {
         p: some
         for p, (a, b) in enumerate(windows)
-        if b > a and (some := waves_of(block.t[a:b], block[a:b].six, scale))
+        if b > a and (some := find_sway(block.t[a:b], block[a:b].six, scale))
     }
     if len(found) < SHARE * len(windows):
         return None
     sizes = np.array(
-        [np.mean([w.size for w in some], axis=0) for some in found.values()]
+        [np.mean([w.mean_squares for w in some], axis=0) for some in found.values()]
     )
     amplitude = np.sqrt(2 * sizes[:, 0])
     if np.sqrt((amplitude**2).mean()) < WIDE:
@@ -106,7 +106,7 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
     lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
     left = np.array([
-        sum(w.left for w in found[p]) / len(found[p]) ** 2 if p in found
+        sum(w.excess_variance for w in found[p]) / len(found[p]) ** 2 if p in found
         else _at_ends(sizes.mean(axis=0), block.t[a:b], about.gravity)
         for p, (a, b) in enumerate(windows)
     ])  # fmt: skip
@@ -119,7 +119,7 @@ def swaying(block: Block, about: Description) -> Swaying | None:
         float(np.sqrt((amplitude**2).mean())),
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
-        max(needed(w) for some in found.values() for w in some),
+        max(needed_seconds(w) for some in found.values() for w in some),
         0.0 if gyroscopes.any() else lost,
     )
 
@@ -142,7 +142,10 @@ def _fixed(about: Description) -> bool:
 
 
 def _at_rest(
-    block: Block, windows: NDArray[np.intp], found: dict[int, list[Waves]], scale: Array
+    block: Block,
+    windows: NDArray[np.intp],
+    found: dict[int, list[SwayWaves]],
+    scale: Array,
 ) -> Block:
     """Samples as they would be on a base at rest."""
     six, rate = block.six, rate_of(block)
@@ -151,19 +154,19 @@ def _at_rest(
         middles = [(u.span[1] + v.span[0]) / 2 for u, v in pairwise(some)]
         edges = [a, *np.searchsorted(block.t, middles).tolist(), b]
         for waves, (first, last) in zip(some, pairwise(edges), strict=True):
-            six[first:last] -= waves.of(block.t[first:last])
+            six[first:last] -= waves.outputs(block.t[first:last])
     few = max(1, round(TURN_S * rate))
     ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
     for (_, end, p), (start, _, q) in pairwise(ordered):
         if start - end < 4 * few:
             continue
         if p in found:
-            turned = found[p][-1].turn(block.t[end : end + 1])[0]
+            turned = found[p][-1].turn_angle(block.t[end : end + 1])[0]
             six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
         if q in found:
             waves, last = found[q][0], start - 1 - round(NEAR_S * rate)
             # the rate falls to rest from this sample to the next one
-            turned = waves.turn(block.t[last : last + 2].mean(keepdims=True))[0]
-            six[last + 1 : start, 3:] -= waves.of(block.t[last + 1 : start])[:, 3:]
+            turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
+            six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]
             six[start - 2 * few : start - few, 3:] -= turned * scale * rate / few
     return replace(block, acc=six[:, :3], gyr=six[:, 3:])

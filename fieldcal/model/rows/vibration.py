@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import grain_of, noise_of
-from fieldcal.windows.noise import ChannelNoise, short_lag
+from fieldcal.windows.noise import ChannelNoise, short_lag_noise
 
 LOUDER = 6.0
 """Significance from which a window counts as noisier than the others."""
@@ -94,7 +94,9 @@ def _compared(
     """Usual noise (6,), what windows have on top (w, 6), and which are loud (w,)."""
     out = np.empty((len(windows), 6))
     for i, (a, b) in enumerate(windows):
-        out[i] = np.concatenate([short_lag(t[a:b]) for t in (block.acc, block.gyr)])
+        out[i] = np.concatenate(
+            [short_lag_noise(t[a:b]) for t in (block.acc, block.gyr)]
+        )
     grain = grain_of(block, windows)  # outputs may stay on one step all through some
     stands = _never_changes(out, grain)
     out[stands] = np.nan

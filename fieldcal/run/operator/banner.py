@@ -53,15 +53,15 @@ W #...# #...# #.#.# ##.## #...#
 GLYPHS = {row[0]: row[2:].split() for row in GRIDS.strip().splitlines()}
 
 
-def drawable(text: str) -> bool:
+def can_draw(text: str) -> bool:
     """Whether there is a letter for each character."""
     return set(text) <= GLYPHS.keys() | {" "}
 
 
-def large(text: str) -> list[str]:
+def draw_large(text: str) -> list[str]:
     """Draw a text in three lines of equal length.
 
-    >>> [line.rstrip() for line in large("TO")]
+    >>> [line.rstrip() for line in draw_large("TO")]
     ['▀█▀ █▀█', ' █  █ █', ' ▀  ▀▀▀']
     """
     grids = [GLYPHS.get(character, [".."] * 5) for character in text]

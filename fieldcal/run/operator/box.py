@@ -33,10 +33,10 @@ FIRST = 0x2800
 """The letter without dots."""
 
 
-def picture(angle_deg: float) -> list[str]:
+def draw_box(angle_deg: float) -> list[str]:
     """A box turned clockwise by an angle, four lines.
 
-    >>> picture(0.0)[0].strip("⠀")
+    >>> draw_box(0.0)[0].strip("⠀")
     '⢀⣤⣄'
     """
     a = np.deg2rad(angle_deg)
@@ -50,7 +50,7 @@ def picture(angle_deg: float) -> list[str]:
     return _letters(dots)
 
 
-def pictures(position: Position, width: int, height: int) -> list[str]:
+def draw_joints(position: Position, width: int, height: int) -> list[str]:
     """All joints of a position, with what is seen.
 
     Side by side where there are so many letters, else two and below them the third; all
@@ -59,9 +59,9 @@ def pictures(position: Position, width: int, height: int) -> list[str]:
     if position.all_degrees is None:
         return []
     alpha, beta, gamma = position.all_degrees
-    drawn = [[*picture(alpha), "α, facing N"], [*picture(beta), "β, facing E"]]
+    drawn = [[*draw_box(alpha), "α, facing N"], [*draw_box(beta), "β, facing E"]]
     if gamma:
-        drawn.append([*picture(gamma), "γ, from above"])
+        drawn.append([*draw_box(gamma), "γ, from above"])
     each = COLUMNS + BETWEEN
     for many in (len(drawn), 2):
         rows = [

@@ -8,29 +8,29 @@ import numpy as np
 
 from fieldcal.core.positions import Position
 from fieldcal.planning.steps import Hold
-from fieldcal.run.operator.instruction import Instruction, numbered
+from fieldcal.run.operator.instruction import Instruction, position_label
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import reminder
 
 TOLD = 2
-"""Sentences that are kept in sight."""
+"""Number of sentences that are shown."""
 
 
 class RunContent:
-    """What there is to show.
+    """Content of all displays of a run, updated by its events.
 
     Parameters
     ----------
-    title : what is being done, and where it is recorded
-    positions : all that will be asked for
-    most : positions that there are at most, None where `positions` has them all
+    title : name of the run, and the folder it is recorded in
+    positions : positions that will be asked for
+    most : largest number of positions; None if `positions` has them all
 
     Attributes
     ----------
     taken : standard error of each position taken, m/s^2, by number; nan where the
         device has no accelerometers
-    view : what the engine is at
+    view : present state of the engine
     hold : the position asked for
 
     """
@@ -46,7 +46,7 @@ class RunContent:
         self._told_before: list[str] = []
         self._reminder = ""
 
-    def asked(self, hold: Hold) -> None:
+    def position_asked(self, hold: Hold) -> None:
         """A position is asked for."""
         self.hold = hold
         if hold.index >= len(self.positions):  # found on the way
@@ -55,22 +55,22 @@ class RunContent:
         self._reminder = ""
         self.taken.pop(hold.index, None)
 
-    def told(self, text: str) -> None:
-        """A sentence must not be missed."""
+    def sentence_told(self, text: str) -> None:
+        """A sentence was told that must not be missed."""
         self._told = [*(t for t in self._told if t != text), text][-TOLD:]
 
-    def withdrawn(self, text: str) -> None:
-        """A sentence holds no longer."""
+    def sentence_withdrawn(self, text: str) -> None:
+        """A sentence no longer applies."""
         self._told = [t for t in self._told if t != text]
 
-    def alarmed(self, waited: float) -> None:
-        """The reason for waiting is repeated after so many s."""
+    def alarm_repeated(self, waited: float) -> None:
+        """The reason for waiting is repeated after `waited` s."""
         self._reminder = reminder(waited)
 
-    def seen(self, view: OperatorView) -> None:
-        """The engine is at something."""
+    def view_changed(self, view: OperatorView) -> None:
+        """The state of the engine changed."""
         if view.phase == "averaging" and self.phase != "averaging":
-            self._told = self._told_before  # what was said of the turn is done
+            self._told = self._told_before  # sentences about the turn no longer apply
         if view.phase == "taken":
             known = view.sigma[:3][np.isfinite(view.sigma[:3])]
             self.taken[view.hold.index] = float(known.max()) if len(known) else np.nan
@@ -85,25 +85,25 @@ class RunContent:
         return self.view.phase if self.view else ""
 
     @property
-    def now(self) -> int:
+    def current_index(self) -> int:
         """Number of the position asked for, from 0; -1 before there is one."""
         return self.hold.index if self.hold else -1
 
     @property
     def instruction(self) -> Instruction:
         """The one thing to do now."""
-        number = numbered(self.hold, len(self.positions), self.most)
+        number = position_label(self.hold, len(self.positions), self.most)
         return Instruction.of(self.hold, self.view, number)
 
     @property
     def sentences(self) -> list[str]:
-        """What must not be missed, and why it waits."""
+        """Sentences that must not be missed, and why the run waits."""
         why = alert(self.view) if self.view else ""
         return [*self._told, *([self._reminder + why] if why else [])]
 
-    def state(self, i: int) -> str:
-        """How it stands with a position: taken, now, or nothing yet."""
+    def position_state(self, i: int) -> str:
+        """State of a position: "taken" with its ±, "now", or empty."""
         if i not in self.taken:
-            return "now" if i == self.now else ""
+            return "now" if i == self.current_index else ""
         sigma = self.taken[i]
         return f"taken   ± {1e3 * sigma:.2f} mm/s²" if np.isfinite(sigma) else "taken"

@@ -1,4 +1,4 @@
-"""What is said to an operator and what is wanted, kept in the session."""
+"""Dialogue with the operator, which is recorded in the session."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.run.waiting import PositionWait
 
 
-def question(waiting: PositionWait) -> WaitReason:
-    """Whether a wrong place is to be taken; asked while the device rests there."""
+def confirmation_question(waiting: PositionWait) -> WaitReason:
+    """Question whether to take a wrong position, asked while the device rests there."""
     return WaitReason(
         WaitState.MISPLACED,
         f"{waiting.problem}; press Enter once more to take it like this, and the result"
@@ -44,23 +44,23 @@ class OperatorDesk:
         self._operator.alarm(reason)
 
     def ask_back(self, waiting: PositionWait) -> bool:
-        """Answer an operator who wants to go on at a wrong place.
+        """Answer an operator who wants to continue in a wrong position.
 
-        Returns whether they were asked; the question stands as long as `question` is
-        the reason that is shown.
+        Returns whether they were asked for confirmation; the question is shown as long
+        as `confirmation_question` is the reason.
         """
-        if waiting.usable and waiting.problem:
-            self.alarm(question(waiting))
+        if waiting.may_insist and waiting.problem:
+            self.alarm(confirmation_question(waiting))
             return True
         self.tell(f"not yet: {waiting.problem or waiting.reason.text}")
         return False
 
-    def insisted(self, hold: Hold, problem: str) -> None:
-        """Keep that a position is taken although it is not where it should be."""
+    def record_insistence(self, hold: Hold, problem: str) -> None:
+        """Record that a position is taken although it is wrong."""
         self._recorder.mark("insisted", position=hold.index, text=problem)
 
     def stop_if_wanted(self) -> None:
-        """End the run if the operator wants that; other wishes are lost.
+        """End the run if the operator wants that; other wishes are ignored.
 
         Raises
         ------
@@ -72,7 +72,7 @@ class OperatorDesk:
             raise Stopped("stopped by the operator")
 
     def wish(self, hold: Hold) -> Wish | None:
-        """What the operator wants; what ends the step is carried out at once.
+        """Return the operator's wish; one that ends the step is carried out here.
 
         Raises
         ------

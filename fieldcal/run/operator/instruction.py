@@ -14,7 +14,7 @@ TURN = "TURN TO"
 Colour = Literal["", "cyan", "yellow", "green", "red"]
 
 
-def numbered(hold: Hold | None, count: int, most: int | None) -> str:
+def position_label(hold: Hold | None, count: int, most: int | None) -> str:
     """Number of the position asked for, of how many; empty where none is.
 
     `most` is how many there are at most, where they are found on the way.

@@ -53,7 +53,7 @@ class Keyboard:
             self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
 
     @property
-    def there(self) -> bool:
+    def has_keys(self) -> bool:
         """Whether anybody can press a key."""
         return self._keys is not None
 
@@ -81,7 +81,7 @@ class Keyboard:
         return wishes[-1] if wishes else None
 
     def forget(self) -> None:
-        """Forget keys pressed by now: they were meant for what is over."""
+        """Discard keys pressed so far: they were meant for an earlier step."""
         self.pressed()
 
 
@@ -89,13 +89,13 @@ class Keys(Protocol):
     """A terminal's keys, one by one."""
 
     def open(self) -> None:
-        """Have keys passed on at once."""
+        """Switch the terminal to pass keys on at once."""
 
     def close(self) -> None:
-        """Set the terminal back."""
+        """Restore the terminal."""
 
     def read(self) -> str | None:
-        """What was pressed by now; None if the terminal is gone."""
+        """Keys pressed since the last call; None if the terminal is gone."""
 
 
 class PosixKeys:
@@ -106,7 +106,7 @@ class PosixKeys:
         self._before: list[Any] = []
 
     def open(self) -> None:
-        """Have keys passed on at once."""
+        """Switch the terminal to pass keys on at once."""
         import termios
         import tty
 
@@ -119,14 +119,14 @@ class PosixKeys:
         termios.tcsetattr(self._file, termios.TCSADRAIN, mode)
 
     def close(self) -> None:
-        """Set the terminal back."""
+        """Restore the terminal."""
         import termios
 
         if self._before:
             termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
 
     def read(self) -> str | None:
-        """What was pressed by now; None if the terminal is gone."""
+        """Keys pressed since the last call; None if the terminal is gone."""
         text = ""
         while select.select([self._file], [], [], 0)[0]:
             data = os.read(self._file, 64)
@@ -143,13 +143,13 @@ class WindowsKeys:
         self._console = importlib.import_module("msvcrt")
 
     def open(self) -> None:
-        """Its keys come at once anyway."""
+        """Nothing to do: keys come at once anyway."""
 
     def close(self) -> None:
-        """Nothing was changed."""
+        """Nothing to restore."""
 
     def read(self) -> str | None:
-        """What was pressed by now."""
+        """Keys pressed since the last call."""
         text = ""
         while self._console.kbhit():
             key = self._console.getwch()

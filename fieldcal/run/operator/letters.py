@@ -19,8 +19,8 @@ ALIKE = {
 
 
 @dataclass(frozen=True, slots=True)
-class OneForOne:
-    """Something drawn, in letters that the terminal has.
+class TerminalLetters:
+    """A drawing in letters that the terminal can show.
 
     Attributes
     ----------
@@ -35,11 +35,13 @@ class OneForOne:
     ) -> RenderResult:
         """Draw it, and put others in the place of letters that cannot be sent."""
         for segment in console.render(self.drawn, options):
-            text = "".join(_sent(letter, options.encoding) for letter in segment.text)
+            text = "".join(
+                _sendable(letter, options.encoding) for letter in segment.text
+            )
             yield Segment(text, segment.style, segment.control)
 
 
-def _sent(letter: str, encoding: str) -> str:
+def _sendable(letter: str, encoding: str) -> str:
     try:
         letter.encode(encoding)
     except UnicodeEncodeError:

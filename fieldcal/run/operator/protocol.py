@@ -81,7 +81,7 @@ class Operator(Protocol):
 
 
 class Display:
-    """Shows an operator, block by block, what the engine is at.
+    """Shows an operator, block by block, the state of the engine.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Display:
         self._operator, self._driver = operator, driver
         self._rate = self._temperature = np.nan
 
-    def heard(self, block: Block) -> None:
+    def note_samples(self, block: Block) -> None:
         """Take note of the rate and temperature of samples that came."""
         if len(block) > 1:
             self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
@@ -105,12 +105,14 @@ class Display:
         self._show("turning", hold, waiting.where, waiting.meter, reason=reason)
 
     def averaging(self, hold: Hold, window: PiecedWindow) -> None:
-        """Show how far a window is."""
-        self._show("averaging", hold, None, window.meter, window.elapsed, window.sigma)
+        """Show the progress of a window."""
+        self._show(
+            "averaging", hold, None, window.motion_now, window.elapsed, window.sigma
+        )
 
     def taken(self, hold: Hold, window: PiecedWindow) -> None:
-        """Show what a window has reached."""
-        self._show("taken", hold, None, window.meter, window.elapsed, window.sigma)
+        """Show the standard error that a window has reached."""
+        self._show("taken", hold, None, window.motion_now, window.elapsed, window.sigma)
 
     def taken_before(self, hold: Hold, average: Average) -> None:
         """Show what was reached when the position was taken before."""

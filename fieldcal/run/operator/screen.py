@@ -1,4 +1,4 @@
-"""The operator's screen: how what is known is laid out on a terminal of any size."""
+"""The operator's screen: layout of the run's state on a terminal of any size."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from rich.text import Text
 
 from fieldcal.core.positions import Position
 from fieldcal.run.operator import widgets
-from fieldcal.run.operator.banner import drawable, large
-from fieldcal.run.operator.box import pictures
+from fieldcal.run.operator.banner import can_draw, draw_large
+from fieldcal.run.operator.box import draw_joints
 from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.instruction import TURN
 from fieldcal.run.operator.keyboard import HELP, SHORT_HELP
-from fieldcal.run.operator.letters import OneForOne
+from fieldcal.run.operator.letters import TerminalLetters
 
 TALL = 32
-"""Lines from which there is room for letters three lines tall."""
+"""Fewest lines with room for letters three lines tall."""
 
 SMALL = (76, 22)
-"""Columns and lines below which only what to do, why, how long and keys are shown."""
+"""Columns and lines below which only instruction, reason, time and keys are shown."""
 
 APART = 3
 """Columns between the list and the picture of the box."""
 
 FEWEST = 3
-"""Positions that are listed however little room there is."""
+"""Fewest positions that are listed, whatever the room."""
 
 
 class Screen:
@@ -57,7 +57,7 @@ class Screen:
         self._verification, self._keys = verification, keys
 
     def drawn(self) -> RenderableType:
-        """Draw it; as high as the terminal, so that nothing jumps."""
+        """Draw the screen, always as high as the terminal, so that it does not jump."""
         columns, rows = SMALL
         if self._console.width < columns or self._console.height < rows:
             return self._lettered(self._small())
@@ -65,14 +65,14 @@ class Screen:
 
     def _lettered(self, drawn: RenderableType) -> RenderableType:
         """In letters that the terminal has."""
-        return drawn if self._has_all_letters else OneForOne(drawn)
+        return drawn if self._has_all_letters else TerminalLetters(drawn)
 
     @property
     def _has_all_letters(self) -> bool:
         return self._console.encoding.lower().startswith("utf")
 
     def _whole(self) -> RenderableType:
-        """All there is, in a frame."""
+        """The full screen, in a frame."""
         view = self._shown.view
         above: list[RenderableType] = [*self._instruction(), Text()]
         if view and self._shown.hold is view.hold:
@@ -80,7 +80,7 @@ class Screen:
         above += [*self._sentences(), Text()]
         below: list[RenderableType] = []
         if view:
-            below.append(widgets.link(view))
+            below.append(widgets.link_state(view))
         if self._keys():
             below.append(Text(HELP))
         rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
@@ -114,9 +114,11 @@ class Screen:
             name = hold.position.name
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
-            lines += [Text(line) for line in widgets.short(view)]
+            lines += [Text(line) for line in widgets.short_gauges(view)]
         number_of = len(self._shown.positions)
-        taken = Text(widgets.progress(self._shown.taken, self._shown.now, number_of))
+        taken = Text(
+            widgets.progress(self._shown.taken, self._shown.current_index, number_of)
+        )
         room = self._console.height - 1 - len(self._console.render_lines(
             Group(*lines, taken)))  # fmt: skip
         lines += [*self._sentences(room), taken]
@@ -127,7 +129,7 @@ class Screen:
         return parts
 
     def _sentences(self, room: float = np.inf) -> list[RenderableType]:
-        """What must not be missed, and why it waits: the last, in so many lines."""
+        """The last sentences, and the reason for waiting, in a limited height."""
         said = [
             Text(f"! {text}", style="bold yellow") for text in self._shown.sentences
         ]
@@ -137,25 +139,25 @@ class Screen:
 
     def _listing(self, rows: int) -> RenderableType:
         """The positions around the present one, with what was reached in each."""
-        positions, now = self._shown.positions, self._shown.now
+        positions, now = self._shown.positions, self._shown.current_index
         table = Table.grid(padding=(0, 2))
         first = int(np.clip(now - rows // 2, 0, max(0, len(positions) - rows)))
         for i in range(first, min(len(positions), first + rows)):
             style = "bold" if i == now else ""
             apart = " (verification)" if i == self._verification else ""
             name = positions[i].name + apart
-            table.add_row(f"{i + 1}", name, self._shown.state(i), style=style)
+            table.add_row(f"{i + 1}", name, self._shown.position_state(i), style=style)
         return table
 
     def _drawing(self, listing: RenderableType, rows: int) -> list[str]:
-        """The box as it should stand, where there are letters and room for it."""
+        """Drawing of the wanted position, if letters and room allow it."""
         hold = self._shown.hold
         if not self._has_all_letters or hold is None:
             return []
         options = self._console.options
         taken = Measurement.get(self._console, options, listing).maximum
         room = self._console.width - 4 - taken - APART
-        return pictures(hold.position, room, rows)
+        return draw_joints(hold.position, room, rows)
 
     def _lines_of(self, *parts: RenderableType) -> int:
         """Count the lines that parts of the screen take within its frame."""
@@ -170,7 +172,7 @@ class Screen:
         width = self._console.width - 4
         if self._console.height >= TALL and self._has_all_letters:
             angles = _angles(turn, width - 4)
-            lines = ["", *large(what.words), *angles, "", what.detail, ""]
+            lines = ["", *draw_large(what.words), *angles, "", what.detail, ""]
         else:
             at = f"   {turn.name}" if turn else ""
             lines = [_spaced(what.words) + at, what.detail]
@@ -184,7 +186,7 @@ def _angles(position: Position | None, width: int) -> list[str]:
     alpha, beta, gamma = position.all_degrees or (np.nan, np.nan, 0.0)
     third = f"  γ {gamma:g}°" if gamma else ""
     text = f"α {alpha:g}°  β {beta:g}°{third}"
-    drawn = large(text) if drawable(text) else [position.name]
+    drawn = draw_large(text) if can_draw(text) else [position.name]
     fits = max(map(len, drawn)) <= width
     return ["", *(drawn if fits else [position.name])]
 

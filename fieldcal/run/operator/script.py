@@ -46,7 +46,7 @@ class ScriptOperator:
         self._say("tell", text=text)
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
-        """Report what is waited for."""
+        """Report the reason for waiting."""
         self.tell(reminder(waited) + reason.text)
 
     def wish(self) -> Wish | None:
@@ -70,11 +70,11 @@ class ScriptOperator:
         )
 
     def _say(self, event: str, **what: Any) -> None:
-        report(event, self._out, **what)
+        report_event(event, self._out, **what)
 
 
-def report(event: str, out: IO[str] | None = None, **what: Any) -> None:
-    """Write one event as a line, to standard error if not told where else."""
+def report_event(event: str, out: IO[str] | None = None, **what: Any) -> None:
+    """Write one event as a line, to standard error by default."""
     out = out or sys.stderr
     line = {"event": event, "host_s": round(host_clock(), 3), **what}
     out.write(json.dumps(line) + "\n")

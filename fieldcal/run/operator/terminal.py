@@ -28,7 +28,7 @@ FRAMES = 8.0
 """Drawings a second."""
 
 ASKED_AGAIN = 5.0
-"""How long a second press of a key that gives something up is waited for, s."""
+"""Time within which a key that discards something must be pressed again, s."""
 
 
 class ConsoleOperator:
@@ -89,7 +89,7 @@ class ConsoleOperator:
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
-        self._shown.asked(hold)
+        self._shown.position_asked(hold)
         self._lines.clear()
         self._bell()
         if self._keyboard:
@@ -102,12 +102,12 @@ class ConsoleOperator:
 
     def tell(self, text: str) -> None:
         """Keep a sentence on the screen."""
-        self._shown.told(text)
+        self._shown.sentence_told(text)
         self._ring(text)
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
-        """Ring for the reason that stands on the screen."""
-        self._shown.alarmed(waited)
+        """Ring for the reason shown on the screen."""
+        self._shown.alarm_repeated(waited)
         self._ring(reminder(waited) + reason.text)
 
     def _ring(self, text: str) -> None:
@@ -120,7 +120,9 @@ class ConsoleOperator:
         pressed = self._keyboard.pressed() if self._keyboard else None
         asked = monotonic() - self._skips < ASKED_AGAIN
         if pressed == "skip" or not asked:
-            self._shown.withdrawn(self._asked)  # answered, or s would only ask again
+            self._shown.sentence_withdrawn(
+                self._asked
+            )  # answered, or s would only ask again
         if pressed == "skip" and not asked:
             self._skips, pressed = monotonic(), None
             self._ask_back()
@@ -137,7 +139,7 @@ class ConsoleOperator:
 
     def show(self, view: OperatorView) -> None:
         """Draw the view, unless the last drawing is too recent."""
-        self._shown.seen(view)
+        self._shown.view_changed(view)
         if view.phase == "taken":
             self._bell()
         if self._live is None:
@@ -179,4 +181,4 @@ class ConsoleOperator:
         return self._screen.drawn()
 
     def _has_keys(self) -> bool:
-        return self._keyboard is not None and self._keyboard.there
+        return self._keyboard is not None and self._keyboard.has_keys

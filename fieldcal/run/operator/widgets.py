@@ -21,27 +21,27 @@ BAR = 30
 """Width of the bar that fills while averaging, characters."""
 
 TICKS = (0.0, 2.0, 5.0, 15.0, 45.0, 180.0)
-"""How far off each second character of half the inclinometer is, deg: always alike."""
+"""Angle of each second character of half the inclinometer, deg; a fixed scale."""
 
 HALF = 2 * (len(TICKS) - 1)
-"""Characters to either side of the middle, which is where it should be."""
+"""Characters to either side of the middle, which is the wanted angle."""
 
 RULER = "  -45  -5  0   5  45  "
-"""What stands above the inclinometers, deg."""
+"""Scale above the inclinometers, deg."""
 
 UNSEEN = "by its mark, gravity does not show it"
-"""Of a third angle: accelerometers at rest show two."""
+"""Notice for a third angle: accelerometers at rest show two only."""
 
 CRYSTAL = 1000.0
 """± of a clock that says nothing, ppm: any crystal is better. So it is for a while once
 the computer was asleep, for samples that waited meanwhile came late."""
 
 NEAR = 1.0
-"""Off by less than this, deg, an angle is not asked to be turned."""
+"""Least error of an angle, deg, for which a turn is requested."""
 
 
 def alert(view: OperatorView) -> str:
-    """Why it waits, where that wants the operator to do something; else empty."""
+    """Reason for waiting if the operator has to act; else empty."""
     return view.reason.text if view.reason.needs_operator else ""
 
 
@@ -86,7 +86,7 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
 
 
 def stillness(level: float) -> Text:
-    """Motion as part of what is allowed."""
+    """Meter of the motion, relative to the allowed motion."""
     if not np.isfinite(level):
         return Text("listening to the device's noise")
     filled = int(np.clip(round(level * METER / 2), 0, METER))
@@ -107,8 +107,8 @@ def sigma(view: OperatorView) -> str:
     return ", ".join(parts) or ""
 
 
-def by_the_end(view: OperatorView) -> str:
-    """Standard error to be expected when the window is full, by white noise."""
+def sigma_at_end(view: OperatorView) -> str:
+    """Expected standard error of the full window, for white noise."""
     acc = view.sigma[:3][np.isfinite(view.sigma[:3])]
     if view.hold.sigma:
         return f", wanted ± {1e3 * view.hold.sigma:.2f} mm/s²"
@@ -138,7 +138,7 @@ def gauges(view: OperatorView) -> Table:
         grid.add_row("averaging", bar)
         grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")
         known = sigma(view)
-        reached = f"± {known}{by_the_end(view)}" if known else "not known yet"
+        reached = f"± {known}{sigma_at_end(view)}" if known else "not known yet"
         grid.add_row("reached", reached)
     if view.phase != "silent":
         grid.add_row("stillness", stillness(view.stillness))
@@ -158,7 +158,7 @@ def progress(taken: Mapping[int, float], now: int, number: int) -> str:
     return " · ".join(parts)
 
 
-def short(view: OperatorView) -> list[str]:
+def short_gauges(view: OperatorView) -> list[str]:
     """What is measured now in a few short lines, for a small screen."""
     if view.phase in ("averaging", "taken"):
         left = max(0.0, view.hold.seconds - view.elapsed)
@@ -180,8 +180,8 @@ def short(view: OperatorView) -> list[str]:
     return lines if alert(view) else [*lines, view.reason.text]
 
 
-def link(view: OperatorView) -> Text:
-    """How the link does."""
+def link_state(view: OperatorView) -> Text:
+    """State of the link: rate and losses."""
     health = view.health
     rate = f"{view.rate_hz:.0f} Hz" if np.isfinite(view.rate_hz) else "no rate yet"
     parts = [rate, f"{health.samples} samples"]

@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 COOKIE = "fieldcal_page"
 
 LARGEST = 1000
-"""Bytes of a request's body."""
+"""Largest body of a request, bytes."""
 
 HEADERS = {
     "content-security-policy": "default-src 'self'; frame-ancestors 'none'",
@@ -29,7 +29,7 @@ HEADERS = {
     "referrer-policy": "no-referrer",
     "cache-control": "no-store",
 }
-"""Of every answer: nothing from elsewhere, in nobody's frame, kept nowhere."""
+"""Headers of every answer: no foreign content, no framing, no caching."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Access:
     uploads: Mapping[str, int] = field(default_factory=dict)
 
     def refusal(self, scope: Scope) -> Response | None:
-        """The answer to a request that is not let in; None for one that is."""
+        """The answer to a request that is refused; None for one that is allowed."""
         headers = {
             k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]
         }
@@ -90,13 +90,13 @@ class Access:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     def _known(self, given: str) -> bool:
-        """Whether a program may have this token; all are compared, in the same time."""
+        """Whether a program's token is valid; all are compared, in constant time."""
         found = [hmac.compare_digest(given.encode(), b.encode()) for b in self.bearers]
         return any(found)
 
 
 class Gate:
-    """Lets requests in by `Access`, and gives every answer its headers."""
+    """Admits requests by `Access`, and adds the headers to every answer."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app, self._access = app, access

@@ -1,4 +1,4 @@
-"""What the page has to show: the run as it stands, by the console's own words."""
+"""Content of the page: the state of the run, in the words of the console."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fieldcal.run.operator.protocol import OperatorView
 
 
 class Board:
-    """What there is to see, written by the run and read by the server's thread.
+    """State of the run, written by the run and read by the server's thread.
 
     Parameters
     ----------
@@ -38,27 +38,27 @@ class Board:
 
     # -- written by the run
 
-    def asked(self, hold: Hold) -> None:
+    def position_asked(self, hold: Hold) -> None:
         """A position is asked for."""
         with self._changed():
-            self._shown.asked(hold)
+            self._shown.position_asked(hold)
 
-    def told(self, text: str) -> None:
-        """A sentence must not be missed."""
+    def sentence_told(self, text: str) -> None:
+        """A sentence was told that must not be missed."""
         with self._changed():
-            self._shown.told(text)
+            self._shown.sentence_told(text)
 
-    def alarmed(self, waited: float) -> None:
-        """The reason for waiting is repeated after so many s."""
+    def alarm_repeated(self, waited: float) -> None:
+        """The reason for waiting is repeated after some time, s."""
         with self._changed():
-            self._shown.alarmed(waited)
+            self._shown.alarm_repeated(waited)
 
-    def seen(self, view: OperatorView) -> None:
-        """The engine is at something."""
+    def view_changed(self, view: OperatorView) -> None:
+        """The state of the engine changed."""
         with self._changed():
-            self._shown.seen(view)
+            self._shown.view_changed(view)
 
-    def ended(self, words: str, sentences: Sequence[str], good: bool) -> None:
+    def run_ended(self, words: str, sentences: Sequence[str], good: bool) -> None:
         """The run is over: GO, NO-GO, or why it stopped."""
         with self._changed():
             self._ended = {
@@ -82,7 +82,7 @@ class Board:
         return self._version
 
     def content(self) -> dict[str, Any]:
-        """All there is to see, as JSON; text as it is shown, never carried out."""
+        """The whole state as JSON; texts are made safe for display."""
         with self._lock:
             run = self._shown
             now = run.instruction
@@ -94,7 +94,7 @@ class Board:
                 "colour": now.colour,
                 "told": [shown(text) for text in run.sentences],
                 "positions": [
-                    {"name": shown(position.name), "state": run.state(i)}
+                    {"name": shown(position.name), "state": run.position_state(i)}
                     for i, position in enumerate(run.positions)
                 ],
                 "now": run.hold.index if run.hold else None,
@@ -122,7 +122,7 @@ def _measured(view: OperatorView) -> dict[str, Any]:
     """What is measured now."""
     out: dict[str, Any] = {
         "phase": view.phase,
-        "link": shown(widgets.link(view).plain),
+        "link": shown(widgets.link_state(view).plain),
         "reason": "" if widgets.alert(view) else shown(view.reason.text),
         "still": bool(view.stillness < 1) if np.isfinite(view.stillness) else None,
     }

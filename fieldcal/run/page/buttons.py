@@ -1,4 +1,4 @@
-"""Who may press the buttons of the page: one at a time, and everybody may watch."""
+"""Who may press the buttons of the page: one client at a time; all may watch."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import get_args
 from fieldcal.run.operator.protocol import Wish
 
 GONE = 15.0
-"""Time after which one who was not heard of any more has left the buttons, s."""
+"""Time without contact after which a client loses the buttons, s."""
 
 OFFERED = frozenset(get_args(Wish)) - {"wait"}
-"""What can be asked for from the page."""
+"""Wishes that the page offers."""
 
 
 class Buttons:
@@ -31,15 +31,15 @@ class Buttons:
         self._holder, self._heard = "", 0.0
         self._pressed: deque[Wish] = deque(maxlen=1)
 
-    def here(self, client: str) -> bool:
-        """Note that somebody watches; whether the buttons are theirs."""
+    def note_watcher(self, client: str) -> bool:
+        """Note that a client watches; returns whether it holds the buttons."""
         with self._lock:
             if client == self._holder:
                 self._heard = self._clock()
             return client == self._holder
 
-    def free(self) -> bool:
-        """Whether nobody holds them, or who did is gone."""
+    def is_free(self) -> bool:
+        """Whether no present client holds the buttons."""
         with self._lock:
             return self._free()
 
@@ -55,7 +55,7 @@ class Buttons:
             return True
 
     def press(self, client: str, wish: Wish) -> bool:
-        """Press one; False if somebody else holds them."""
+        """Press a button; False if another client holds them."""
         with self._lock:
             if client != self._holder:
                 return False
@@ -64,10 +64,10 @@ class Buttons:
             return True
 
     def pressed(self) -> Wish | None:
-        """What was asked for since the last call: the last one."""
+        """The last wish since the last call; None without one."""
         with self._lock:
             return self._pressed.pop() if self._pressed else None
 
     def forget(self) -> None:
-        """Forget what was pressed by now: it was meant for what is over."""
+        """Discard wishes so far: they were meant for an earlier step."""
         self.pressed()

@@ -1,4 +1,4 @@
-"""The page's server: beside the run, in a thread of its own."""
+"""The server of the page, in a thread beside the run."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ EVERY = 0.125
 """Shortest time between two views that are sent, s."""
 
 ALIVE = 2.0
-"""Time after which something is sent though nothing changed, s."""
+"""Longest time between two messages to a client, s."""
 
 LINGER = 3.0
-"""How long the last view is offered to who has not seen it, s."""
+"""Time that the last state is offered to clients that have not seen it, s."""
 
 NAME = 64
-"""Letters of a client's name."""
+"""Longest name of a client."""
 
 
 class PageServer:
@@ -56,7 +56,7 @@ class PageServer:
     def __init__(self, host: str, port: int = 0) -> None:
         self.buttons, self.board = Buttons(), Board("fieldcal", [])
         self._seen: dict[str, int] = {}
-        self._socket = listening(host, port)
+        self._socket = listening_socket(host, port)
         port = self._socket.getsockname()[1]
         name = f"[{host}]" if ":" in host else host
         self.access = Access((f"{name}:{port}",))
@@ -72,12 +72,12 @@ class PageServer:
 
     @property
     def address(self) -> str:
-        """What to open, with the token."""
+        """Address of the page, with the token."""
         return f"http://{self.access.hosts[0]}/?token={self.access.token}"
 
     @property
     def watched(self) -> bool:
-        """Whether anybody has seen the page."""
+        """Whether any client has seen the page."""
         return bool(self._seen)
 
     def __enter__(self) -> Self:
@@ -94,11 +94,11 @@ class PageServer:
         self._thread.join(timeout=5.0)
         self._socket.close()
 
-    def look(self, client: str) -> str:
-        """What a client is to see now, as JSON."""
+    def content_for(self, client: str) -> str:
+        """The present content for a client, as JSON."""
         version = self.board.version
-        mine = self.buttons.here(client)
-        content = {**self.board.content(), "mine": mine, "free": self.buttons.free()}
+        mine = self.buttons.note_watcher(client)
+        content = {**self.board.content(), "mine": mine, "free": self.buttons.is_free()}
         self._seen[client] = version
         return json.dumps(content)
 
@@ -107,7 +107,7 @@ class PageServer:
         before, sent = "", -ALIVE
         try:
             while not self._server.should_exit:
-                now = self.look(client)
+                now = self.content_for(client)
                 if now != before or monotonic() - sent > ALIVE:
                     before, sent = now, monotonic()
                     yield f"data: {now}\n\n"
@@ -116,7 +116,7 @@ class PageServer:
             self._seen.pop(client, None)
 
 
-def listening(host: str, port: int) -> socket.socket:
+def listening_socket(host: str, port: int) -> socket.socket:
     """Return a socket that listens there.
 
     Raises
@@ -135,7 +135,7 @@ def listening(host: str, port: int) -> socket.socket:
         ) from error
 
 
-def this_computer() -> str:
+def local_address() -> str:
     """The address that others on the local network reach this computer by.
 
     That from which it would send to them; nothing is sent.

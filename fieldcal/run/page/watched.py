@@ -1,4 +1,4 @@
-"""An operator whose run is seen on the page as well, and wished from there."""
+"""An operator that also shows the run on the page and takes wishes from it."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ class WatchedOperator:
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
         self._buttons.forget()
-        self._board.asked(hold)
+        self._board.position_asked(hold)
         self._inner.place(hold)
 
     def tell(self, text: str) -> None:
         """Show a sentence that must not be missed."""
-        self._board.told(text)
+        self._board.sentence_told(text)
         self._inner.tell(text)
 
     def alarm(self, reason: WaitReason, waited: float = 0.0) -> None:
         """Call the operator."""
-        self._board.alarmed(waited)
+        self._board.alarm_repeated(waited)
         self._inner.alarm(reason, waited)
 
     def show(self, view: OperatorView) -> None:
         """Show the state."""
-        self._board.seen(view)
+        self._board.view_changed(view)
         self._inner.show(view)
 
     def wish(self) -> Wish | None:
-        """What was asked for here or there; the page asks back by itself."""
+        """A wish of the other operator or of the page, which confirms by itself."""
         return self._buttons.pressed() or self._inner.wish()

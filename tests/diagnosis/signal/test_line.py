@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Block
-from fieldcal.diagnosis.signal.line import Remains, remains, tuned
+from fieldcal.diagnosis.signal.line import LineRemainder, line_remainder, tune_line
 from fieldcal.diagnosis.signal.moments import moments_of
 from fieldcal.diagnosis.signal.periodogram import LONGEST
-from fieldcal.diagnosis.signal.pieces import Pieces, pieces_of
+from fieldcal.diagnosis.signal.pieces import WindowSamples, samples_of_windows
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
 from fieldcal.model.rows.reduce import RowSource, reduce
@@ -19,7 +19,9 @@ RATE, SIGMA, HZ, SIZE = 100.0, 5e-3, 7.03, 6e-4
 SEEDS = range(12)
 
 
-def recorded(seed: int, windows: int, samples: int, phase: float = 0.0) -> Pieces:
+def recorded(
+    seed: int, windows: int, samples: int, phase: float = 0.0
+) -> WindowSamples:
     """A line on a_y in white noise, its phase perhaps another in each window."""
     rng = np.random.default_rng(seed)
     six, times = [], []
@@ -30,14 +32,14 @@ def recorded(seed: int, windows: int, samples: int, phase: float = 0.0) -> Piece
         six.append(noise - noise.mean(axis=0))
         times.append(t)
     x = Experience.at_rest(np.zeros(windows), np.zeros(windows), 9.81)
-    return Pieces(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
+    return WindowSamples(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
 
 
-def left(pieces: Pieces) -> Remains:
+def left(pieces: WindowSamples) -> LineRemainder:
     """What is left of the line, whatever it is found to be."""
-    tone = tuned(pieces, Hum(), moments_of(pieces, HZ + 2e-4))
+    tone = tune_line(pieces, Hum(), moments_of(pieces, HZ + 2e-4))
     assert tone.channels == ("ay",)
-    return remains(pieces, tone)
+    return line_remainder(pieces, tone)
 
 
 @pytest.mark.parametrize(
@@ -88,18 +90,18 @@ def test_sway_is_foretold_in_positions_not_seen() -> None:
         wave = np.exp(2j * np.pi * 0.83 * t)
         six.append(np.real(wave[:, None] * seen) + rng.normal(0, SIGMA, (3000, 6)))
         times.append(t)
-    pieces = Pieces(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
-    tone = tuned(pieces, sway, moments_of(pieces, 0.83))
-    found = remains(pieces, tone)
-    assert tone.clear
-    assert found.gain(tone.clear) > 0.7
+    pieces = WindowSamples(x, tuple(six), tuple(times), np.full(6, SIGMA), RATE)
+    tone = tune_line(pieces, sway, moments_of(pieces, 0.83))
+    found = line_remainder(pieces, tone)
+    assert tone.clear_channels
+    assert found.gain(tone.clear_channels) > 0.7
 
 
 def test_a_line_is_tuned_in_windows_longer_than_a_periodogram() -> None:
     """What a periodogram tells of its frequency is far from what the window tells."""
     pieces = recorded(3, 1, 12 * LONGEST)
     off = 0.3 * RATE / LONGEST
-    tone = tuned(pieces, Hum(), moments_of(pieces, HZ + off))
+    tone = tune_line(pieces, Hum(), moments_of(pieces, HZ + off))
     assert tone.channels == ("ay",)
     assert abs(tone.hz - HZ) < 4 * tone.sigmas["hz"]
 
@@ -118,8 +120,10 @@ def test_a_slow_line_keeps_what_the_slopes_of_windows_took() -> None:
             six[:, 1] += 0.01 * np.cos(2 * np.pi * 0.6 * own + 0.1)
             line = np.polynomial.polynomial.polyfit(own - own.mean(), six, 1)
             samples.append(six - line[0] - np.outer(own - own.mean(), line[1]))
-        pieces = Pieces(x, tuple(samples), tuple(t), np.full(6, SIGMA), RATE, every)
-        tone = tuned(pieces, Hum(), moments_of(pieces, 0.601))
+        pieces = WindowSamples(
+            x, tuple(samples), tuple(t), np.full(6, SIGMA), RATE, every
+        )
+        tone = tune_line(pieces, Hum(), moments_of(pieces, 0.601))
         off.append([(tone.values["ay"] - 0.01) / tone.sigmas["ay"],
                     (tone.hz - 0.6) / tone.sigmas["hz"]])  # fmt: skip
     mean, rms = np.mean(off, axis=0), np.sqrt(np.mean(np.square(off), axis=0))
@@ -139,6 +143,6 @@ def test_what_never_changes_has_no_line_of_rounding() -> None:
     block = Block.of(t, acc, np.full_like(acc, 0.004))
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
-    pieces = pieces_of(source, reduce(source))
+    pieces = samples_of_windows(source, reduce(source))
     assert len(pieces.samples) == 2
     assert not any(samples.any() for samples in pieces.samples)

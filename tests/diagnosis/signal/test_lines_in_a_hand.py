@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.signal.line import Tone
-from fieldcal.diagnosis.signal.spectrum import tones
+from fieldcal.diagnosis.signal.line import SpectralLine
+from fieldcal.diagnosis.signal.spectrum import find_lines
 from fieldcal.model.rows.reduce import RowSource, reduce
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import parse
@@ -38,7 +38,7 @@ def held(seed: int) -> tuple[Array, Array]:
     return t, six
 
 
-def lines(t: Array, six: Array) -> list[Tone]:
+def lines(t: Array, six: Array) -> list[SpectralLine]:
     """What is found."""
     starts = np.arange(COUNT) * REST_S + 1.0
     said = [{"start_s": s, "end_s": s + HELD_S} for s in starts.tolist()]
@@ -46,7 +46,7 @@ def lines(t: Array, six: Array) -> list[Tone]:
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, starts, Thermometer.of(block))
-    return [tone for tone, _ in tones(source, reduce(source))]
+    return [tone for tone, _ in find_lines(source, reduce(source))]
 
 
 @pytest.mark.parametrize("seed", range(3))

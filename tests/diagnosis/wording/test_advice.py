@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from small_sessions import dictionary, ladder
 
-from fieldcal.diagnosis.findings.unknown_mismatch import Unknown
+from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch
 from fieldcal.diagnosis.result import Mismatch
-from fieldcal.diagnosis.wording.advice import WAYS, about_mismatches
+from fieldcal.diagnosis.wording.advice import MISMATCH_REMEDIES, advice_on_mismatches
 
 
-def unknown(cause: str, channel: str = "ay", correlation: float = 0.9) -> Unknown:
+def unknown(
+    cause: str, channel: str = "ay", correlation: float = 0.9
+) -> UnknownMismatch:
     """A mismatch of a cause without physics, in two positions."""
-    return Unknown(
+    return UnknownMismatch(
         cause,
         Mismatch(
             channel=channel, kind="time", covariate=cause, positions=(0, 1),
@@ -25,14 +27,14 @@ def unknown(cause: str, channel: str = "ay", correlation: float = 0.9) -> Unknow
 
 def test_each_function_that_no_effect_makes_has_a_way_to_find_its_physics() -> None:
     causes = {c.name for c in dictionary(ladder()).causes if c.kind == "unknown"}
-    assert causes - set(WAYS) == {"window", "position"}
-    for cause in WAYS:
-        (said,) = about_mismatches([unknown(cause)])
+    assert causes - set(MISMATCH_REMEDIES) == {"window", "position"}
+    for cause in MISMATCH_REMEDIES:
+        (said,) = advice_on_mismatches([unknown(cause)])
         assert ": ay follows " in said and " on purpose" not in said
 
 
 def test_what_follows_the_time_may_follow_a_temperature() -> None:
-    (said,) = about_mismatches([unknown("time"), unknown("time", "az")])
+    (said,) = advice_on_mismatches([unknown("time"), unknown("time", "az")])
     assert said == (
         "Hold one position for longer, and record the temperature: ay and az follow the"
         " time, as biases do that follow a temperature, and no effect in the catalogue"
@@ -44,5 +46,5 @@ def test_what_follows_the_time_may_follow_a_temperature() -> None:
     ("cause", "correlation"), [("window", np.nan), ("time", np.nan), ("position", 0.5)]
 )
 def test_single_positions_are_repeated(cause: str, correlation: float) -> None:
-    (said,) = about_mismatches([unknown(cause, "gz", correlation)])
+    (said,) = advice_on_mismatches([unknown(cause, "gz", correlation)])
     assert said.startswith("Repeat ") and "gz is off only there" in said

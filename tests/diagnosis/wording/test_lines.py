@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fieldcal.diagnosis.result import FoundEffect, Quantity
-from fieldcal.diagnosis.wording.lines import by_impact, lines
+from fieldcal.diagnosis.wording.lines import by_impact, effect_lines
 
 
 def _found(name: str, **moves: tuple[float, float]) -> FoundEffect:
@@ -29,7 +29,7 @@ def test_what_moves_the_calibration_is_told_before_what_is_left_out_of_it() -> N
 
 def test_one_that_happened_often_stays_one_line_in_its_place() -> None:
     found = [_found("bump"), _found("bump"), _found("quadratic", z=(0.01, 0.001))]
-    told = lines(by_impact(found))
+    told = effect_lines(by_impact(found))
     assert [one.what for one in told] == ["quadratic", "bump (2 times)"]
     assert [one.does for one in told] == [
         "acc bias z +0.01 m/s² (10 σ)", "nothing: left out",

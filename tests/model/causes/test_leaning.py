@@ -11,8 +11,8 @@ from small_sessions import SD, WINDOW_S, G, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.findings.found_effects import parameters
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.findings.found_effects import parameter_estimates
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.wander import Wander
@@ -136,7 +136,7 @@ def explained(block: Block) -> Explanation:
     ]
     about = {"format": 1, "site": {"gravity": G, "latitude_deg": 50.0},
              "position": positions}  # fmt: skip
-    return explain(prepare(block, parse(about)))
+    return explain(prepare_recording(block, parse(about)))
 
 
 @pytest.mark.thorough
@@ -146,8 +146,8 @@ def test_what_leans_is_no_change_of_a_bias(seed: int, lean: float) -> None:
     found = explained(stops(np.random.default_rng(seed), lean))
     assert "leaning" in found.best.set.keys
     assert found.posterior.names(found.best.set) == ("temperature_bias",)
-    (standing,) = found.standing
-    told = parameters(found, standing)
+    (standing,) = found.probable_causes
+    told = parameter_estimates(found, standing)
     for axis, true in zip("xyz", WARMING, strict=True):
         one = told[f"a{axis}"]
         assert one.sigma is not None and one.sigma < 5e-4

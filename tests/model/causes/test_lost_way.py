@@ -14,7 +14,7 @@ from small_sessions import dictionary, ladder, nominal
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
@@ -58,7 +58,7 @@ def held(way: int | None, seconds: float = LOST_S) -> list[dict[str, float]]:
 @cache
 def explained(seed: int, way: int | None) -> Explanation:
     tables = {"format": 1, **about(), "position": held(way)}
-    return explain(prepare(lossy(seed, way), parse(tables)))
+    return explain(prepare_recording(lossy(seed, way), parse(tables)))
 
 
 @pytest.mark.parametrize(
@@ -68,9 +68,9 @@ def test_the_turn_that_was_not_followed_is_told_and_no_other(
     seed: int, way: int | None
 ) -> None:
     one = explained(seed, way)
-    assert one.lost_ways == (() if way is None else ((way, way + 1),))
+    assert one.untracked_turns == (() if way is None else ((way, way + 1),))
     said = [text for text in notes(one, []) if "gyroscopes measured" in text]
-    assert len(said) == len(one.lost_ways)
+    assert len(said) == len(one.untracked_turns)
     assert way is None or f"from position {way + 1} to {way + 2} is not" in said[0]
     assert "gyro_scale" in one.posterior.names(one.best.set)
 

@@ -13,7 +13,7 @@ from small_sessions import dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.explain import explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.diagnosis.wording.paragraph import notes
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
@@ -50,11 +50,11 @@ def sunk(seed: int, by: float) -> Block:
 @pytest.mark.parametrize(("seed", "by"), [(1, 4e-3), (2, 0.0)])
 def test_a_base_that_gives_way_is_told_and_is_no_effect(seed: int, by: float) -> None:
     tables = {"format": 1, "site": SITE, "position": PLACES}
-    one = explain(prepare(sunk(seed, by), parse(tables)))
-    assert one.sinks == (by > 0)
-    assert {s.name for s in one.standing} == ({"base_tilt"} if by else set())
+    one = explain(prepare_recording(sunk(seed, by), parse(tables)))
+    assert one.base_sinks == (by > 0)
+    assert {s.name for s in one.probable_causes} == ({"base_tilt"} if by else set())
     said = [text for text in notes(one, []) if "The base turned slowly" in text]
-    assert len(said) == one.sinks
+    assert len(said) == one.base_sinks
 
 
 @pytest.mark.thorough

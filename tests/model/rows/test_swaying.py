@@ -17,7 +17,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis import diagnose
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession, solve_session
 from fieldcal.model.rows.swaying import swaying
@@ -28,7 +28,7 @@ from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve
-from fieldcal.windows.sway import waves_of
+from fieldcal.windows.sway import find_sway
 
 FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 SECONDS, RATE = 30.0, 50.0
@@ -147,9 +147,9 @@ def test_a_part_of_a_slow_wave_is_no_drift() -> None:
     for held in (pier.held()[2], pier.held()[4]):
         some = (block.t >= held.start) & (block.t < held.end)
         t, six = block.t[some], block.six[some]
-        (found,) = waves_of(t, six, np.ones(3))
+        (found,) = find_sway(t, six, np.ones(3))
         s = (t - t.mean()) / np.ptp(t) * 2
-        left = six - found.of(t) - firm.six[some]
+        left = six - found.outputs(t) - firm.six[some]
         assert np.abs(left[:, :3].T @ s / (s @ s)).max() < 1e-3
 
 
@@ -158,7 +158,7 @@ def test_beating_waves_have_no_arm() -> None:
     waves = "sway:amplitude_deg=1,hz=0.1008,spread_hz=0.01008,phase_deg=97.12,"
     block = played(100, f"{waves}azimuth_deg=7.375")
     some = (block.t >= positions()[4]["start_s"]) & (block.t < positions()[4]["end_s"])
-    (found,) = waves_of(block.t[some], block.six[some], np.ones(3))
+    (found,) = find_sway(block.t[some], block.six[some], np.ones(3))
     assert np.abs(found.arm).max() < 3.0
 
 
@@ -248,7 +248,7 @@ def test_waves_take_slow_noise_with_them_and_the_rows_know_it(tmp_path: Path) ->
     found = swaying(one.block, one.about)
     assert found is not None
     assert found.white == pytest.approx(NOISE, rel=0.05)
-    rows = prepare(one.block, one.about).rows
+    rows = prepare_recording(one.block, one.about).rows
     assert rows.noise == pytest.approx(NOISE, rel=0.05)
     assert np.nanmedian(rows.sd * np.sqrt(rows.length * RATE)[:, None], axis=0) == (
         pytest.approx(NOISE, rel=0.06)

@@ -10,7 +10,7 @@ from benchmarks.concealed import kinds
 from benchmarks.concealed.draws import sized
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.diagnosis.explain import explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.fitted import whole
@@ -36,8 +36,8 @@ def test_the_way_is_left_with_its_noise_beside_what_fades(
     square, freedom = 0.0, 0
     for seed in range(sessions):
         session = _having(name, seed)
-        found = explain(prepare(session.record(seed), session.about))
-        assert [one.name for one in found.standing] == [name]
+        found = explain(prepare_recording(session.record(seed), session.about))
+        assert [one.name for one in found.probable_causes] == [name]
         values = whole(found.inferred.best.state, found.dictionary)
         for turn in found.inferred.turned:
             left = turn.way - turn.way_design @ values[turn.columns]
@@ -58,8 +58,8 @@ def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
     draw, _ = kinds()["cross_coupling"]
     session = draw(np.random.default_rng(32_002_000))
     assert not session.angles
-    found = explain(prepare(session.record(32_002_000), session.about))
-    assert [one.name for one in found.standing] == ["cross_coupling"]
+    found = explain(prepare_recording(session.record(32_002_000), session.about))
+    assert [one.name for one in found.probable_causes] == ["cross_coupling"]
 
 
 @pytest.mark.thorough
@@ -69,7 +69,7 @@ def test_what_was_gone_through_is_not_gone_through_again(
     """The first set that is found ends it, where what follows from that is known."""
     rng = np.random.default_rng(1)
     session = plain(rng, ("wide",)).having({"cross_coupling": {"k12": 0.006}})
-    found = explain(prepare(session.record(1), session.about)).inferred
+    found = explain(prepare_recording(session.record(1), session.about)).inferred
     assert found.best.keys == {"cross_coupling"}
     assert found.search.key(found.best.members) in found.been
     runs: list[Set] = []

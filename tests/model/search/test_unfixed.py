@@ -12,7 +12,7 @@ import pytest
 from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.sizing import EVEN, Sizes
 from fieldcal.model.search.inference import STAYED
 from fieldcal.model.search.selection import Search
@@ -34,14 +34,14 @@ def explained(seed: int) -> Explanation:
         said = said.replace("[site]", f"[site]\ngravity = {GRAVITY}")
         (one / "session.toml").write_text(said)
         session = Session.open(one)
-        return explain(prepare(session.block, session.about))
+        return explain(prepare_recording(session.block, session.about))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_three_effects_are_found_of_which_none_is_seen_alone(seed: int) -> None:
     """What bends |f| bends the turns as well, until accelerometers are set right."""
     found = explained(seed)
-    assert {one.name for one in found.standing} == EVERY
+    assert {one.name for one in found.probable_causes} == EVERY
     assert found.posterior.nothing < 1e-6
 
 
@@ -71,7 +71,7 @@ def test_how_a_position_lies_moves_no_closure() -> None:
 def test_sizes_do_not_hang_on_where_they_begin() -> None:
     """Of |f| each axis alone may do without its scatter, all three together not."""
     found = explained(88_001_001)
-    assert "temperature_bias" in {one.name for one in found.standing}
+    assert "temperature_bias" in {one.name for one in found.probable_causes}
     dictionary, gram = found.dictionary, found.inferred.search.gram
     causes = {cause.key: cause for cause in dictionary.causes}
     even = (EVEN,) * len(dictionary.always)

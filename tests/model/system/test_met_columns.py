@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.concealed import kinds
 from fieldcal.diagnosis.explain import explain
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.system import turn_rows
 from fieldcal.model.system.met_columns import Met, met_columns
@@ -29,8 +29,8 @@ def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(turn_rows, "met_columns", both)
     session = kinds()["gyro_scale"][0](np.random.default_rng(7))
-    found = explain(prepare(session.record(7), session.about))
-    assert "gyro_scale" in [one.name for one in found.standing]
+    found = explain(prepare_recording(session.record(7), session.about))
+    assert "gyro_scale" in [one.name for one in found.probable_causes]
     assert len(seen) > 10 and any(met.general for met, _ in seen)
     for met, alone in seen:
         np.testing.assert_array_equal(met.index, alone.index)

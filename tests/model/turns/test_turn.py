@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.diagnosis.explain import inference_of
-from fieldcal.diagnosis.prepare import prepare
+from fieldcal.diagnosis.explain import build_inference
+from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.filtered_turns import FILTERED
@@ -115,8 +115,8 @@ def followed(
         "format": 1, "device": {"name": "turned"}, "position": places,
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
-    prepared = prepare(block, about)
-    inference = inference_of(prepared.source, prepared.rows, prepared)
+    prepared = prepare_recording(block, about)
+    inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
     known = Search(d, gram(linear, d, at_rest)).evaluated(())
@@ -240,8 +240,8 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
         for (a, b), w in zip(PLACES, windows, strict=True)
     ]
     about = {"format": 1, "position": places, "nominal": {"gyr_scale": [2.0] * 3}}
-    prepared = prepare(block, parse(about))
-    inference = inference_of(prepared.source, prepared.rows, prepared)
+    prepared = prepare_recording(block, parse(about))
+    inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
     assert inference.turns is not None and not d.free.any()
@@ -343,8 +343,8 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     """Without known angles a closure begins and ends at the forces that are seen."""
     block, windows = recorded()
     places = [{"start_s": w.start, "end_s": w.end} for w in windows]
-    prepared = prepare(block, parse({"format": 1, "position": places}))
-    inference = inference_of(prepared.source, prepared.rows, prepared)
+    prepared = prepare_recording(block, parse({"format": 1, "position": places}))
+    inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
     assert inference.turns is not None and d.free.all()

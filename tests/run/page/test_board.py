@@ -37,8 +37,8 @@ def view(phase: Phase, hold: Hold = HOLD, **changes: object) -> OperatorView:
 
 def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
-    board.seen(view("turning"))
+    board.position_asked(HOLD)
+    board.view_changed(view("turning"))
     now = board.content()
     assert (now["words"], now["detail"]) == ("TURN TO", "position 4 of 5, then let go")
     assert now["there"] == {"alpha_deg": 20.0, "beta_deg": -1.3, "ok": False}
@@ -49,50 +49,50 @@ def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
 
 def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
     board = Board("fieldcal", FIVE)
-    board.told("the device was moved")
-    board.asked(HOLD)
-    board.seen(view("averaging"))
+    board.sentence_told("the device was moved")
+    board.position_asked(HOLD)
+    board.view_changed(view("averaging"))
     now = board.content()
     assert now["words"] == "HOLD STILL" and now["colour"] == "green"
     assert (now["elapsed_s"], now["seconds"]) == (12.0, 30.0)
     assert now["reached"] == "± 3.00 mm/s², 0.020 mrad/s" and now["still"] is True
     assert now["told"] == ["the device was moved"]
-    board.seen(view("taken"))
+    board.view_changed(view("taken"))
     now = board.content()
     assert now["words"] == "TAKEN" and now["told"] == []
     states = ["", "", "", "taken   ± 3.00 mm/s²", ""]
     assert [row["state"] for row in now["positions"]] == states
-    board.asked(HOLD)  # once more
+    board.position_asked(HOLD)  # once more
     states[3] = "now"
     assert [row["state"] for row in board.content()["positions"]] == states
 
 
 def test_gyroscopes_alone_have_no_error_of_a_force() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
-    board.seen(view("taken", sigma=np.array([np.nan, np.nan, np.nan, 1, 1, 1])))
+    board.position_asked(HOLD)
+    board.view_changed(view("taken", sigma=np.array([np.nan, np.nan, np.nan, 1, 1, 1])))
     assert board.content()["positions"][3]["state"] == "taken"
 
 
 def test_what_was_said_of_the_turn_is_done_when_the_window_begins() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
-    board.seen(view("turning"))
-    board.told("press s once more")
-    board.alarmed(60.0)
-    board.seen(view("averaging"))
+    board.position_asked(HOLD)
+    board.view_changed(view("turning"))
+    board.sentence_told("press s once more")
+    board.alarm_repeated(60.0)
+    board.view_changed(view("averaging"))
     assert board.content()["told"] == []
     wrong = WaitReason(WaitState.MISPLACED, "it is off")
-    board.seen(view("turning", reason=wrong))  # for the first time since
+    board.view_changed(view("turning", reason=wrong))  # for the first time since
     assert board.content()["told"] == ["it is off"]
 
 
 def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
+    board.position_asked(HOLD)
     wrong = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
-    board.seen(view("turning", reason=wrong))
-    board.alarmed(60.0)
+    board.view_changed(view("turning", reason=wrong))
+    board.alarm_repeated(60.0)
     now = board.content()
     assert now["colour"] == "yellow"
     assert now["told"] == ["still waiting, 60 s: the device is at α = 3.0°"]
@@ -100,8 +100,8 @@ def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
 
 def test_positions_that_are_found_on_the_way_are_listed() -> None:
     board = Board("fieldcal", FIVE[:1], most=9)
-    board.asked(Hold(0, FIVE[0], 30.0))
-    board.asked(Hold(1, FIVE[4], 30.0))
+    board.position_asked(Hold(0, FIVE[0], 30.0))
+    board.position_asked(Hold(1, FIVE[4], 30.0))
     now = board.content()
     assert now["detail"] == "position 2 of at most 9, then let go"
     assert [row["name"] for row in now["positions"]] == [FIVE[0].name, FIVE[4].name]
@@ -110,8 +110,8 @@ def test_positions_that_are_found_on_the_way_are_listed() -> None:
 def test_what_others_wrote_is_shown_and_never_carried_out() -> None:
     evil = Position("\x1b]0;GO\x07", 0.0, 0.0)
     board = Board("fieldcal", [evil])
-    board.asked(Hold(0, evil, 30.0))
-    board.told("a\u202eb")
+    board.position_asked(Hold(0, evil, 30.0))
+    board.sentence_told("a\u202eb")
     now = board.content()
     assert now["positions"][0]["name"] == r"\x1b]0;GO\x07"
     assert now["told"] == [r"a\u202eb"]
@@ -119,10 +119,10 @@ def test_what_others_wrote_is_shown_and_never_carried_out() -> None:
 
 def test_the_end_is_what_is_shown_last() -> None:
     board = Board("fieldcal", FIVE)
-    board.asked(HOLD)
-    board.seen(view("averaging"))
+    board.position_asked(HOLD)
+    board.view_changed(view("averaging"))
     before = board.version
-    board.ended("NO-GO", ["take position 3 again"], good=False)
+    board.run_ended("NO-GO", ["take position 3 again"], good=False)
     now = board.content()
     assert (now["words"], now["colour"], now["ended"]) == ("NO-GO", "red", True)
     assert now["told"] == ["take position 3 again"] and "phase" not in now
@@ -140,8 +140,8 @@ class Clock:
 def test_one_has_the_buttons_and_all_others_watch() -> None:
     clock = Clock()
     buttons = Buttons(clock)
-    assert buttons.free() and buttons.take("a")
-    assert buttons.here("a") and not buttons.here("b")
+    assert buttons.is_free() and buttons.take("a")
+    assert buttons.note_watcher("a") and not buttons.note_watcher("b")
     assert not buttons.take("b") and not buttons.press("b", "stop")
     assert buttons.press("a", "repeat") and buttons.pressed() == "repeat"
     assert buttons.pressed() is None
@@ -153,11 +153,11 @@ def test_whoever_is_gone_leaves_the_buttons() -> None:
     buttons = Buttons(clock)
     buttons.take("a")
     clock.now = GONE - 1
-    assert buttons.here("a") and not buttons.free()
+    assert buttons.note_watcher("a") and not buttons.is_free()
     clock.now += GONE - 1
-    assert not buttons.free() and not buttons.take("b")
+    assert not buttons.is_free() and not buttons.take("b")
     clock.now += 2
-    assert buttons.free() and buttons.take("b")
+    assert buttons.is_free() and buttons.take("b")
 
 
 class Console:

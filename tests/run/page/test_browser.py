@@ -38,7 +38,7 @@ def page() -> Iterator[Screen]:
 def server() -> Iterator[PageServer]:
     with PageServer("127.0.0.1") as made:
         made.board = Board("fieldcal · five_position", FIVE)
-        made.board.asked(Hold(1, FIVE[1], 30.0))
+        made.board.position_asked(Hold(1, FIVE[1], 30.0))
         yield made
 
 
@@ -55,7 +55,7 @@ def tap(page: Screen, what: str) -> None:
 def test_it_shows_what_to_do_on_any_screen(
     page: Screen, server: PageServer, size: tuple[int, int]
 ) -> None:
-    server.board.told("<b>not carried out</b> " + "x" * 300)
+    server.board.sentence_told("<b>not carried out</b> " + "x" * 300)
     page.size(*size)
     opened(page, server)
     assert page.text("angles") == FIVE[1].name
@@ -76,7 +76,7 @@ def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
     """East, down, south are x, y, -z; clockwise from above turns east to south."""
     position = Position.deg(20.0, 10.0, gamma=120.0)
     hold = Hold(len(FIVE), position, 30.0)  # found on the way
-    server.board.asked(hold)
+    server.board.position_asked(hold)
     opened(page, server)
     script = "turned(20, 10, 120).slice(9, -1).split(',').map(Number)"
     m = page.value(script)
@@ -86,7 +86,7 @@ def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
     np.testing.assert_allclose(seen, flip @ turned @ flip, atol=1e-5)
     page.until("document.getElementById('angles').textContent", position.name)
     there = PositionCheck(False, 12.0, 10.0, "", 2.0)
-    server.board.seen(
+    server.board.view_changed(
         OperatorView("turning", hold, there, 0.4, 0.0, np.full(6, np.nan),
                      WaitReason(WaitState.TURNING), 100.0, 24.5, Health(samples=9))
     )  # fmt: skip
@@ -157,7 +157,7 @@ def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> Non
     page.value("source.close(), listen()")
     page.until(lost)
     assert page.value(WORDS) == "TURN TO"  # what was known last stays in sight
-    server.board.asked(Hold(2, FIVE[2], 30.0))
+    server.board.position_asked(Hold(2, FIVE[2], 30.0))
     page.ask("Network.emulateNetworkConditions", offline=False, latency=0,
              downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
     page.until(lost, False)
@@ -167,9 +167,9 @@ def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> Non
 def test_the_end_stays_though_nothing_is_served_any_more(page: Screen) -> None:
     with PageServer("127.0.0.1") as server:
         server.board = Board("fieldcal", FIVE)
-        server.board.asked(Hold(0, FIVE[0], 30.0))
+        server.board.position_asked(Hold(0, FIVE[0], 30.0))
         opened(page, server)
-        server.board.ended("GO", [], good=True)
+        server.board.run_ended("GO", [], good=True)
     page.until(f"{WORDS} === 'GO'")
     assert page.value("document.getElementById('lost').hidden")
     assert page.value("document.getElementById('mine').hidden")

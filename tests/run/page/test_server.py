@@ -38,7 +38,7 @@ OPENER = urllib.request.build_opener(Stay, urllib.request.ProxyHandler({}))
 def server() -> Iterator[PageServer]:
     with PageServer(LOCAL) as made:
         made.board = Board("fieldcal · five_position", FIVE)
-        made.board.asked(Hold(1, FIVE[1], 30.0))
+        made.board.position_asked(Hold(1, FIVE[1], 30.0))
         yield made
 
 
@@ -155,7 +155,7 @@ def test_malformed_wishes_are_refused(
 ) -> None:
     server.buttons.take("holder", over=True)
     assert status(server, path, body) in (400, 409)
-    assert server.buttons.here("holder") and server.buttons.pressed() is None
+    assert server.buttons.note_watcher("holder") and server.buttons.pressed() is None
 
 
 def test_one_presses_and_the_other_watches(server: PageServer) -> None:
@@ -172,9 +172,9 @@ def test_a_change_is_sent_without_being_asked_for(server: PageServer) -> None:
     with sent(server, "/events?client=c") as stream:
         assert json.loads(stream.readline()[6:])["detail"].startswith("position 2")
         stream.readline()
-        server.board.asked(Hold(2, FIVE[2], 30.0))
+        server.board.position_asked(Hold(2, FIVE[2], 30.0))
         assert json.loads(stream.readline()[6:])["detail"].startswith("position 3")
-    server.board.asked(Hold(1, FIVE[1], 30.0))
+    server.board.position_asked(Hold(1, FIVE[1], 30.0))
 
 
 def test_whoever_opens_the_page_as_a_run_ends_does_not_break_it() -> None:
@@ -186,11 +186,11 @@ def test_whoever_opens_the_page_as_a_run_ends_does_not_break_it() -> None:
         @property
         def version(self) -> int:
             if name := next(self.others, ""):
-                there.look(name)
+                there.content_for(name)
             return 0
 
     with PageServer(LOCAL) as there:
-        there.look("a")
+        there.content_for("a")
         there.board = Opened("fieldcal", [])
     assert there.watched
 

@@ -21,12 +21,8 @@ from fieldcal.diagnosis.signal.line import (
     tune_line,
 )
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
-from fieldcal.diagnosis.signal.periodogram import (
-    Peak,
-    compute_spectra,
-    highest_peak,
-    noise_near,
-)
+from fieldcal.diagnosis.signal.peaks import Peak, highest_peak
+from fieldcal.diagnosis.signal.periodogram import compute_spectra, noise_near
 from fieldcal.diagnosis.signal.pieces import (
     Complex,
     WindowSamples,

@@ -19,7 +19,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.fleet.lot_prior import lot_prior
+from fieldcal.fleet.lot_prior import estimate_lot_prior
 from fieldcal.history.sessions import StoredSession
 from fieldcal.solve import Observations, solve
 
@@ -93,7 +93,7 @@ class Made:
 
     def prior(self, count: int) -> LotPrior:
         """What so many units say of the next."""
-        return lot_prior("a lot", list(self._stored(count)))
+        return estimate_lot_prior("a lot", list(self._stored(count)))
 
     def _stored(self, count: int) -> Iterator[StoredSession]:
         for i in range(count):

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 GAP_S = 8.0
 ANGLES = [(a, b) for b in (0.0, 5.0, -5.0) for a in (0.0, 45.0, -45.0)]
@@ -55,7 +55,7 @@ def record(
 
     starts = [3.0 + i * (seconds + GAP_S) for i in range(len(angles))]
     held = [(*a, s, s + seconds) for a, s in zip(angles, starts, strict=True)]
-    effects = tuple(effect(name, values) for name, values in there.items())
+    effects = tuple(checked_effect(name, values) for name, values in there.items())
     device = Profile(sampling=Sampling(rate_hz), effects=effects)
     block = simulate(device, [(*np.deg2rad(w[:2]), *w[2:]) for w in held], seed=1)
     rows = "".join(

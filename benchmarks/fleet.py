@@ -27,12 +27,12 @@ from benchmarks import borrow
 from fieldcal.calibration import limits
 from fieldcal.core.samples import Array
 from fieldcal.fleet.batch import SessionBatch
-from fieldcal.fleet.lot import lot
+from fieldcal.fleet.lot import analyse_lot
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.reduced import ReducedSession
 from fieldcal.fleet.shared import SharedFinding, SharedSearch
 from fieldcal.fleet.tree import sessions_in
-from fieldcal.fleet.workers import processes
+from fieldcal.fleet.workers import process_pool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -40,7 +40,7 @@ from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile, Truth
 from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 NINE = [(a, b) for b in (0.0, 5.0, -5.0) for a in (0.0, 45.0, -45.0)]
 SECONDS, GAP = 30.0, 10.0
@@ -89,7 +89,7 @@ def batch(place: Path, count: int) -> list[StoredSession]:
     own = SessionBatch(folders, Killing(), Database(place / "store.sqlite"))
     jobs = os.cpu_count() or 1
     begun = perf_counter()
-    for _ in own.carried_out(own.left(), processes(jobs)):
+    for _ in own.process(own.unprocessed(), process_pool(jobs)):
         pass
     wall = perf_counter() - begun
     seconds, peaks = np.loadtxt(place / "used", ndmin=2).T
@@ -128,16 +128,16 @@ class Killing(SessionTask):
 
 def tilted(place: Path, count: int = 12) -> None:
     """One of three stations is tilted, and every unit is bent alike by the force."""
-    common = effect("g_sensitivity", {"g12": 2e-5})
+    common = checked_effect("g_sensitivity", {"g12": 2e-5})
     for i in range(count):
         station = "ABC"[i % 3]
         tilt = {"about_x_deg": 0.1} if station == "B" else {}
-        effects = (common, *((effect("base_tilt", tilt),) if tilt else ()))
+        effects = (common, *((checked_effect("base_tilt", tilt),) if tilt else ()))
         recorded(place / f"{i}", i, station, effects)
     database = Database(place / "store.sqlite")
     own = SessionBatch(sessions_in([place]), SessionTask(), database)
     alone: Counter[str] = Counter()
-    for _ in own.carried_out(own.left(), processes(os.cpu_count() or 1)):
+    for _ in own.process(own.unprocessed(), process_pool(os.cpu_count() or 1)):
         pass
     rows = database.done(lambda db: sessions.found(db, reduced=True, documents=True))
     for one in rows:
@@ -197,7 +197,7 @@ def lots() -> None:
     rng, bounds = np.random.default_rng(1), limits.read("tactical")
     named = wrong = there = 0
     for _ in range(TRIALS):
-        found = lot(units(rng, 300, odd=0.01), bounds)
+        found = analyse_lot(units(rng, 300, odd=0.01), bounds)
         there += 3
         named += sum(o.serial.startswith("odd") for o in found.odd)
         wrong += sum(not o.serial.startswith("odd") for o in found.odd)
@@ -210,7 +210,7 @@ def lots() -> None:
             shifted(rng, bounds, size, count, late)
     some = units(rng, 10_000)
     begun = perf_counter()
-    lot(some, bounds)
+    analyse_lot(some, bounds)
     print(f"a lot of 10 000 units: {perf_counter() - begun:.1f} s")
 
 
@@ -224,7 +224,7 @@ def shifted(
     """How often the last units of many are told to be shifted, also falsely."""
     kinds: Counter[str] = Counter()
     for _ in range(TRIALS):
-        found = lot(units(rng, count, shift=size, late=late), bounds)
+        found = analyse_lot(units(rng, count, shift=size, late=late), bounds)
         kinds["lot"] += any(
             s.parameter == "acc_bias.x" and s.level == "lot" for s in found.shifts
         )
@@ -290,7 +290,7 @@ def shared(rows: list[StoredSession]) -> None:
 
 
 def _verdict(found: list[SharedFinding], effect: str, level: str) -> str:
-    names = [(f.effect.key[0], f.effect.member.grouping.names) for f in found]
+    names = [(f.effect.key[0], f.effect.level_effect.grouping.names) for f in found]
     if not level:
         return "nothing" if not names else "false"
     right = [n for n in names if n[0] == effect and level in n[1]]

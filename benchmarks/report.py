@@ -16,7 +16,7 @@ from fieldcal.core.frames import force
 from fieldcal.core.positions import FIVE, WIDE
 from fieldcal.core.samples import Array, Block
 from fieldcal.report import gather, render
-from fieldcal.report.browser import Browser, find
+from fieldcal.report.browser import Browser, find_browser
 from fieldcal.session.folder import Session
 from fieldcal.session.sample_files import to_batch
 
@@ -78,7 +78,7 @@ def main() -> None:
         print(f"reading them     {read:6.2f} s")
         print(f"making the page  {made:6.2f} s, {made / read:.1f} x reading")
         print(f"size             {page.stat().st_size / 1e6:6.2f} MB (limit 6)")
-        if find() is None:
+        if find_browser() is None:
             print("opening          no Chromium here")
             return
         with Browser() as browser:

@@ -21,7 +21,7 @@ import distributed
 from benchmarks.fleet import recorded
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.tree import sessions_in
-from fieldcal.fleet.workers import results, scheduled
+from fieldcal.fleet.workers import dask_pool, run_tasks
 from fieldcal.history.sessions import StoredSession
 
 
@@ -51,11 +51,11 @@ def main() -> None:
                 engine.LocalCluster(
                     n_workers=workers, threads_per_worker=1, dashboard_address=None
                 ) as cluster,
-                scheduled(cluster.scheduler_address) as pool,
+                dask_pool(cluster.scheduler_address) as pool,
             ):
-                list(results(folders[:workers], SessionTask(), pool))
+                list(run_tasks(folders[:workers], SessionTask(), pool))
                 begun = perf_counter()
-                done = list(results(folders, SessionTask(), pool))
+                done = list(run_tasks(folders, SessionTask(), pool))
                 spent[workers] = perf_counter() - begun
                 good = sum(
                     one.value is not None and bool(one.value.good) for one in done
@@ -66,7 +66,7 @@ def main() -> None:
                 )
                 if workers > 1:
                     (Path(place) / "kill").touch()
-                    again = list(results(folders, Noted(), pool))
+                    again = list(run_tasks(folders, Noted(), pool))
                     known = {one.item for one in again if one.value is not None}
                     print(
                         f"a worker killed: {len(known)} of {count} sessions with a"

@@ -188,7 +188,7 @@ class Autopilot:
 
     def _corrected(self, block: Block) -> Block:
         """Apply the calibration that it has."""
-        warm = autopilot_thermal.taken_out(
+        warm = autopilot_thermal.thermal_correction(
             self._kind, self._instance, self.parameters, block
         )
         acc, gyr = block.acc - warm[0], block.gyr - warm[1]

@@ -64,7 +64,7 @@ def parameters(kind: str) -> dict[str, float]:
     return table
 
 
-def taken_out(
+def thermal_correction(
     kind: str, instance: int, known: Mapping[str, float], block: Block
 ) -> tuple[Array, Array]:
     """What comes off accelerometers and gyroscopes, (n, 3) each."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.random_process import stream
+from fieldcal.sim_device.random_process import random_stream
 
 
 class SignalChain:
@@ -23,7 +23,7 @@ class SignalChain:
         self._full_scale: Array = np.repeat(full, 3)
         stages = (e.stage(self._full_scale) for e in profile.in_order)
         self._stages = [stage for stage in stages if stage is not None]
-        arrivals = (e.arrival(stream(seed, e.id)) for e in profile.effects)
+        arrivals = (e.arrival(random_stream(seed, e.id)) for e in profile.effects)
         self._arrivals = [arrival for arrival in arrivals if arrival is not None]
 
     def passes(self, t: Array, outputs: Array) -> Array:

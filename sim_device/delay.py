@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from time import monotonic
 
 from fieldcal.core.samples import Block
-from fieldcal.sim_device.random_process import stream
+from fieldcal.sim_device.random_process import random_stream
 
 
-class Delay:
+class SampleDelay:
     """Holds samples up, in their order; false while it holds none.
 
     Attributes
@@ -21,7 +21,7 @@ class Delay:
 
     def __init__(self, seed: int) -> None:
         self.mean = 0.0
-        self._rng = stream(seed, "delay")
+        self._rng = random_stream(seed, "delay")
         self._held: deque[tuple[float, Block]] = deque()
         self._last = 0.0
 

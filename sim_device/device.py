@@ -18,11 +18,11 @@ from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.body import Body
 from fieldcal.sim_device.chain import SignalChain
 from fieldcal.sim_device.joints import Angles
-from fieldcal.sim_device.life import Life
 from fieldcal.sim_device.noise import RandomErrors
 from fieldcal.sim_device.profile import Profile, Truth
-from fieldcal.sim_device.random_process import stream
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.random_process import random_stream
+from fieldcal.sim_device.sensor_conditions import SensorConditions
+from fieldcal.sim_device.vocabulary import checked_effect
 
 PIECE = 4096
 """Samples calculated at once: few enough to stay in the processor's cache."""
@@ -49,7 +49,7 @@ class VirtualDevice:
         self.seed = seed
         self.rate = self.profile.sampling.rate_hz
         self.sensing = Sensing(self.profile, seed)
-        self._arrival = stream(seed, "arrival")
+        self._arrival = random_stream(seed, "arrival")
         self._tick = 0
 
     @property
@@ -65,7 +65,7 @@ class VirtualDevice:
     @property
     def angles(self) -> Angles:
         """Alpha, beta and gamma that it was last told to turn to, rad."""
-        return self.body.asked
+        return self.body.commanded_angles
 
     @property
     def busy_until(self) -> float:
@@ -137,7 +137,7 @@ class VirtualDevice:
             raise InputError(f"a bump lasts more than 0 s, not {seconds:g} s")
         start = self._start(at)
         given = {"at_s": start, "for_s": seconds, "push": push, "tilt_deg": tilt_deg}
-        self.body.disturb(effect("bump", given))
+        self.body.disturb(checked_effect("bump", given))
         return (start + seconds) * self.sensing.pace
 
     def take(self, n: int) -> Block:
@@ -162,7 +162,7 @@ class VirtualDevice:
         host = np.maximum.accumulate(true + late)
         block = Block.of(stamps, six[:3].T, six[3:].T, degrees, seq, host)
         kept = self.sensing.chain.arrives(n)
-        return block if kept.all() else _only(block, kept)
+        return block if kept.all() else _selected_samples(block, kept)
 
     def _start(self, at: float | None) -> float:
         """True time of the next sample, or of a device time to come."""
@@ -193,17 +193,17 @@ class Sensing:
 
     def __init__(self, profile: Profile, seed: int) -> None:
         self.profile = profile
-        self.pace = profile.pace
+        self.pace = profile.clock_rate
         self.body = Body(profile, seed)
         self.chain = SignalChain(profile, seed)
         rate = profile.sampling.rate_hz
         effects = profile.effects
         ratio: Array = np.prod([e.noise_ratio() for e in effects], axis=0, initial=1.0)
         self._noise = RandomErrors(profile.noise, rate, seed, ratio)
-        wanders = (e.wander(rate, stream(seed, e.id)) for e in effects)
+        wanders = (e.random_bias(rate, random_stream(seed, e.id)) for e in effects)
         self._wanders = [wander for wander in wanders if wander is not None]
-        self._thermometer = stream(seed, "thermometer")
-        stamps = (e.stamps(stream(seed, e.id)) for e in effects)
+        self._thermometer = random_stream(seed, "thermometer")
+        stamps = (e.stamps(random_stream(seed, e.id)) for e in effects)
         self._stamps = [stamp for stamp in stamps if stamp is not None]
         self._lag = sum(e.lag() for e in effects)
 
@@ -245,7 +245,7 @@ class Sensing:
 
         outputs = at_once
         for one in self.profile.effects:
-            outputs = partial(one.followed, outputs)
+            outputs = partial(one.filtered_outputs, outputs)
         now = outputs(true)
         if not late:
             return now
@@ -254,10 +254,10 @@ class Sensing:
         return np.concatenate([first[:3], last[3:]])
 
     def _outputs(self, t: Array, vibration: Array) -> Array:
-        life = self.body.life(t, vibration)
-        six = _plain(self.profile.truth, life)
+        conditions = self.body.conditions(t, vibration)
+        six = _ideal_outputs(self.profile.truth, conditions)
         for one in self.profile.in_order:
-            if (more := one.adds(life)) is not None:
+            if (more := one.added_output(conditions)) is not None:
                 six = six + more
         return six
 
@@ -272,15 +272,15 @@ class Sensing:
         return picked
 
 
-def _only(block: Block, kept: NDArray[np.bool_]) -> Block:
+def _selected_samples(block: Block, kept: NDArray[np.bool_]) -> Block:
     columns = (block.acc, block.gyr, block.temperature, block.seq, block.t_host)
     return Block.of(block.t[kept], *(column[kept] for column in columns))
 
 
-def _plain(truth: Truth, life: Life) -> Array:
+def _ideal_outputs(truth: Truth, conditions: SensorConditions) -> Array:
     """Outputs (6, n) by bias and scale factor alone."""
     bias = np.array([*truth.acc_bias, *truth.gyr_bias])[:, None]
     scale = np.array([*truth.acc_scale, *truth.gyr_scale])[:, None]
-    true = np.concatenate([life.f + life.vibration, life.w])
+    true = np.concatenate([conditions.f + conditions.vibration, conditions.w])
     six: Array = bias + scale * true
     return six

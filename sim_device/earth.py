@@ -67,7 +67,7 @@ def gravity(latitude_deg: float, height_m: float) -> float:
     return hypot(g_u, g_b * sin(b) * cos(b))  # (e2)
 
 
-def carried(
+def moving_base_terms(
     latitude: float, height_m: float, north: float, east: float
 ) -> tuple[Array, Array]:
     """What a base that moves over the Earth adds, by the path of a point in space.
@@ -85,12 +85,13 @@ def carried(
 
     """
     (moved, turned), (stood, spun) = (
-        _along(latitude, height_m, *v) for v in ((north, east), (0.0, 0.0))
+        _moving_base_terms_at(latitude, height_m, *v)
+        for v in ((north, east), (0.0, 0.0))
     )
     return (turned - spun)[:, None], (moved - stood)[:, None]
 
 
-def _along(
+def _moving_base_terms_at(
     latitude: float, height: float, north: float, east: float
 ) -> tuple[Array, Array]:
     """Acceleration and rate of the local level, by differences, level axes, (3,)."""

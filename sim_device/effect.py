@@ -1,12 +1,12 @@
-"""What every effect of the virtual device is: what it takes, what it does, an example.
+"""Base class of the virtual device's effects: parameters, action and an example.
 
-To add one, write effects/<id>.py with one subclass of `SimulatedEffect`. It says what
-parameters it has and in which ranges, and defines the methods of what it acts on: where
-the device stands, the motion of its base, the setting of its joints, the outputs of the
-sensors, their noise, the clock, or the samples between the sensors and the wire. An
-effect holds its parameters only; a method that needs random numbers or a memory gets
-the numbers, and returns a function that keeps the memory. Axes are the device's, units
-m/s^2, rad/s, s, K.
+To add one, write effects/<id>.py with one subclass of `SimulatedEffect`. It states its
+parameters with their ranges, and overrides the methods for what it acts on: the
+installation of the device, the motion of its base, the setting of its joints, the
+outputs of the sensors, their noise, the clock, or the samples between the sensors and
+the wire. An effect holds its parameters only. A method that needs random numbers or a
+state receives a generator, and returns a function that keeps the state. Axes are the
+device's, units m/s^2, rad/s, s, K.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.joints import Creep
-from fieldcal.sim_device.life import Life
-from fieldcal.sim_device.motion import BaseMotion, Stand
+from fieldcal.sim_device.motion import BaseMotion, Installation
 from fieldcal.sim_device.random_process import RandomProcess
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 AXES = ("x", "y", "z")
 SIX = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -34,10 +34,10 @@ Stage = Callable[[Array, Array], None]
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Values that a number can have, and how that is said."""
+    """Accepted values of a number, with a description for messages."""
 
-    says: str
-    holds: Callable[[float], bool]
+    description: str
+    contains: Callable[[float], bool]
 
 
 ANY = Range("", lambda v: True)
@@ -47,7 +47,7 @@ NOT_NEGATIVE = Range("0 or more", lambda v: v >= 0)
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number that an effect takes; it must be given if it has no default."""
+    """A numeric parameter of an effect; without a default it must be given."""
 
     default: float | None = None
     range: Range = ANY
@@ -55,16 +55,16 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A word that an effect takes, by its pattern; `shape` is how that is said."""
+    """A text parameter of an effect; `wording` describes the pattern in messages."""
 
     pattern: str
     default: str | None = None
-    shape: str = ""
+    wording: str = ""
 
     @property
-    def says(self) -> str:
-        """What can be given, for people."""
-        return self.shape or self.pattern.replace("|", ", ")
+    def description(self) -> str:
+        """Accepted values, for messages."""
+        return self.wording or self.pattern.replace("|", ", ")
 
 
 CHANNEL = Word("|".join((*SIX, *GROUPS)))
@@ -73,18 +73,18 @@ CHANNEL = Word("|".join((*SIX, *GROUPS)))
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """An effect that a diagnosis names, and what the session needs to show it.
+    """Parameters of an effect, and a session in which a diagnosis names it.
 
     Attributes
     ----------
-    given : parameters
-    device : tables of the device file, beside those of the session
-    window_s : how long the device is held in a position, s
+    given : parameters of the effect
+    device : tables of the device file, in addition to those of the session
+    window_s : time in each position, s
     vibration : rms in every third position, m/s^2; None: none
-    turntable : whether it is turned at constant rates instead of held
-    host_clock : whether the samples come with the times at which the host got them
-    in_motion : whether only a reference that follows the motion shows it
-    unmended : why no position is predicted better once it is known; empty if one is
+    turntable : whether the device is turned at constant rates instead of held
+    host_clock : whether the samples have the times at which the host received them
+    in_motion : whether only a reference that follows the motion shows the effect
+    unmended : why no position is predicted better with the effect; empty if one is
 
     """
 
@@ -100,17 +100,17 @@ class Example:
 
 @dataclass(frozen=True)
 class SimulatedEffect:
-    """One thing that a virtual device is told to have.
+    """An effect of a virtual device.
 
     Attributes
     ----------
     numbers, words : its parameters, checked and complete
-    VECTOR : components, each zero unless given, of which one must be given
-    NUMBERS, WORDS : what it takes beside them
+    VECTOR : components; each is zero unless given, and one must be given
+    NUMBERS, WORDS : its other parameters
     REPEATS : whether a device can have it more than once
-    ORDER : place among those that act on the same; equal ones act as they are given
-    NEEDS_EARTH : whether it shows in the Earth's rate only
-    EXAMPLE : values and a session that show it; tests and benchmarks draw from it
+    ORDER : order among effects that act on the same; equal ones act as they are given
+    NEEDS_EARTH : whether it shows only with the Earth's rate
+    EXAMPLE : values and a session that show it, for tests and benchmarks
 
     """
 
@@ -147,7 +147,7 @@ class SimulatedEffect:
         return (*cls.VECTOR, *cls.NUMBERS, *cls.WORDS)
 
     def column(self, names: tuple[str, ...]) -> Array:
-        """Several numbers at once, one below the other, (k, 1)."""
+        """Several numeric parameters as a column, (k, 1)."""
         return np.array([self.numbers[name] for name in names])[:, None]
 
     def matrix(self, letter: str, v: Array) -> Array:
@@ -161,73 +161,77 @@ class SimulatedEffect:
         return np.stack(rows)
 
     def gravity(self, g: float) -> float:
-        """Gravity where the device stands, m/s^2, if it would be `g` without this."""
+        """Gravity at the device, m/s^2, where it is `g` without this effect."""
         return g
 
-    def stands(self, stand: Stand) -> Stand:
-        """How the device is held, apart from its joints."""
-        return stand
+    def change_installation(self, installation: Installation) -> Installation:
+        """Return the installation of the device with this effect."""
+        return installation
 
     def base_motion(self) -> BaseMotion | None:
-        """Motion of the base, if it makes it move."""
+        """Motion of the base that the effect causes; None: none."""
         return None
 
     def creep(self) -> Creep | None:
-        """How its joints overshoot and relax, if they do."""
+        """Overshoot and relaxation of the joints; None: none."""
         return None
 
-    def setting(self, rng: np.random.Generator) -> Callable[[Array], Array] | None:
-        """From where the joints should end up to where they do, (2,) rad."""
+    def joint_setting(
+        self, rng: np.random.Generator
+    ) -> Callable[[Array], Array] | None:
+        """Function from commanded to reached angles of the joints, (2,) rad."""
         return None
 
-    def shaking(self, rng: np.random.Generator) -> float:
-        """Vibration in the position that is taken now, rms in m/s^2."""
+    def vibration_rms(self, rng: np.random.Generator) -> float:
+        """Vibration in the next position, rms in m/s^2."""
         return 0.0
 
-    def adds(self, life: Life) -> Array | None:
-        """What comes on top of the outputs, (6, n) m/s^2 and rad/s."""
+    def added_output(self, conditions: SensorConditions) -> Array | None:
+        """Contribution to the outputs, (6, n) m/s^2 and rad/s; None: none."""
         return None
 
     def noise_ratio(self) -> Array:
-        """White noise of the outputs against what it is without, (6,)."""
+        """Ratio of the outputs' white noise with and without the effect, (6,)."""
         return np.ones(6)
 
-    def wander(self, rate: float, rng: np.random.Generator) -> RandomProcess | None:
-        """What wanders on top of the outputs, sampled at `rate` Hz."""
+    def random_bias(
+        self, rate: float, rng: np.random.Generator
+    ) -> RandomProcess | None:
+        """Random process that is added to the outputs, sampled at `rate` Hz."""
         return None
 
     def lag(self) -> float:
-        """Seconds by which it makes the gyroscopes late."""
+        """Delay of the gyroscopes, s."""
         return 0.0
 
-    def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
-        """What the sensors put out at t (n,) s, (6, n), without noise.
+    def filtered_outputs(self, outputs: Callable[[Array], Array], t: Array) -> Array:
+        """Outputs (6, n) of the sensors at t (n,) s, without noise.
 
-        `outputs` are those of sensors that follow at once, at any instants.
+        `outputs` gives the outputs of sensors without delay, at any instants.
         """
         return outputs(t)
 
-    def pace(self) -> float:
+    def clock_rate(self) -> float:
         """Seconds of the device's clock in a true second."""
         return 1.0
 
     def stamps(
         self, rng: np.random.Generator
     ) -> Callable[[Array], tuple[Array, Array]] | None:
-        """From even times (n,) s of the device's clock to stamps, and when samples are.
+        """Function from regular times (n,) s to stamps and times of the samples.
 
-        None: both are the even times.
+        All are times of the device's clock. None: both are the regular times.
         """
         return None
 
     def stage(self, full_scale: Array) -> Stage | None:
-        """What happens to samples; `full_scale` (6,) of the outputs, inf without."""
+        """Stage of the signal chain; `full_scale` (6,) of the outputs, inf without."""
         return None
 
     def arrival(
         self, rng: np.random.Generator
     ) -> Callable[[int], NDArray[np.bool_]] | None:
-        """Which of the next n samples arrive, (n,) bool; None: all of them."""
+        """Function that says which of the next n samples arrive, (n,); None: all."""
         return None
 
 
@@ -238,17 +242,17 @@ def matrix_names(letter: str, diagonal: bool = True) -> tuple[str, ...]:
 
 
 def rows(channel: str) -> list[int]:
-    """Rows of the outputs that a channel's name means."""
+    """Rows of the outputs of a channel or a group of channels."""
     return [SIX.index(name) for name in GROUPS.get(channel, (channel,))]
 
 
 def of_acc(more: Array) -> Array:
-    """Outputs (6, n) of which only the accelerometers' (3, n) are not zero."""
+    """Outputs (6, n) from those of the accelerometers (3, n); the others are zero."""
     return np.concatenate([more, np.zeros_like(more)])
 
 
 def of_gyr(more: Array) -> Array:
-    """Outputs (6, n) of which only the gyroscopes' (3, n) are not zero."""
+    """Outputs (6, n) from those of the gyroscopes (3, n); the others are zero."""
     return np.concatenate([np.zeros_like(more), more])
 
 

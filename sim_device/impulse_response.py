@@ -1,4 +1,4 @@
-"""Outputs as what lies between motion and samples passes them on.
+"""Filtering of the outputs by an impulse response between motion and samples.
 
     U(t) = int_0^inf u(t - T s) h(s) ds
 
@@ -21,19 +21,19 @@ Outputs = Callable[[Array], Array]
 """Outputs (6, n) at times (n,) s."""
 
 Past = list[tuple[float, float]]
-"""Ages in units of T, and the shares of what was then."""
+"""Pairs of an age, in units of T, and the weight of the output at that age."""
 
 
-def past(response: Callable[[Array], Array], until: float, steps: int) -> Past:
-    """The past that counts, in an even number of steps."""
+def past_instants(response: Callable[[Array], Array], until: float, steps: int) -> Past:
+    """Ages up to `until` and their weights, by Simpson's rule in even `steps`."""
     ages = np.linspace(0.0, until, steps + 1)
     shares = response(ages) * np.where(np.arange(steps + 1) % 2, 4.0, 2.0)
     shares[[0, -1]] /= 2
     return list(zip(ages.tolist(), (shares / shares.sum()).tolist(), strict=True))
 
 
-def passed_on(outputs: Outputs, t: Array, rows: slice, scale: float, by: Past) -> Array:
-    """Some rows of outputs, with `scale` for T."""
+def convolve(outputs: Outputs, t: Array, rows: slice, scale: float, by: Past) -> Array:
+    """Convolve some rows of outputs with a response; `scale` is T, s."""
     out = np.zeros((len(range(6)[rows]), len(t)))
     for age, share in by:
         out += share * outputs(t - scale * age)[rows]
@@ -59,10 +59,10 @@ class SimulatedLowPass(SimulatedEffect):
     def response(age: Array) -> Array:
         """The response to an impulse at ages in time constants, up to a factor."""
 
-    def followed(self, outputs: Outputs, t: Array) -> Array:
+    def filtered_outputs(self, outputs: Outputs, t: Array) -> Array:
         """Outputs (6, n) at t (n,) s as the sensors follow them."""
-        now, by = outputs(t), past(self.response, self.PAST, self.STEPS)
+        now, by = outputs(t), past_instants(self.response, self.PAST, self.STEPS)
         for rows, tau in ((slice(3), self["acc"]), (slice(3, 6), self["gyr"])):
             if tau:
-                now[rows] = passed_on(outputs, t, rows, tau, by)
+                now[rows] = convolve(outputs, t, rows, tau, by)
         return now

@@ -12,7 +12,7 @@ from fieldcal.sim_device.device import VirtualDevice
 BLOCK_S = 0.1
 
 
-class Where(Protocol):
+class PositionLike(Protocol):
     """A position: angles in rad, a constant rate in rad/s."""
 
     @property
@@ -56,7 +56,7 @@ class InProcess(Driver):
     def close(self) -> None:
         """Nothing to release."""
 
-    def place(self, position: Where) -> float:
+    def place(self, position: PositionLike) -> float:
         """Turn the device; returns the device time at which it is there, s.
 
         Raises

@@ -1,4 +1,4 @@
-"""How the joints that carry the device move: angles as smooth functions of time.
+"""Motion of the joints that carry the device: angles as smooth functions of time.
 
 Four joints in a row: alpha about z, beta about the turned x, gamma about the twice
 turned y, and the spin of a rate table about an axis fixed in the device. Each moves
@@ -35,15 +35,15 @@ Angles = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Swing:
-    """Where the joints are at n instants.
+class JointStates:
+    """States of the joints at n instants.
 
     Attributes
     ----------
     angle, rate, acceleration : (4, n) of the joints; rad, rad/s, rad/s^2
     axis : (3, n) unit axis of the spin, procedure axes
-    since : (n,) s since the last turn ended, negative in a turn, inf before any
-    progress : (n,) share of the last turn's duration that has passed, 0 before any
+    since_turn : (n,) s since the last turn ended, negative in a turn, inf before any
+    turn_progress : (n,) share of the last turn's duration that has passed, 0 before any
     position : (n,) how many turns have begun
 
     """
@@ -52,8 +52,8 @@ class Swing:
     rate: Array
     acceleration: Array
     axis: Array
-    since: Array
-    progress: Array
+    since_turn: Array
+    turn_progress: Array
     position: Array
 
 
@@ -196,7 +196,7 @@ class Joints:
         s = t - last.start if np.isfinite(last.start) else 0.0
         return last.coefficients[0] + last.coefficients[1] * s, last.coefficients[1]
 
-    def at(self, t: Array) -> Swing:
+    def at(self, t: Array) -> JointStates:
         """Where the joints are at ascending instants `t`, (n,) s."""
         n = len(t)
         angle, rate, acceleration = (np.empty((JOINTS, n)) for _ in range(3))
@@ -211,7 +211,7 @@ class Joints:
                 x, v, a = creep.at(t, turn, side)
                 angle, rate, acceleration = angle + x, rate + v, acceleration + a
         since, progress, position = self._last_turn(t)
-        return Swing(angle, rate, acceleration, axis, since, progress, position)
+        return JointStates(angle, rate, acceleration, axis, since, progress, position)
 
     def _pieces(self, t: Array) -> Iterator[tuple[slice, _Segment]]:
         starts = [s.start for s in self._segments]

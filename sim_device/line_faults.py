@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.can_packing import CanPacket
-from fieldcal.sim_device.random_process import stream
+from fieldcal.sim_device.random_process import random_stream
 
 KINDS = ("garbage_bytes", "flip_bits", "lose_bytes", "double_bytes")
 MOST = 100_000
@@ -23,7 +23,7 @@ class LineFaults:
     """Spoils the next bytes that are sent, once for each order; seeded."""
 
     def __init__(self, seed: int) -> None:
-        self._rng = stream(seed, "line faults")
+        self._rng = random_stream(seed, "line faults")
         self._orders: list[tuple[str, int]] = []
 
     def order(self, faults: Mapping[str, int]) -> None:

@@ -20,7 +20,7 @@ from fieldcal.core.samples import Block
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
 from fieldcal.sim_device.pty_port import forget, open_pty
-from fieldcal.sim_device.uart import heard, listens_at
+from fieldcal.sim_device.uart import received_bytes, terminal_bit_rate
 from fieldcal.sim_device.wire import Wire
 
 HEARD = 4096
@@ -88,9 +88,9 @@ class SerialLink(Link):
         """Queue samples; they are lost while no host is there."""
         if self.attached():
             data = self._faults.spoil(self._wire.encode(block))
-            listens = listens_at(self._ours) if self._baud else None
+            listens = terminal_bit_rate(self._ours) if self._baud else None
             if self._baud and listens and listens != self._baud:
-                data = heard(data, self._baud, listens)
+                data = received_bytes(data, self._baud, listens)
             self._out += data
 
     @property

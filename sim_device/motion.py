@@ -1,4 +1,4 @@
-"""What the device experiences while its base rocks and its joints turn.
+"""Specific force and angular rate of the device on a moving base with turning joints.
 
 The frames follow each other from the local level to the device, each turned about an
 axis of the one before by an angle x(t) about the unit axis u:
@@ -10,15 +10,17 @@ axis of the one before by an angle x(t) about the unit axis u:
 Attitude q, rate w and its derivative dw are handed down from frame to frame:
 
     q  <- q (x) (cos x/2, u sin x/2)                                (m1)
-    w  <- into(w) + u x'                                            (m2)
-    dw <- into(dw) - u x' cross into(w) + u x''                     (m3)
+    w  <- T w + u x'                                                (m2)
+    dw <- T dw - u x' cross T w + u x''                             (m3)
 
-and what the sensors feel in the last one is
+with T the transformation into the next frame. In the last frame, specific force and
+angular rate at the sensors are
 
-    f = into(q, a - g) + dw cross r + w cross (w cross r)           (m4)
-    rate = w + into(q, W (0, -sin phi, cos phi))                    (m5)
+    f = T_q (a - g) + dw cross r + w cross (w cross r)              (m4)
+    rate = w + T_q W (0, -sin phi, cos phi)                         (m5)
 
-with g = (0, g, 0) pointing down, a the acceleration of the base, r the lever arm from
+with T_q the transformation by the attitude q from the local level, g = (0, g, 0)
+pointing down, a the acceleration of the base, r the lever arm from
 the turning centre to the sensors, W the Earth's rate and phi the latitude. Coriolis
 terms of the Earth's rate (1e-5 m/s^2 in a turn) are left out. Source: rigid-body
 kinematics in turning frames, e.g. Goldstein, Classical Mechanics, chapter 4.
@@ -34,8 +36,8 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.sim_device.joints import ALPHA, BETA, GAMMA, SPIN, Swing
-from fieldcal.sim_device.quaternion import STILL, cross, into, multiply, turn
+from fieldcal.sim_device.joints import ALPHA, BETA, GAMMA, SPIN, JointStates
+from fieldcal.sim_device.quaternion import STILL, cross, multiply, to_frame, turn
 
 X: Array = np.array([[1.0], [0.0], [0.0]])
 Y: Array = np.array([[0.0], [1.0], [0.0]])
@@ -104,13 +106,13 @@ class MovingFrame:
             rad/s^2, in its own axes
 
         """
-        w = into(step, self.w)
-        dw = into(step, self.dw) - cross(about, w) + speeding
+        w = to_frame(step, self.w)
+        dw = to_frame(step, self.dw) - cross(about, w) + speeding
         return MovingFrame(multiply(self.q, step), w + about, dw)  # (m1) (m2) (m3)
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class Installation:
     """Where and how the device is held, apart from the joints.
 
     Attributes
@@ -146,7 +148,7 @@ class Stand:
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class SensorMotion:
     """True specific force and angular rate at n instants, device axes.
 
     Attributes
@@ -160,8 +162,8 @@ class Felt:
     w: Array
 
 
-def carried(
-    stand: Stand, moves: Sequence[BaseMotion], t: Array, swing: Swing
+def base_frame(
+    stand: Installation, moves: Sequence[BaseMotion], t: Array, swing: JointStates
 ) -> MovingFrame:
     """Frame of the procedure axes at instants `t`, (n,) s."""
     frame = MovingFrame.level(len(t))
@@ -176,15 +178,17 @@ def carried(
     return frame
 
 
-def feel(stand: Stand, frame: MovingFrame, acceleration: Array) -> Felt:
+def sensor_motion(
+    stand: Installation, frame: MovingFrame, acceleration: Array
+) -> SensorMotion:
     """What the sensors feel, with the base accelerated by (3, n) m/s^2, level axes."""
-    f = into(frame.q, acceleration + stand.pull - stand.gravity * Y)
+    f = to_frame(frame.q, acceleration + stand.pull - stand.gravity * Y)
     if np.any(stand.lever):
         arm = stand.from_device(stand.lever)
         arm = arm + np.zeros_like(f)
         f = f + cross(frame.dw, arm) + cross(frame.w, cross(frame.w, arm))  # (m4)
-    w = frame.w + into(frame.q, stand.earth + np.zeros_like(f))  # (m5)
-    return Felt(stand.to_device(f), stand.to_device(w))
+    w = frame.w + to_frame(frame.q, stand.earth + np.zeros_like(f))  # (m5)
+    return SensorMotion(stand.to_device(f), stand.to_device(w))
 
 
 def level_axis(azimuth: float) -> Array:
@@ -218,5 +222,5 @@ def mounting_axes(
     return (index[0], index[1], index[2]), (signs[0], signs[1], signs[2])
 
 
-def _joint(swing: Swing, i: int) -> Angle:
+def _joint(swing: JointStates, i: int) -> Angle:
     return Angle(swing.angle[i], swing.rate[i], swing.acceleration[i])

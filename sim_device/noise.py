@@ -23,7 +23,7 @@ from fieldcal.sim_device.random_process import (
     GaussMarkov,
     RandomProcess,
     Walk,
-    stream,
+    random_stream,
 )
 
 FLICKER_TAU = 4.0 ** np.arange(8)
@@ -37,19 +37,19 @@ class RandomErrors:
         self, figures: NoiseFigures, rate: float, seed: int, ratio: Array
     ) -> None:
         self._white = ratio * white_sigma(figures, rate)
-        self._rng = stream(seed, "white")
+        self._rng = random_stream(seed, "white")
         self._slow: list[RandomProcess] = []
         walk = _six(figures.acc_walk, figures.gyr_walk)
         if walk.any():
-            self._slow.append(Walk(walk, rate, stream(seed, "walk")))
+            self._slow.append(Walk(walk, rate, random_stream(seed, "walk")))
         wander = _six(figures.acc_instability, figures.gyr_instability)
         if wander.any():
-            rng = stream(seed, "instability")
+            rng = random_stream(seed, "instability")
             tau = figures.instability_s
             self._slow.append(GaussMarkov(wander, tau, rate, rng))
         flicker = _six(figures.acc_flicker, figures.gyr_flicker) * _flicker_scale()
         if flicker.any():
-            rngs = stream(seed, "flicker").spawn(len(FLICKER_TAU))
+            rngs = random_stream(seed, "flicker").spawn(len(FLICKER_TAU))
             self._slow += [
                 GaussMarkov(flicker, float(tau), rate, rng)
                 for tau, rng in zip(FLICKER_TAU, rngs, strict=True)

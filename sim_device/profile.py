@@ -16,7 +16,7 @@ from fieldcal.core.grade import GRADES, Grade
 from fieldcal.sim_device import earth
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.motion import mounting_axes
-from fieldcal.sim_device.vocabulary import check_together
+from fieldcal.sim_device.vocabulary import check_repeats
 
 Triad = tuple[float, float, float]
 
@@ -163,7 +163,7 @@ class Profile:
     effects: tuple[SimulatedEffect, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        check_together(self.effects)
+        check_repeats(self.effects)
         mounting_axes(self.frame.mounting, right_handed=True)
         _check_numbers(self)
         for one in self.effects:
@@ -205,9 +205,9 @@ class Profile:
         return g
 
     @property
-    def pace(self) -> float:
+    def clock_rate(self) -> float:
         """Seconds of the device's clock in a true second."""
-        return math.prod(one.pace() for one in self.effects)
+        return math.prod(one.clock_rate() for one in self.effects)
 
     def concealed(self) -> dict[str, Any]:
         """Everything that a recalibration should find out, as JSON."""

@@ -18,14 +18,14 @@ from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 FORMAT = 1
 
 _TABLES = {f.name: type(f.default) for f in fields(Profile) if f.name != "effects"}
 
 
-def read(path: Path) -> Profile:
+def read_profile(path: Path) -> Profile:
     """Read a device file.
 
     Raises
@@ -35,12 +35,12 @@ def read(path: Path) -> Profile:
 
     """
     try:
-        return from_tables(_load(path))
+        return profile_from_tables(_load(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def from_tables(tables: Mapping[str, Any]) -> Profile:
+def profile_from_tables(tables: Mapping[str, Any]) -> Profile:
     """Make the device of a parsed device file.
 
     Raises
@@ -64,7 +64,7 @@ def from_tables(tables: Mapping[str, Any]) -> Profile:
 
 
 def to_toml(profile: Profile) -> str:
-    """Text of a device file that `read` gives back the same."""
+    """Text of a device file that `read_profile` gives back the same."""
     import tomlkit
 
     tables: dict[str, Any] = {"format": FORMAT}
@@ -168,7 +168,7 @@ def _effects(table: Mapping[str, Any]) -> tuple[SimulatedEffect, ...]:
         for one in given if isinstance(given, list) else [given]:
             if not isinstance(one, Mapping):
                 raise InputError(f"effects.{id_} must be a table: [effects.{id_}]")
-            made.append(effect(id_, one))
+            made.append(checked_effect(id_, one))
     return tuple(made)
 
 

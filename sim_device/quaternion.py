@@ -55,7 +55,7 @@ def multiply(p: Array, q: Array) -> Array:
     )
 
 
-def into(q: Array, v: Array) -> Array:
+def to_frame(q: Array, v: Array) -> Array:
     """Coordinates of `v` (3, n) in the frame of attitude `q` (4, n), (q3)."""
     s, r = q[0], q[1:]
     across = cross(r, v)

@@ -20,7 +20,7 @@ BLOCK = 64
 """Ticks of the sampling clock that a Gauss-Markov process is calculated in."""
 
 
-def stream(seed: int, name: str) -> np.random.Generator:
+def random_stream(seed: int, name: str) -> np.random.Generator:
     """Random numbers for one purpose, apart from those of every other."""
     return np.random.default_rng([seed, crc32(name.encode())])
 

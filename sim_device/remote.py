@@ -12,7 +12,7 @@ from fieldcal.core.errors import DeviceError, InputError
 PATIENCE_S = 10.0
 
 
-class Remote:
+class RemoteDevice:
     """A connection to the control socket of ``fieldcal sim``; see `control`.
 
     Raises

@@ -12,7 +12,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.sim_device.device import PIECE, Sensing
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.temperature import recorded
+from fieldcal.sim_device.temperature import recorded_climate
 from fieldcal.sim_device.way import Manoeuvre
 
 SHARE = 0.6
@@ -87,7 +87,9 @@ def simulate(
     else:
         t = _ascending(times)
     if temperature is not None:
-        climate = recorded(profile.temperature, t, np.asarray(temperature, float))
+        climate = recorded_climate(
+            profile.temperature, t, np.asarray(temperature, float)
+        )
         profile = replace(profile, temperature=climate)
     sensing = Sensing(_standing_at(profile, windows[0]), seed)
     _move(sensing, windows)
@@ -156,9 +158,9 @@ def _move(sensing: Sensing, windows: list[HeldWindow]) -> None:
             seconds = max(end - start, shortest) / pace
             body.spin(start / pace, seconds, (w.alpha, w.beta, w.gamma), w.rate)
         if w.way is not None:
-            body.ways.append(replace(w.way, t=w.way.t / pace))
+            body.manoeuvres.append(replace(w.way, t=w.way.t / pace))
         if w.vibration is not None:
-            body.levels[-1] = w.vibration
+            body.vibration_rms[-1] = w.vibration
 
 
 def _ticks(t: Array, rate: float) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from time import monotonic
 from typing import Protocol
 
-from fieldcal.sim_device.delay import Delay
+from fieldcal.sim_device.delay import SampleDelay
 from fieldcal.sim_device.device import VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link import Link
@@ -38,7 +38,7 @@ BEHIND_S = 0.5
 """If the pace is missed by more, it is taken up anew instead of caught up, s."""
 
 
-class Watched(Protocol):
+class OrderSource(Protocol):
     """Something that hears orders: the control socket, the keys."""
 
     def watched(self) -> tuple[list[int], list[int]]:
@@ -72,7 +72,7 @@ class DeviceStream:
         announce: Callable[[str], None] = lambda address: None,
     ) -> None:
         self.device, self.link, self.faults = device, link, faults
-        self.stamps, self.delay = StampFaults(), Delay(device.seed)
+        self.stamps, self.delay = StampFaults(), SampleDelay(device.seed)
         # a clock that runs fast puts out more samples in a second of the wall clock
         self._pace = speed * device.sensing.pace
         self._speed, self._duration, self._announce = speed, duration, announce
@@ -105,7 +105,7 @@ class DeviceStream:
         self._heard = False  # a host that has to ask anew has not gone
         return until
 
-    def run(self, *listeners: Watched) -> None:
+    def run(self, *listeners: OrderSource) -> None:
         """Run until the end: the duration, or `stop`.
 
         Raises
@@ -189,7 +189,7 @@ class DeviceStream:
         batch = max(1, int(TICK_S * self._speed * self.device.rate))
         return min(due, chunk) if due >= batch else 0
 
-    def _sleep(self, listeners: tuple[Watched, ...]) -> None:
+    def _sleep(self, listeners: tuple[OrderSource, ...]) -> None:
         """Wait until there may be something to do."""
         reading: list[int] = []
         writing: list[int] = []

@@ -21,7 +21,7 @@ SMOOTHED_S = 5.0
 """A recorded temperature is averaged over so long: sensors do not follow its noise."""
 
 
-def course(climate: Climate, t: Array) -> tuple[Array, Array]:
+def temperature_course(climate: Climate, t: Array) -> tuple[Array, Array]:
     """Temperature (n,) °C and its rate (n,) K/s at instants `t`, (n,) s."""
     t = np.maximum(t, 0.0)
     if climate.points:
@@ -38,7 +38,7 @@ def course(climate: Climate, t: Array) -> tuple[Array, Array]:
     )
 
 
-def recorded(climate: Climate, t: Array, degrees: Array) -> Climate:
+def recorded_climate(climate: Climate, t: Array, degrees: Array) -> Climate:
     """Climate in which the device has the temperatures of a recording.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What a serial line at one bit rate says to a host that listens at another.
+"""Bytes that a host receives from a serial line at another bit rate than its own.
 
 A byte is a start bit 0, eight bits from the lowest, a stop bit 1; an idle line is 1.
 The host begins a byte at a fall of the line, at t, and samples the line in the middle
@@ -23,17 +23,17 @@ SPEEDS = {
 """Bit rates by the numbers that the system has for them."""
 
 
-def listens_at(file: int) -> int:
+def terminal_bit_rate(file: int) -> int:
     """Bit rate that a terminal is set to; 0 if it is none of the usual ones."""
     return SPEEDS.get(termios.tcgetattr(file)[5], 0)
 
 
-def heard(data: bytes, sent: int, read: int) -> bytes:
+def received_bytes(data: bytes, sent: int, read: int) -> bytes:
     """Bytes that a host reading at `read` bit/s makes of those sent at `sent`.
 
-    >>> heard(b"fieldcal", 9600, 9600)
+    >>> received_bytes(b"fieldcal", 9600, 9600)
     b'fieldcal'
-    >>> heard(b"U", 9600, 19200) == b"U"
+    >>> received_bytes(b"U", 9600, 19200) == b"U"
     False
     """
     frames = np.ones((len(data), BITS), np.uint8)

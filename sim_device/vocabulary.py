@@ -18,7 +18,7 @@ from fieldcal.sim_device import effects
 from fieldcal.sim_device.effect import Number, SimulatedEffect, Word
 
 
-def effect(id_: str, given: Mapping[str, Any]) -> SimulatedEffect:
+def checked_effect(id_: str, given: Mapping[str, Any]) -> SimulatedEffect:
     """Check the parameters of one effect and fill in the defaults.
 
     Raises
@@ -26,7 +26,7 @@ def effect(id_: str, given: Mapping[str, Any]) -> SimulatedEffect:
     InputError
         If there is no such id or parameter, one is missing, or a value is out of range.
 
-    >>> effect("cross_coupling", {"k12": 0.003})["k12"]
+    >>> checked_effect("cross_coupling", {"k12": 0.003})["k12"]
     0.003
     """
     if id_ not in effects.ids():
@@ -52,7 +52,7 @@ def parse(text: str) -> SimulatedEffect:
     Raises
     ------
     InputError
-        If the text has not that form, or `effect` refuses what it says.
+        If the text has not that form, or `checked_effect` refuses what it says.
 
     >>> parse("settling:ax=-0.03,tau_s=4")["tau_s"]
     4.0
@@ -66,10 +66,10 @@ def parse(text: str) -> SimulatedEffect:
         if name in given:
             raise InputError(f"{text!r} gives {name} twice; leave one out")
         given[name] = value
-    return effect(id_.strip(), given)
+    return checked_effect(id_.strip(), given)
 
 
-def check_together(given: tuple[SimulatedEffect, ...]) -> None:
+def check_repeats(given: tuple[SimulatedEffect, ...]) -> None:
     """Refuse an effect given twice that can only be there once.
 
     Raises
@@ -97,16 +97,18 @@ def _number(id_: str, name: str, given: Mapping[str, Any], takes: Number) -> flo
         number = math.nan
     if not math.isfinite(number):
         raise InputError(f"{id_}: {name} must be a number, not {value!r}")
-    if not takes.range.holds(number):
-        raise InputError(f"{id_}: {name} must be {takes.range.says}, not {number:g}")
+    if not takes.range.contains(number):
+        raise InputError(
+            f"{id_}: {name} must be {takes.range.description}, not {number:g}"
+        )
     return number
 
 
 def _word(id_: str, name: str, given: Mapping[str, Any], takes: Word) -> str:
     value = given.get(name, takes.default)
     if value is None:
-        raise InputError(f"{id_} needs {name}, one of {takes.says}")
+        raise InputError(f"{id_} needs {name}, one of {takes.description}")
     text = "".join(value) if isinstance(value, list | tuple) else str(value)
     if text and not re.fullmatch(takes.pattern, text):
-        raise InputError(f"{id_}: {name} must be {takes.says}, not {text!r}")
+        raise InputError(f"{id_}: {name} must be {takes.description}, not {text!r}")
     return text

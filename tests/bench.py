@@ -15,7 +15,7 @@ from fieldcal.core.positions import FIVE
 from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 TILT = (0.8, -0.5)
 """What the joints' zeros of the device are off, deg."""
@@ -29,7 +29,7 @@ def five_positions(folder: Path, about: Mapping[str, Any] | None = None) -> Path
         for p, s in zip(FIVE, starts, strict=True)
     ]
     off = dict(zip(("alpha0_deg", "beta0_deg"), TILT, strict=True))
-    effects = (effect("angle_offset", off), effect("earth_rate", {}))
+    effects = (checked_effect("angle_offset", off), checked_effect("earth_rate", {}))
     block = simulate(Profile(effects=effects), windows, seed=1)
     folder.mkdir()
     positions = [

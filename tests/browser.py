@@ -15,7 +15,7 @@ class Screen(Browser):
 
     def go(self, address: str) -> None:
         """Go to a page."""
-        self.ask("Page.navigate", url=address)
+        self.call("Page.navigate", url=address)
 
     def until(self, script: str, wanted: Any = True) -> None:
         """Wait until a line of script comes to what is wanted."""
@@ -32,4 +32,4 @@ class Screen(Browser):
         """Be a screen of some size, px."""
         self.resize(width, height, mobile=True)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.ask("Emulation.setEmulatedMedia", features=[scheme])
+        self.call("Emulation.setEmulatedMedia", features=[scheme])

@@ -14,7 +14,7 @@ from fieldcal.core.samples import Block
 from fieldcal.session.sample_files import to_batch
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 NINE = [(a, b) for b in (0.0, 5.0, -5.0) for a in (0.0, 45.0, -45.0)]
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
@@ -23,7 +23,7 @@ WIDE = [*FACES, (45.0, 0.0), (-45.0, 0.0), (0.0, 45.0), (45.0, 35.0)]
 CALM = Profile(
     noise=NoiseFigures(acc_instability=(0.0,) * 3, gyr_instability=(0.0,) * 3),
     temperature=Climate(self_heating_k=0.0),
-    effects=(effect("earth_rate", {}),),
+    effects=(checked_effect("earth_rate", {}),),
 )
 """A device without instability that does not warm itself."""
 

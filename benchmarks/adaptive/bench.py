@@ -10,7 +10,7 @@ from benchmarks.concealed import draws, others
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.effects import kind
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 FASTEST = 50.0
 """Samples a second at most: what they cost is time, and noise is drawn anyway."""
@@ -57,7 +57,9 @@ def drawn(number: int, rng: np.random.Generator) -> Bench:
     profile = replace(session.profile, sampling=device.Sampling(rate))
     if not TILTS & set(concealed):
         about_x, about_z = rng.normal(0.0, 0.5, 2)
-        tilt = effect("base_tilt", {"about_x_deg": about_x, "about_z_deg": about_z})
+        tilt = checked_effect(
+            "base_tilt", {"about_x_deg": about_x, "about_z_deg": about_z}
+        )
         profile = replace(profile, effects=(*profile.effects, tilt))
     said = float(np.exp(rng.uniform(np.log(0.002), np.log(0.02))))
     return Bench(replace(session, profile=profile), said)

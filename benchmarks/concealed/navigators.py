@@ -22,8 +22,14 @@ from benchmarks.concealed.drifting import FACES, Sensors, record
 from benchmarks.concealed.judging import Outcome
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array
-from fieldcal.navigator.mistakes import ATTITUDES, AZIMUTH, LEVEL, SCATTER, run_name
-from fieldcal.navigator.session_runs import calibrated
+from fieldcal.navigator.mistakes import (
+    ATTITUDES,
+    AZIMUTH,
+    LEVEL,
+    SCATTER,
+    run_mistake_name,
+)
+from fieldcal.navigator.session_runs import calibrate_navigator
 from fieldcal.session import description
 
 STATED_LEVEL_DEG = 0.02
@@ -60,7 +66,9 @@ class NavigatorRuns:
             folder = Path(place)
             record(folder, self.sensors, rng, tilt_deg=self.tilt_deg, **self.how)
             start = time.perf_counter()
-            found = calibrated(folder, description.read(folder / "session.toml"))
+            found = calibrate_navigator(
+                folder, description.read(folder / "session.toml")
+            )
             seconds = time.perf_counter() - start
         named = {
             name: STAND_FOR.get(name, ())
@@ -119,7 +127,7 @@ def astray(rng: np.random.Generator) -> NavigatorRuns:
     own, r = np.zeros((len(FACES), 3)), int(rng.integers(len(FACES)))
     way, size = rng.uniform(0, 2 * np.pi), float(np.exp(rng.uniform(*np.log([0.3, 2]))))
     own[r] = size * np.array([np.cos(way), 0.0, np.sin(way)])
-    truth = frozenset({run_name(r)})
+    truth = frozenset({run_mistake_name(r)})
     return NavigatorRuns(
         "navigator, one attitude",
         Sensors.drawn(rng),

@@ -13,7 +13,7 @@ from benchmarks.concealed.sessions import Session, plain
 from fieldcal.core.samples import Array, Block
 from fieldcal.sim_device import effects
 from fieldcal.sim_device.profile import FullScale
-from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.profile_file import profile_from_tables
 
 CHANCE = ("angle_setting", "random_walk")
 CHAIN = (
@@ -162,7 +162,7 @@ def example(name: str, rng: np.random.Generator) -> Session:
     """An effect without a draw of its own: its example, at some device and place."""
     shown = effects.kind(name).EXAMPLE
     session = plain(rng, ("table",) if shown.turntable else ("twelve", "wide"))
-    made = from_tables(shown.device)
+    made = profile_from_tables(shown.device)
     parts = {part: getattr(made, part) for part in shown.device}
     windows = session.windows
     if shown.vibration is not None:

@@ -21,7 +21,7 @@ from fieldcal.session.description import Description
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 LADDER = (
     *((0, 0), (22.5, 0), (45, 0), (45, 5), (22.5, 5), (0, 5), (-22.5, 2.5)),
@@ -94,7 +94,7 @@ class Session:
     def having(self, concealed: Mapping[str, Mapping[str, Any]]) -> Session:
         """The same with these effects concealed."""
         there = [e for e in self.profile.effects if e.id not in concealed]
-        there += [effect(name, given) for name, given in concealed.items()]
+        there += [checked_effect(name, given) for name, given in concealed.items()]
         profile = replace(self.profile, effects=tuple(there))
         return replace(self, profile=profile, concealed=concealed)
 
@@ -105,7 +105,7 @@ class Session:
         host = unknown
         if self.host_clock:
             late = np.random.default_rng(seed).exponential(2e-3, len(block))
-            host = 1e5 + block.t / self.profile.pace + late
+            host = 1e5 + block.t / self.profile.clock_rate + late
         warmth = block.temperature if self.thermometer else unknown
         block = replace(block, temperature=warmth, seq=unknown, t_host=host)
         if not self.gyroscopes:
@@ -206,7 +206,7 @@ def plain(
             warm_up_s=float(rng.uniform(200, 900)),
         ),
         motion=device.Handling(turn_s=float(rng.uniform(2, 5))),
-        effects=(effect("earth_rate", {}),),
+        effects=(checked_effect("earth_rate", {}),),
     )
     return Session(
         "nothing",

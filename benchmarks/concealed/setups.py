@@ -10,7 +10,7 @@ from benchmarks.concealed.draws import drawn, sized
 from benchmarks.concealed.others import calm
 from benchmarks.concealed.sessions import Session, plain
 from fieldcal.sim_device.profile import Identity
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 
 def pier(rng: np.random.Generator) -> Session:
@@ -28,7 +28,7 @@ def pier(rng: np.random.Generator) -> Session:
         }
         both.append(values)
     one = session.profile
-    swaying = tuple(effect("sway", values) for values in both)
+    swaying = tuple(checked_effect("sway", values) for values in both)
     profile = replace(one, effects=(*one.effects, *swaying))
     return replace(session, profile=profile, concealed={"sway": {}}, label="pier")
 

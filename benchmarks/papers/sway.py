@@ -28,7 +28,7 @@ from fieldcal.session.recorder import Recorder
 from fieldcal.sim_device import profile as device
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 HERTZ = (0.1, 0.2, 0.35, 0.5)
@@ -36,7 +36,7 @@ SECONDS, TURN_S, RATE = 30.0, 8.0, 50.0
 AMPLITUDE_DEG, SPREAD = 1.0, 0.1
 """Of each wave, and of its frequency where the swaying is irregular, in itself."""
 
-EARTH = effect("earth_rate", {})
+EARTH = checked_effect("earth_rate", {})
 """Felt as by a real device: whether one feels it is told by these windows just so."""
 
 DRAWN_AGAIN = 400
@@ -98,7 +98,7 @@ def played(seed: int, hz: float = 0.0, spread: float = 0.0) -> Block:
             acc=(5e-3,) * 3, gyr=(1e-3,) * 3,
             acc_instability=device.ZERO, gyr_instability=device.ZERO,
         ),
-        effects=(EARTH, *(effect("sway", w) for w in waves if hz)),
+        effects=(EARTH, *(checked_effect("sway", w) for w in waves if hz)),
     )  # fmt: skip
     return simulate(profile, held(), seed=seed)
 

@@ -94,7 +94,7 @@ def picture(effect: Effect) -> str:
     """The picture of an effect, SVG."""
     earth = kind(effect.id).NEEDS_EARTH
     profile = _plain(earth).having(parse(given(effect)))
-    if profile.pace != 1:
+    if profile.clock_rate != 1:
         return _clock(profile)
     block = simulate(profile, windows(), seed=4, noise=False)
     plain = _without(earth)

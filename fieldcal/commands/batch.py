@@ -16,7 +16,7 @@ from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.batch import SessionBatch
-    from fieldcal.fleet.workers import Pool
+    from fieldcal.fleet.workers import WorkerPool
     from fieldcal.history.sessions import StoredSession
 
 RARE = ("scheduler", "history", "limits")
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         Database(args.history or default_place()),
     )
     every = [str(folder) for folder in batch.folders]
-    left = batch.left() if args.resume else every
+    left = batch.unprocessed() if args.resume else every
     if left:
         with pool_of(args) as pool:
             carried_out(batch, left, pool)
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 @contextlib.contextmanager
-def pool_of(args: argparse.Namespace) -> Iterator[Pool]:
+def pool_of(args: argparse.Namespace) -> Iterator[WorkerPool]:
     """Processes as --jobs has them, or the workers of --scheduler.
 
     Raises
@@ -93,18 +93,18 @@ def pool_of(args: argparse.Namespace) -> Iterator[Pool]:
         If there is none.
 
     """
-    from fieldcal.fleet.workers import processes, scheduled
+    from fieldcal.fleet.workers import dask_pool, process_pool
 
     if args.jobs is not None and args.jobs < 1:
         raise InputError(f"--jobs {args.jobs}: there must be one process at least")
     if getattr(args, "scheduler", None):
-        with scheduled(args.scheduler) as pool:
+        with dask_pool(args.scheduler) as pool:
             yield pool
     else:
-        yield processes(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
+        yield process_pool(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
 
 
-def carried_out(batch: SessionBatch, left: list[str], pool: Pool) -> None:
+def carried_out(batch: SessionBatch, left: list[str], pool: WorkerPool) -> None:
     """Do what is left, with a bar that says how quick and how long still."""
     from rich import progress
 
@@ -118,7 +118,7 @@ def carried_out(batch: SessionBatch, left: list[str], pool: Pool) -> None:
         console=ShownConsole(stderr=True),
         transient=True,
     )
-    with bar, contextlib.closing(batch.carried_out(left, pool)) as done:
+    with bar, contextlib.closing(batch.process(left, pool)) as done:
         task = bar.add_task("", total=len(left), rate="")
         for one in done:
             bar.update(task, advance=1)
@@ -130,7 +130,7 @@ def carried_out(batch: SessionBatch, left: list[str], pool: Pool) -> None:
 
 
 def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
-    rows = [one for some in batch.stored() for one in some]
+    rows = [one for some in batch.stored_rows() for one in some]
     failed = [one for one in rows if one.error]
     solved = [one for one in rows if not one.error]
     bad = [one for one in solved if not one.good or one.go is False]

@@ -12,7 +12,7 @@ from fieldcal.core.grade import GRADES
 from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
-    from fieldcal.fleet.lot import Lot
+    from fieldcal.fleet.lot import LotAnalysis
 
 RARE = ("limits", "history")
 
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command: 0 in control, 1 something is odd or has shifted."""
     from fieldcal.calibration import limits
     from fieldcal.core.errors import InputError
-    from fieldcal.fleet.lot import lot
+    from fieldcal.fleet.lot import analyse_lot
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
@@ -65,12 +65,14 @@ def run(args: argparse.Namespace) -> int:
     wanted = sessions.parsed(args.query)
     database = Database(args.history or default_place())
     some = database.done(lambda db: sessions.found(db, wanted))
-    found = lot(some, limits.read(args.grade, args.limits), args.fdr)
+    found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
-        from fieldcal.report.lot_page import page
+        from fieldcal.report.lot_page import render_lot_page
         from fieldcal.session.folder import write_whole
 
-        write_whole(args.report, page(found, " ".join(args.query) or "everything"))
+        write_whole(
+            args.report, render_lot_page(found, " ".join(args.query) or "everything")
+        )
     if args.json:
         sys.stdout.write(json.dumps(found.to_json(), allow_nan=False) + "\n")
     else:
@@ -80,11 +82,11 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.in_control else 1
 
 
-def _show(found: Lot) -> None:
+def _show(found: LotAnalysis) -> None:
     from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     say = sys.stdout.write
-    share, low, high = (100 * part for part in found.share)
+    share, low, high = (100 * part for part in found.yield_share)
     say(
         f"{len(found.units)} units with a good result, of {found.sessions} sessions;"
         f" {found.failed} without a result\n"
@@ -93,8 +95,9 @@ def _show(found: Lot) -> None:
     )
     say(f"{'parameter':24}{'mean ± of it':>24}{'spread (95 %)':>32}{'Cpk':>14}\n")
     for one in found.parameters.values():
-        mean = " ± ".join(format_with_sigma(one.about.mean, one.about.mean_sigma))
-        wide = f"{one.about.spread:.2g} ({one.about.low:.2g} to {one.about.high:.2g})"
+        fit = one.distribution
+        mean = " ± ".join(format_with_sigma(fit.mean, fit.mean_sigma))
+        wide = f"{fit.spread:.2g} ({fit.low:.2g} to {fit.high:.2g})"
         unit = format_unit(one.unit)
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
         say(f"{one.name:24}{mean:>24}{f'{wide} {unit}':>32}{cpk:>14}\n")
@@ -102,16 +105,17 @@ def _show(found: Lot) -> None:
         say(line + "\n")
 
 
-def statements(found: Lot) -> list[str]:
+def statements(found: LotAnalysis) -> list[str]:
     """What is odd, what has shifted, and which chart is beyond its limits."""
     from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     out = []
     for odd in found.odd[:SHOWN]:
         unit = format_unit(found.parameters[odd.parameter].unit)
+        off = " ± ".join(format_with_sigma(odd.deviation, odd.sigma))
         out.append(
             f"odd: {one_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
-            f" {' ± '.join(format_with_sigma(odd.off, odd.sigma))} {unit}".rstrip()
+            f" {off} {unit}".rstrip()
         )
     if len(found.odd) > SHOWN:
         out.append(f"odd: and {len(found.odd) - SHOWN} more (--json)")

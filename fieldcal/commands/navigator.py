@@ -23,12 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.commands.table import show
-    from fieldcal.navigator.session_runs import calibrated
+    from fieldcal.navigator.session_runs import calibrate_navigator
     from fieldcal.session import description
     from fieldcal.session.folder import DESCRIPTION, RESULT, write_whole
 
     about = description.read(args.session / DESCRIPTION)
-    found = calibrated(args.session, about)
+    found = calibrate_navigator(args.session, about)
     text = json.dumps(found.to_json(), allow_nan=False)
     path = write_whole(args.session / RESULT, text + "\n")
     if args.json:

@@ -82,10 +82,10 @@ def run(args: argparse.Namespace) -> int:
         if path:
             sys.stdout.write(f"written: {path}\n")
     if args.report:
-        from fieldcal.report.noise_page import page
+        from fieldcal.report.noise_page import render_noise_page
         from fieldcal.session.folder import write_whole
 
-        written = write_whole(args.report, page(found))
+        written = write_whole(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
 

@@ -86,11 +86,13 @@ def write(
 
     """
     from fieldcal.report import gather, render
-    from fieldcal.report.gather import earlier_result
+    from fieldcal.report.gather import read_earlier_result
     from fieldcal.report.page import REPORT
     from fieldcal.session.folder import write_whole
 
-    before = [earlier_result(path) for path in earlier] or _before(session, history)
+    before = [read_earlier_result(path) for path in earlier] or _before(
+        session, history
+    )
     return write_whole(output or session / REPORT, render(gather(session, before)))
 
 

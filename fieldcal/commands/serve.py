@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
             "the service needs starlette and uvicorn: pip install 'fieldcal[page]'"
         ) from error
     from fieldcal.commands.run_page import address_of
-    from fieldcal.fleet.workers import processes, scheduled
+    from fieldcal.fleet.workers import dask_pool, process_pool
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
     from fieldcal.service.bounds import MIB, Bounds
@@ -81,9 +81,9 @@ def run(args: argparse.Namespace) -> int:
     host, port = address_of(args.listen, "--listen")
     with ExitStack() as open_:
         if args.scheduler:
-            pool = open_.enter_context(scheduled(args.scheduler))
+            pool = open_.enter_context(dask_pool(args.scheduler))
         else:
-            pool = processes(1, ["fieldcal.service.work"])
+            pool = process_pool(1, ["fieldcal.service.work"])
         jobs = Jobs((args.folder or _folder()).resolve(), bounds)
         database = Database(args.history or default_place())
         queue = JobQueue(jobs, database, pool)

@@ -73,12 +73,12 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
     plain, diagnosed = (
         SessionBatch(folders, SessionTask(d), database) for d in (False, True)
     )
-    known = set(diagnosed.left())
-    left = [folder for folder in plain.left() if folder in known]
+    known = set(diagnosed.unprocessed())
+    left = [folder for folder in plain.unprocessed() if folder in known]
     if left:
         with pool_of(args) as pool:
             carried_out(plain, left, pool)
-    rows = [one for some in plain.stored() for one in some]
+    rows = [one for some in plain.stored_rows() for one in some]
     for one in rows:
         if one.error:
             raise InputError(f"{one.error}; or leave {Path(one.folder).name} out")
@@ -99,9 +99,9 @@ def lines(one: SharedFinding) -> list[str]:
         f"{title}: by {one.level}, P = {one.level_probability:.2f}"
         f" (of any level {one.probability:.2f})"
     ]
-    if one.other:
-        out.append(f"  or, as well: {', '.join(one.other)}")
-    groups = one.effect.member.grouping.labels
+    if one.alternatives:
+        out.append(f"  or, as well: {', '.join(one.alternatives)}")
+    groups = one.effect.level_effect.grouping.labels
     order = np.argsort(-np.abs(one.values / one.sigmas).max(axis=1), kind="stable")
     for g in order[:GROUPS]:
         told = []

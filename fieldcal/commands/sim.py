@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fieldcal.sim_device.line_faults import LineFaults
     from fieldcal.sim_device.link import Link
     from fieldcal.sim_device.profile import Profile
-    from fieldcal.sim_device.stream import DeviceStream, Watched
+    from fieldcal.sim_device.stream import DeviceStream, OrderSource
 
 HELP = "be a virtual device on a link"
 
@@ -218,11 +218,11 @@ def _profile(args: argparse.Namespace) -> Profile:
     from fieldcal.sim_device import profile_file
     from fieldcal.sim_device.effect import SimulatedEffect
     from fieldcal.sim_device.profile import Profile
-    from fieldcal.sim_device.vocabulary import effect, parse
+    from fieldcal.sim_device.vocabulary import checked_effect, parse
 
     # a real device always feels the Earth; a device file says for itself what it has
-    default = Profile(effects=(effect("earth_rate", {}),))
-    profile = profile_file.read(args.profile) if args.profile else default
+    default = Profile(effects=(checked_effect("earth_rate", {}),))
+    profile = profile_file.read_profile(args.profile) if args.profile else default
     tables: dict[str, dict[str, Any]] = {
         "device": {"grade": args.grade},
         "sampling": {"rate_hz": args.rate},
@@ -246,7 +246,7 @@ def _profile(args: argparse.Namespace) -> Profile:
     ):
         if text := getattr(args, option):
             values = _numbers(f"--{option.replace('_', '-')}", text, 2)
-            more.append(effect(id_, dict(zip(names, values, strict=True))))
+            more.append(checked_effect(id_, dict(zip(names, values, strict=True))))
     changes: dict[str, Any] = {}
     for table, values_ in tables.items():
         given = {key: value for key, value in values_.items() if value is not None}
@@ -310,7 +310,9 @@ def _say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def _keys(stream: DeviceStream, steps: tuple[float, float]) -> Iterator[list[Watched]]:
+def _keys(
+    stream: DeviceStream, steps: tuple[float, float]
+) -> Iterator[list[OrderSource]]:
     """Listen to the keys, if there is somebody at a terminal."""
     if not sys.stdin.isatty():
         yield []

@@ -171,7 +171,7 @@ def _left(args: argparse.Namespace) -> dict[str, float]:
 
 def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
     """What the store says of units as --lot wants them, but for the session's own."""
-    from fieldcal.fleet.lot_prior import lot_prior
+    from fieldcal.fleet.lot_prior import estimate_lot_prior
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
     from fieldcal.history.place import default_place
@@ -181,7 +181,7 @@ def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
     some = database.done(lambda db: sessions.found(db, wanted, documents=True))
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
-    return lot_prior(" ".join(args.lot), some, serial, folder)
+    return estimate_lot_prior(" ".join(args.lot), some, serial, folder)
 
 
 def _decided(

@@ -49,19 +49,19 @@ class BaseStep(Separable):
 
     def applies(self, x: Experience) -> bool:
         """Where the angles of more than one position are known."""
-        return len(np.unique(x.position[_held(x)])) > 1
+        return len(np.unique(x.position[_at_rest_in_known_position(x)])) > 1
 
     def chance(self, x: Experience) -> float:
         """Of three hundred sessions one has a knock that nobody noticed."""
         return 3e-3
 
     def course(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """One from the instant on."""
+        """Step function: 0 before the instant, 1 after it."""
         return BiasStep().course(x, shape)
 
     def pattern(self, x: Experience) -> Array:
-        """What a degree about each axis does at rest."""
-        rows = np.flatnonzero(_held(x))
+        """Change of the outputs at rest for a degree about each axis, (n, 6, 2)."""
+        rows = np.flatnonzero(_at_rest_in_known_position(x))
         out = np.zeros((len(x), 6, 2))
         if not len(rows):
             return out
@@ -73,7 +73,9 @@ class BaseStep(Separable):
         return out
 
 
-def _held(x: Experience) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _at_rest_in_known_position(
+    x: Experience,
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Rows at rest in a known position."""
     held: np.ndarray[tuple[int], np.dtype[np.bool_]] = x.oriented & (x.position >= 0)
     return held

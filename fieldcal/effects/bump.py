@@ -27,7 +27,7 @@ from fieldcal.physics.recording import CheckedSamples, Fault, medians
 from fieldcal.physics.shape import Shape
 
 NEXT = 4.02
-"""Two steps of an output, in half steps: to the next one, off a course between two."""
+"""Largest deviation that rounding explains, in half steps of an output."""
 
 LONGEST_S = 5.0
 """A disturbance that lasts longer is a change of the device, not a bump."""
@@ -37,15 +37,15 @@ AROUND_S, BESIDE_S = 6.0, 1.5
 is on either side of it: a jump bends the course of two of its parts."""
 
 FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
-"""Time constants of what fades after a turn; slower ones are no disturbance anyway."""
+"""Time constants of exponential changes after a turn; slower ones are no bumps."""
 
 LOUDEST_S = 1.0
-"""Of a window that may have been pushed, as long as pushes of a hand or a gust are."""
+"""Length of a push of a hand or a gust, s."""
 
 NOTHING = slice(0, 0)
 
 SHORTEST = 3
-"""Samples; a single wild one is left out and not called a bump."""
+"""Fewest samples of a bump; a single outlier is left out without being named."""
 
 
 class Bump(Chain):
@@ -64,10 +64,12 @@ class Bump(Chain):
         rate = 1 / float(np.median(np.diff(recording.block.t)))
         held = enumerate(recording.windows)
         some = [p for p, (first, last) in held if last - first >= FEWEST]
-        return [fault for p in some for fault in _touched(recording, p, rate)]
+        return [
+            fault for p in some for fault in _disturbed_stretches(recording, p, rate)
+        ]
 
 
-def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
+def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     """Disturbed stretches of one window."""
     out = []
     around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
@@ -77,7 +79,7 @@ def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
     noise[noise == 0.0] = np.inf  # what never changes is not pushed
     z = recording.six(first, last)
     z /= noise
-    _flatten(z, rate, _loudest(z, rate, shortest))
+    _flatten(z, rate, _most_disturbed_stretch(z, rate, shortest))
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
     for c in np.flatnonzero(steps >= noise):
@@ -89,13 +91,13 @@ def _touched(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
         if b - a > LONGEST_S * rate:
             continue
         near = recording.six(first + max(a - around, 0), min(first + b + around, last))
-        if not _steady(near / noise, there, (int(a), int(b)), rate):
+        if not _has_steady_change(near / noise, there, (int(a), int(b)), rate):
             out.append(_fault(recording, first, int(a), int(b), z, rate))
     return out
 
 
-def _loudest(z: Array, rate: float, m: int) -> slice:
-    """The second, or quarter of a window, in which some 4 m samples are furthest off.
+def _most_disturbed_stretch(z: Array, rate: float, m: int) -> slice:
+    """Stretch of a second, or a quarter of a window, with the largest deviation.
 
     `z` is (n, c) in standard deviations. A push as long as that bends the course that
     is taken out with it, and is no part of what is usual. None where even the furthest
@@ -104,7 +106,7 @@ def _loudest(z: Array, rate: float, m: int) -> slice:
     width = max(min(4 * m, len(z) // 4), 1)
     mean = np.zeros(len(z) - width + 1)
     for column in z.T:
-        off = np.nan_to_num(_off_course(column, rate))
+        off = np.nan_to_num(_deviation_from_course(column, rate))
         np.maximum(mean, running_means(off, width), out=mean)
     at, long = int(np.argmax(mean)), min(round(LOUDEST_S * rate), len(z) // 4)
     first = at - (long - width) // 2
@@ -114,27 +116,33 @@ def _loudest(z: Array, rate: float, m: int) -> slice:
 
 
 def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
-    """Take its course over seconds out of a window, in place."""
+    """Subtract the slow change over seconds from a window, in place."""
     for column in piece.T:
-        column[:] = _off_course(column, rate, without)
+        column[:] = _deviation_from_course(column, rate, without)
 
 
-def _off_course(column: Array, rate: float, without: slice = NOTHING) -> Array:
-    """Samples (n,) beside the course over seconds of them all, but for some."""
+def _deviation_from_course(
+    column: Array, rate: float, without: slice = NOTHING
+) -> Array:
+    """Samples (n,) less their slow change; `without` is not used to find it."""
     width = int(np.clip(round(2 * rate), 8, max(len(column) // 4, 8)))
     known = column.copy()
     known[without] = np.nan
-    level, centre = _levels(known, max(len(column) // width, 1))
+    level, centre = _medians_by_part(known, max(len(column) // width, 1))
     some = np.isfinite(level)
-    return _beside(column, centre[some], level[some]) if some.any() else column
+    return (
+        _deviation_from_parts(column, centre[some], level[some])
+        if some.any()
+        else column
+    )
 
 
-def _levels(column: Array, parts: int) -> tuple[Array, Array]:
-    """Medians (parts,) of what is known in parts of a window, and their middles.
+def _medians_by_part(column: Array, parts: int) -> tuple[Array, Array]:
+    """Medians (parts,) of parts of a window, without nan, and centres of the parts.
 
     The parts are as long as each other, but for one sample; nan where nothing is known.
 
-    >>> _levels(np.array([1.0, 5.0, 3.0, 7.0, np.nan]), 2)
+    >>> _medians_by_part(np.array([1.0, 5.0, 3.0, 7.0, np.nan]), 2)
     (array([3., 7.]), array([1. , 3.5]))
     """
     each, more = divmod(len(column), parts)
@@ -146,16 +154,18 @@ def _levels(column: Array, parts: int) -> tuple[Array, Array]:
     return np.concatenate(found), centre
 
 
-def _steady(near: Array, there: Usual, at: tuple[int, int], rate: float) -> bool:
-    """Whether what is near does so, or its level jumps, or fades from the start.
+def _has_steady_change(
+    near: Array, there: Usual, at: tuple[int, int], rate: float
+) -> bool:
+    """Whether a jump or an exponential change explains the samples near a stretch.
 
     `near` is (n, 6) in standard deviations, what lies around a stretch `at` of the
     window, first and one past the last sample; `there` what is usual in that.
     """
     near, around = np.nan_to_num(near), round(AROUND_S * rate)
-    courses = [_jump(near, round(BESIDE_S * rate))]
+    courses = [_level_jump(near, round(BESIDE_S * rate))]
     if at[0] < around:
-        courses += [_fading(near, tau * rate) for tau in FADES_S]
+        courses += [_exponential_change(near, tau * rate) for tau in FADES_S]
     shortest, margin = max(2, round(0.1 * rate)), round(LOUDEST_S * rate / 2)
     first = min(at[0], around)
     beside = slice(max(first - margin, 0), first + at[1] - at[0] + margin)
@@ -171,8 +181,8 @@ def _steady(near: Array, there: Usual, at: tuple[int, int], rate: float) -> bool
     return False
 
 
-def _jump(z: Array, margin: int) -> Array | None:
-    """Level that jumps where means before and after part most, (n, 6).
+def _level_jump(z: Array, margin: int) -> Array | None:
+    """Step function where the means before and after differ most, (n, 6).
 
     None if that leaves fewer than `margin` samples on one side.
     """
@@ -188,15 +198,15 @@ def _jump(z: Array, margin: int) -> Array | None:
     return level
 
 
-def _fading(z: Array, tau: float) -> Array:
-    """What fades with a time constant, in samples, towards a level, (n, 6)."""
+def _exponential_change(z: Array, tau: float) -> Array:
+    """Fit of an exponential change towards a level, (n, 6); `tau` in samples."""
     design = np.column_stack([np.ones(len(z)), np.exp(-np.arange(len(z)) / tau)])
     course: Array = design @ np.linalg.lstsq(design, z, rcond=None)[0]
     return course
 
 
-def _beside(column: Array, centre: Array, level: Array) -> Array:
-    """What is left of samples (n,) beside a course from part to part.
+def _deviation_from_parts(column: Array, centre: Array, level: Array) -> Array:
+    """Samples (n,) less a polygon through the levels of the parts.
 
     Beyond the first and the last part it goes on as it was, or stays, whichever is
     nearer: what drifts goes on, and what sways turns back.

@@ -7,7 +7,7 @@ stretch. Source: V. Paxson, On Calibrating Measurements of Packet Transit Times,
 
 >>> import numpy as np
 >>> host = np.arange(0.0, 100.0, 0.01)
->>> round(skew(host * (1 + 2e-4), host)[0], 3)
+>>> round(estimate_skew(host * (1 + 2e-4), host)[0], 3)
 200.0
 """
 
@@ -21,16 +21,16 @@ from fieldcal.physics.recording import CheckedSamples, Fault
 
 STRETCHES = 60
 PPM = 5.0
-"""Crystals that agree better than this are taken to agree."""
+"""Smallest rate that is reported: crystals differ by as much."""
 
 WORST = 1e5
-"""No crystal is off by a tenth: such a recording was played at another speed."""
+"""Largest rate of a crystal, ppm: a larger one is a recording at another speed."""
 
 SURE = 6.0
 
 
-def skew(t: Array, t_host: Array) -> tuple[float, float]:
-    """Rate of the device's clock against the host's, and its deviation, ppm."""
+def estimate_skew(t: Array, t_host: Array) -> tuple[float, float]:
+    """Estimate the rate of the device's clock against the host's, and its ±, ppm."""
     late = (t_host - t_host[0]) - (t - t[0])
     parts = np.array_split(np.arange(len(t)), min(STRETCHES, max(len(t) // 20, 2)))
     first = np.array([p[np.argmin(late[p])] for p in parts])
@@ -58,12 +58,12 @@ class ClockSkew(Chain):
     source = "Paxson 1998; 10 to 2000 ppm"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
-        """Rate of the clock, where host times are there."""
+        """Estimate the rate of the clock from the host's times, if there are any."""
         block = recording.block
         known = np.isfinite(block.t_host)
         if known.sum() < 100:
             return []
-        ppm, sigma = skew(block.t[known], block.t_host[known])
+        ppm, sigma = estimate_skew(block.t[known], block.t_host[known])
         if not max(PPM, SURE * sigma) <= abs(ppm) <= WORST:
             return []
         return [

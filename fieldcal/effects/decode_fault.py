@@ -14,7 +14,7 @@ project; the usual slips in reading a register pair.
 >>> import numpy as np
 >>> course = np.arange(1000, 3000, 7)
 >>> broken = course - 256 * (course % 256 >= 128)
->>> kind, mended = undone(broken)
+>>> kind, mended = undo_decode_fault(broken)
 >>> kind, bool((mended == course).all())
 ('low_byte_signed', True)
 """
@@ -33,25 +33,25 @@ from fieldcal.windows.spikes import WILD, without_spikes
 Counts = NDArray[np.int64]
 
 JUMP = 128
-"""LSB from which a step between samples is a jump."""
+"""Smallest step between samples that counts as a jump, LSB."""
 
 CLEARLY = 5
-"""How many more jumps have to go than come."""
+"""Ratio of jumps removed to jumps added from which a fault is undone."""
 
 WIDEST = 70_000
-"""Counts beyond which values are no 16-bit ones, but decimals written out."""
+"""Largest count of a 16-bit value; larger ones are decimals."""
 
 FEWEST = 4
-"""Jumps that have to go."""
+"""Smallest number of jumps removed."""
 
 BYTE = 256
 """Values of a byte."""
 
 NEARER = 10.0
-"""How many times nearer values of one byte come to what they ought to be."""
+"""Factor by which values of one byte must come nearer to the prediction."""
 
 UNLIKELY = (5.0, 0.5)
-"""Departure that no sensor at rest has, m/s^2 and rad/s."""
+"""Smallest deviation of an outlier at rest, m/s^2 and rad/s."""
 
 BESIDE = 10
 """Samples to either side that tell whether something shakes the device."""
@@ -68,8 +68,8 @@ MOVED = (np.inf, 10.0)
 a sample by any force, but its rate does not come and go within one."""
 
 
-def undone(counts: Counts) -> tuple[str, Counts]:
-    """What happened to counts and what they were; "" where nothing did."""
+def undo_decode_fault(counts: Counts) -> tuple[str, Counts]:
+    """Return the kind of fault, "" if none, and the counts without it."""
     before = np.abs(np.diff(counts))
     best, kind, mended = float(before.sum()), "", counts
     for name, undo in _UNDO.items():
@@ -118,26 +118,28 @@ class DecodeFault(Chain):
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
         """Channels that become smooth when a slip is undone, or without wild values."""
-        wild = _wild(recording)
-        found = (_fault(recording, c) or _of_wild(recording, c, wild[:, c])
+        wild = _outlier_samples(recording)
+        found = (_fault(recording, c) or _restore_outliers(recording, c, wild[:, c])
                  for c in range(len(CHANNELS)))  # fmt: skip
         return [fault for fault in found if fault is not None]
 
 
-def _wild(recording: CheckedSamples) -> NDArray[np.bool_]:
-    """Single samples that jump by more than the device can move, (n, 6)."""
+def _outlier_samples(recording: CheckedSamples) -> NDArray[np.bool_]:
+    """Whether single samples jump by more than the device can move, (n, 6)."""
     n, edge, still = len(recording.block), AROUND + 3, recording.still
     out, moved = np.zeros((n, 6), dtype=bool), np.repeat(MOVED, 3)
     for first in range(0, n, AT_ONCE):
         some = slice(max(first - edge, 0), min(first + AT_ONCE + edge, n))
         most = np.where(still[some, None], 1.0, moved) * np.repeat(UNLIKELY, 3)
-        found = _wild_in(recording.block[some], most * np.abs(recording.scale))
+        found = _outliers_in_block(
+            recording.block[some], most * np.abs(recording.scale)
+        )
         out[first : first + AT_ONCE] = found[first - some.start :][:AT_ONCE]
     return out
 
 
-def _wild_in(block: Block, most: Array) -> NDArray[np.bool_]:
-    """The same of a part of the samples, of jumps that are at `most` likely, (n, 6)."""
+def _outliers_in_block(block: Block, most: Array) -> NDArray[np.bool_]:
+    """`_outlier_samples` of a block, for jumps of more than `most`, (n, 6)."""
     six = block.six
     apart = np.zeros_like(six)
     apart[1:-1] = np.abs(six[1:-1] - (six[:-2] + six[2:]) / 2)
@@ -152,21 +154,21 @@ def _wild_in(block: Block, most: Array) -> NDArray[np.bool_]:
             np.clip(np.add.outer(rows, s), 0, len(six) - 1) for s in (steps, -steps)
         )
         usual = np.max([np.median(apart[near, c], axis=1) for near in sides], axis=0)
-        others = np.where(_touched(wild[:, c]), np.nan, apart[:, c])
-        tails = [_tail(others[max(r - AROUND, 0) : r + AROUND]) for r in rows]
+        others = np.where(_samples_beside_outliers(wild[:, c]), np.nan, apart[:, c])
+        tails = [_tail_threshold(others[max(r - AROUND, 0) : r + AROUND]) for r in rows]
         least = np.maximum(WILD * DEVIATION * usual, tails)
         wild[rows, c] = apart[rows, c] > least
     return wild
 
 
-def _touched(wild: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Samples that are wild, or depart from one beside them that is, (n,)."""
+def _samples_beside_outliers(wild: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether samples are outliers or next to one, (n,)."""
     out: NDArray[np.bool_] = np.convolve(wild, np.ones(3), "same") > 0
     return out
 
 
-def _tail(values: Array) -> float:
-    """What one of some values exceeds by `CHANCE`, if their tail is an exponential.
+def _tail_threshold(values: Array) -> float:
+    """Value that is exceeded with probability `CHANCE` in an exponential tail.
 
     Its scale is that between the tenth and the hundredth of them that is largest.
     """
@@ -178,10 +180,10 @@ def _tail(values: Array) -> float:
     return float(hundredth + scale * np.log(len(values) / 100 / CHANCE))
 
 
-def _of_wild(
+def _restore_outliers(
     recording: CheckedSamples, c: int, wild: NDArray[np.bool_]
 ) -> Fault | None:
-    """Wild values of one channel, and what they may have been."""
+    """Fault of a channel with outliers, which are replaced; None without outliers."""
     rows = np.flatnonzero(wild)
     if not len(rows):
         return None
@@ -200,7 +202,7 @@ def _of_wild(
 
 
 def _fault(recording: CheckedSamples, c: int) -> Fault | None:
-    """What happened to one channel."""
+    """Decoding fault of one channel; None if there is none."""
     lsb = float(recording.steps[c])
     values, t = recording.channel(c), recording.block.t
     if not lsb or not np.isfinite(values).all() or not np.ptp(values):
@@ -208,13 +210,13 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
     if np.abs(values).max() > WIDEST * lsb:
         return None
     counts = np.round(values / lsb).astype(np.int64)
-    kind, mended = undone(counts)
-    fine = _within(values, lsb) if np.abs(counts).max() <= BYTE // 2 else 0.0
+    kind, mended = undo_decode_fault(counts)
+    fine = _finer_step(values, lsb) if np.abs(counts).max() <= BYTE // 2 else 0.0
     if fine:
-        # whoever swaps counts of one byte gets multiples of 256, or one less
+        # swapped counts of one byte are multiples of 256, or one less
         swapped = np.round(values / fine).astype(np.int64)
-        other, whole = undone(swapped)
-        if other and _nearer(recording, c, whole * fine):
+        other, whole = undo_decode_fault(swapped)
+        if other and _is_nearer_to_prediction(recording, c, whole * fine):
             kind, mended, counts, lsb = other, whole, swapped, fine
     if not kind:
         return None
@@ -232,16 +234,16 @@ def _fault(recording: CheckedSamples, c: int) -> Fault | None:
     )
 
 
-def _within(values: Array, step: float) -> float:
-    """Step of a grid 256 times finer, of values near a coarse one; 0 of others."""
+def _finer_step(values: Array, step: float) -> float:
+    """Step of a 256 times finer grid of the values; 0 if there is none."""
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps < 1.5 * step]
     fine = np.round(BYTE * gaps / step).sum()
     return float(gaps.sum() / fine) if fine else 0.0
 
 
-def _nearer(recording: CheckedSamples, c: int, mended: Array) -> bool:
-    """Whether outputs come much nearer to what the nominal calibration predicts.
+def _is_nearer_to_prediction(recording: CheckedSamples, c: int, mended: Array) -> bool:
+    """Whether mended outputs are much nearer to those of the nominal calibration.
 
     Where a force is not known, it is no larger than gravity.
     """

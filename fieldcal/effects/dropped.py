@@ -7,7 +7,7 @@ project.
 
 >>> import numpy as np
 >>> t = np.delete(np.arange(100) * 0.01, [20, 21, 50])
->>> missing(t).sum()
+>>> count_missing_samples(t).sum()
 np.int64(3)
 """
 
@@ -35,7 +35,7 @@ SPAN, BURSTS = 50, 2.0
 FEWEST = 2
 
 
-def missing(t: Array) -> NDArray[np.int_]:
+def count_missing_samples(t: Array) -> NDArray[np.int_]:
     """Samples missing after each sample but the last, (n - 1,)."""
     step = np.diff(t)
     usual = np.median(step)
@@ -54,7 +54,7 @@ def missing(t: Array) -> NDArray[np.int_]:
     return lost
 
 
-def _paused(recording: CheckedSamples) -> NDArray[np.bool_]:
+def _is_pause(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Whether the recording paused after each sample but the last, (n - 1,).
 
     A long time outside windows is a pause, and so is all the time between two windows.
@@ -85,14 +85,14 @@ class Dropped(Chain):
         block = recording.block
         if len(block) < 10:
             return []
-        lost = missing(block.t)
+        lost = count_missing_samples(block.t)
         if np.isfinite(block.seq).all():
             jumps = np.diff(block.seq)
             usual = np.median(jumps)
             if usual > 0:  # a counter that wraps goes back, and tells nothing there
                 counted = np.where(jumps > 0, np.round(jumps / usual) - 1, 0)
                 lost = np.maximum(lost, counted.astype(int))
-        lost = np.where(_paused(recording), 0, lost)
+        lost = np.where(_is_pause(recording), 0, lost)
         total = int(lost.sum())
         if total < FEWEST:
             return []

@@ -65,7 +65,7 @@ class JointCreep(Sensor):
         return 5e-3
 
     def design(self, x: Experience, shape: Mapping[str, float] = NO_SHAPE) -> Array:
-        """What a degree of each joint does, (1)."""
+        """Change of the outputs for a degree of each joint, (1), (n, 6, 2)."""
         turns, out = x.joint_turns, np.zeros((len(x), 6, 2))
         if not len(turns.at):
             return out

@@ -17,7 +17,7 @@ project.
 >>> import numpy as np
 >>> f = np.array([[0, -9.8, 0], [-6.9, -6.9, 0], [0, -6.9, 6.9]])
 >>> axes, _ = turned_axes(f[:, [1, 0, 2]] * [1, 1, -1], f)
->>> named(axes)
+>>> axes_label(axes)
 '+y+x-z'
 """
 
@@ -38,31 +38,31 @@ from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns, signed_axes
 from fieldcal.physics.recording import CheckedSamples, Fault
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
-"""Spread allowed: of bias in m/s^2, of scale, and of what other effects do, m/s^2."""
+"""Allowed spread of bias, m/s^2, of scale, and of other effects, m/s^2."""
 
 BETTER = 30.0
-"""Odds (ln) against the declared axes."""
+"""Log odds against the declared axes from which others are accepted."""
 
 FITS = 10.0
-"""Squares a row that axes to be believed in leave, in the spreads above."""
+"""Largest mean square of the residuals of accepted axes, in the spreads above."""
 
 UNITS = {"g": G0, "mg": 1e-3 * G0, "m/s^2 read as g": 1 / G0, "deg/s": np.pi / 180}
 NEAR = 0.05
 
 RATES = {"deg/s": np.pi / 180, "mrad/s": 1e-3, "rad/s read as deg/s": 180 / np.pi}
 ANGLES = {"rad": 180 / np.pi}
-"""What the stated angles are to be multiplied by, if they have another unit."""
+"""Factors for stated angles in another unit."""
 
 USUAL, AROUND = 1.5, 4.0
 """Angle turned over the least that it can be, and by what factor that may be off: units
 are 17 apart and more."""
 
 LEAST = np.deg2rad(10.0)
-"""Least turn of the force that tells, rad."""
+"""Smallest turn of the force that is used, rad."""
 
 
 def turned_axes(measured: Array, f: Array) -> tuple[Array, float]:
-    """Axes (3, 3) by which forces (n, 3) read as measured; odds against the identity.
+    """Most probable axes (3, 3) of measured forces, and log odds against the identity.
 
     Both in m/s^2, measured with the nominal calibration taken out.
     """
@@ -98,7 +98,7 @@ def angle_unit(x: Experience, held: Index, measured: Array) -> str:
 
 
 def _odds(measured: Array, f: Array) -> tuple[float, float]:
-    """Likelihood (ln) and squares, each axis as bias + scale x force near 0 and 1."""
+    """Log likelihood and sum of squares, with bias near 0 and scale factor near 1."""
     total, squares = 0.0, 0.0
     for m, force in zip(measured.T, f.T, strict=True):
         design = np.column_stack([np.ones(len(force)) * BIAS, force * SCALE])
@@ -109,7 +109,7 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
     return total - 0.5 * squares, squares
 
 
-def turns_seen(
+def measured_turns(
     recording: CheckedSamples, held: Sequence[int], f: Array
 ) -> list[SeenTurn]:
     """Turns between windows by number, where the force is f (n, 3).
@@ -147,7 +147,7 @@ def rate_unit(turns: Sequence[SeenTurn]) -> str:
     return ""
 
 
-def named(axes: Array) -> str:
+def axes_label(axes: Array) -> str:
     """Signed axes by the rows of a matrix (3, 3), such as +x-z+y."""
     at = np.argmax(np.abs(axes), axis=1).tolist()
     return "".join("+-"[bool(row[i] < 0)] + "xyz"[i]
@@ -159,18 +159,22 @@ def angle_between(one: Array, two: Array) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(one, two)), one @ two))
 
 
-def _of_rates(
+def _rate_fault(
     recording: CheckedSamples, undo: Array, values: dict[str, float | str]
 ) -> Fault:
-    """Gyroscopes in another unit or other axes, which a matrix (3, 3) puts right."""
+    """Fault of gyroscopes in another unit or other axes, corrected by `undo` (3, 3)."""
     six = recording.block.six
     six[:, 3:] = six[:, 3:] @ undo.T
     return replace(
-        _all_along(recording), channel="gx", values=values, size=1.0, mended=six
+        _whole_recording_fault(recording),
+        channel="gx",
+        values=values,
+        size=1.0,
+        mended=six,
     )
 
 
-def _all_along(recording: CheckedSamples) -> Fault:
+def _whole_recording_fault(recording: CheckedSamples) -> Fault:
     """A fault of all forces, from the first sample to the last."""
     return Fault(
         channel="ax",
@@ -211,11 +215,11 @@ class Mounting(Chain):
             return [self._fault(recording, {"unit": unit}, UNITS[unit], np.eye(3))]
         oriented = recording.x.oriented[held]
         if angle := angle_unit(recording.x, np.array(held)[oriented], acc[oriented]):
-            fault, size = _all_along(recording), ANGLES[angle]
+            fault, size = _whole_recording_fault(recording), ANGLES[angle]
             return [replace(fault, values={"angles": angle}, angles=size)]
         force = np.where(oriented[:, None], recording.x.f[held], acc)
-        if rate := rate_unit(turns_seen(recording, held, force)):
-            return [_of_rates(recording, RATES[rate] * np.eye(3), {"unit": rate})]
+        if rate := rate_unit(measured_turns(recording, held, force)):
+            return [_rate_fault(recording, RATES[rate] * np.eye(3), {"unit": rate})]
         return self._axes(recording, held, acc)
 
     def _axes(
@@ -231,15 +235,15 @@ class Mounting(Chain):
         if oriented.sum() >= 2:
             found, odds = turned_axes(acc[oriented], recording.x.f[held][oriented])
             axes = found if odds >= BETTER else axes
-        seen = turns_seen(recording, held, acc @ axes)
+        seen = measured_turns(recording, held, acc @ axes)
         turned = axes_by_turns([t._replace(angles=t.angles @ axes) for t in seen])
         values: dict[str, float | str] = {}
         if turned is not None:
-            values["gyr_axes"] = named(turned.T)
+            values["gyr_axes"] = axes_label(turned.T)
         if (axes == np.eye(3)).all():
-            return [] if turned is None else [_of_rates(recording, turned, values)]
+            return [] if turned is None else [_rate_fault(recording, turned, values)]
         # the mounting that session.toml should have had
-        values["axes"] = named(recording.x.mounting @ axes.T)
+        values["axes"] = axes_label(recording.x.mounting @ axes.T)
         return [self._fault(recording, values, 1.0, axes.T, turned)]
 
     @staticmethod
@@ -262,4 +266,4 @@ class Mounting(Chain):
         acc = six[:, :3] @ undo.T * unit
         gyr = six[:, 3:] @ undo.T @ (np.eye(3) if rates is None else rates.T)
         mended = np.hstack([acc, gyr])
-        return replace(_all_along(recording), values=values, mended=mended)
+        return replace(_whole_recording_fault(recording), values=values, mended=mended)

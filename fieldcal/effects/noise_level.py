@@ -8,7 +8,7 @@ shifts nothing.
 Source: model of this project; a triad's axes agree within tens of percent.
 
 >>> import numpy as np
->>> louder(np.array([1.0, 1.1, 3.0]))
+>>> noisiest_axis(np.array([1.0, 1.1, 3.0]))
 (2, 2.857142857142857)
 """
 
@@ -33,7 +33,7 @@ STEADY, HALF = 0.8, (1 + RATIO) / 2
 at least: single windows show it less well."""
 
 
-def louder(noise: Array) -> tuple[int, float]:
+def noisiest_axis(noise: Array) -> tuple[int, float]:
     """The noisiest of three axes and its ratio to the mean of the others."""
     worst = int(np.argmax(noise))
     others = np.delete(noise, worst).mean()
@@ -67,8 +67,10 @@ class NoiseLevel(Chain):
             noise = np.maximum(recording.quick[triad], recording.steps[triad])
             if not noise.all():
                 continue
-            worst, ratio = louder(noise)
-            if ratio < RATIO or not _everywhere(recording, triad, worst):
+            worst, ratio = noisiest_axis(noise)
+            if ratio < RATIO or not _is_noisiest_in_most_windows(
+                recording, triad, worst
+            ):
                 continue
             name = CHANNELS[first + worst]
             sigma = ratio * float(np.sqrt(2.0 / samples))
@@ -86,13 +88,15 @@ class NoiseLevel(Chain):
         return out
 
 
-def _everywhere(recording: CheckedSamples, triad: slice, worst: int) -> bool:
+def _is_noisiest_in_most_windows(
+    recording: CheckedSamples, triad: slice, worst: int
+) -> bool:
     """Whether an axis of a triad is the noisier one in most windows."""
     found = []
     for first, last in recording.windows:
         noise = short_lag_noise(recording.six(first, last)[:, triad])
         noise = np.maximum(noise, recording.steps[triad])
         if last - first > FEWEST and np.isfinite(noise).all():
-            axis, ratio = louder(noise)
+            axis, ratio = noisiest_axis(noise)
             found.append(axis == worst and ratio > HALF)
     return not found or float(np.mean(found)) >= STEADY

@@ -21,7 +21,7 @@ from fieldcal.physics.effect import NO_SHAPE, Param, Sensor
 from fieldcal.physics.experience import Experience
 
 
-def products(v: Array) -> Array:
+def axis_products(v: Array) -> Array:
     """Products xy, yz, xz of vectors, (n, 3)."""
     x, y, z = v.T
     return np.column_stack([x * y, y * z, x * z])  # (2.1)
@@ -45,5 +45,5 @@ class PendulousProducts(Sensor):
         """The three products on each output."""
         out = np.zeros((len(x), 6, 9))
         for i in range(3):
-            out[:, i, 3 * i : 3 * i + 3] = products(x.f)
+            out[:, i, 3 * i : 3 * i + 3] = axis_products(x.f)
         return out

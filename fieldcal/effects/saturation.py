@@ -8,7 +8,7 @@ one that the channel runs into and comes out of. Source: model of this project.
 
 >>> import numpy as np
 >>> signal = np.clip(np.sin(np.arange(200) / 7.0), -0.9, 0.9)
->>> [(float(signal[rows[0]]), len(rows)) for rows in rails(signal, np.nan)]
+>>> [(float(signal[rows[0]]), len(rows)) for rows in samples_at_rails(signal, np.nan)]
 [(-0.9, 28), (0.9, 35)]
 """
 
@@ -21,22 +21,22 @@ from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault, Rows
 
 FEWEST = 5
-"""Samples at the rail from which it counts."""
+"""Smallest number of samples at a rail."""
 
 BESIDE = 4.0
-"""How much more often the rail is taken than the value next to it."""
+"""Ratio of samples at the rail to samples at the value next to it."""
 
 UNDER_WAY = 5
-"""Samples beside a run at a rail by which the channel is under way there."""
+"""Number of samples next to a run that must move towards the rail."""
 
 PACE = 3.0
-"""Steps of that way, from the last value to the rail, at most."""
+"""Largest last step to the rail, in mean steps before it."""
 
 CHANCE = 3.0
-"""Standard deviations of a difference of two counts that chance does not make."""
+"""Difference of two counts that is significant, in standard deviations."""
 
 
-def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
+def samples_at_rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     """Samples at each rail of a channel; none where there is no rail.
 
     `limit` is the declared full scale, nan where unknown; `coarse` says that any value
@@ -50,8 +50,8 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
         if len(at) < FEWEST:
             continue
         declared = abs(abs(edge) - limit) < 1e-3 * limit
-        beside = _beside(values, edge)
-        apart = bool((np.diff(at) > 1).any()) or _run_into(values, at)
+        beside = _neighbour_count(values, edge)
+        apart = bool((np.diff(at) > 1).any()) or _moves_into_rail(values, at)
         often = apart and 0 < BESIDE * beside + FEWEST < len(at)
         # as far down as up is full scale only if more is there than beside it: gravity
         # on both faces of a box is as much up as down, and its noise thins outwards
@@ -62,8 +62,8 @@ def rails(values: Array, limit: float, coarse: bool = False) -> list[Rows]:
     return out
 
 
-def _run_into(values: Array, at: Rows) -> bool:
-    """Whether a channel is under way to the one run of samples at a rail, and from it.
+def _moves_into_rail(values: Array, at: Rows) -> bool:
+    """Whether a channel moves steadily into the single run at a rail, and out of it.
 
     One that stands still where it happened to be goes on with a jump.
     """
@@ -77,8 +77,8 @@ def _run_into(values: Array, at: Rows) -> bool:
     return True
 
 
-def _beside(values: Array, edge: float) -> int:
-    """How often the value next to an edge is taken; 0 where there is no other."""
+def _neighbour_count(values: Array, edge: float) -> int:
+    """Number of samples at the value next to an edge; 0 if there is no other value."""
     inner = values[np.isfinite(values) & (values != edge)]
     if not len(inner):
         return 0
@@ -96,7 +96,7 @@ class Saturation(Chain):
     source = "model of this project"
 
     def find(self, recording: CheckedSamples) -> list[Fault]:
-        """Channels with samples at a rail, which the axes of a triad share."""
+        """Find channels with samples at a rail; the axes of a triad share the limit."""
         out = []
         for first in (0, 3):
             limit, found = float(recording.limits[first // 3]), {}
@@ -107,7 +107,7 @@ class Saturation(Chain):
                     values = recording.channel(c)
                     if c not in found and np.isfinite(values).any():
                         coarse = bool(recording.steps[c] > noise)
-                        if at := rails(values, limit, coarse):
+                        if at := samples_at_rails(values, limit, coarse):
                             found[c] = np.sort(np.concatenate(at))
                 if not found:
                     break

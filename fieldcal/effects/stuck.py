@@ -10,7 +10,7 @@ if it goes on while the device is turned. Source: model of this project.
 >>> import numpy as np
 >>> values = np.sin(np.arange(500.0))
 >>> values[100:140] = values[100]
->>> repeats(values).tolist()
+>>> equal_value_runs(values).tolist()
 [[100, 140]]
 """
 
@@ -27,22 +27,22 @@ from fieldcal.windows.dead_axis import dead_sensors
 
 ODDS = 1e-6
 MANY = 20
-"""Runs from which their usual length is known."""
+"""Smallest number of runs for which their usual length is known."""
 
 SHARE = 0.2
-"""Part of a window next to a run from which the window's own repeats are known."""
+"""Smallest part of a window outside a run for which its repeats are known."""
 
 TURNED = 30.0
-"""Standard deviations that other axes go through while the device is turned."""
+"""Change of the other axes during a turn, in standard deviations."""
 
 JUMP = 2.5
-"""Steps by which a channel that stood still jumps when it goes on."""
+"""Smallest jump, in steps, at the ends of a run."""
 
 FEWEST = 8
-"""Equal samples from which a run counts."""
+"""Smallest number of equal samples of a run."""
 
 
-def repeats(values: Array) -> NDArray[np.intp]:
+def equal_value_runs(values: Array) -> NDArray[np.intp]:
     """First and one past the last sample of each run of one value, (m, 2)."""
     equal = np.diff(values) == 0
     found = runs(equal)
@@ -80,8 +80,8 @@ class Stuck(Chain):
         t, out = recording.block.t, []
         step = float(np.median(np.diff(t)))
         for c, name in enumerate(CHANNELS):
-            for first, last in repeats(recording.channel(c)).tolist():
-                if _no_wonder(recording, c, first, last):
+            for first, last in equal_value_runs(recording.channel(c)).tolist():
+                if _is_explained_by_steps(recording, c, first, last):
                     continue
                 begins, ends = float(t[first]), float(t[last - 1] + step)
                 out.append(
@@ -98,8 +98,10 @@ class Stuck(Chain):
         return out
 
 
-def _no_wonder(recording: CheckedSamples, c: int, first: int, last: int) -> bool:
-    """Whether a run of equal values comes of steps that are coarse."""
+def _is_explained_by_steps(
+    recording: CheckedSamples, c: int, first: int, last: int
+) -> bool:
+    """Whether coarse steps of the output explain a run of equal values."""
     if last - first == len(recording.block):
         dead = dead_sensors(recording.block.six)
         return not any(c in one.axes for one in dead if not one.absent)
@@ -108,7 +110,7 @@ def _no_wonder(recording: CheckedSamples, c: int, first: int, last: int) -> bool
     # a turn begins slowly: its first samples may read as those of the rest before
     if step_of > 2 and _turned(recording, c, first, last) < FEWEST:
         return True
-    return step_of > 1 and _usual(recording, c, step, first, last)
+    return step_of > 1 and _is_usual_for_noise(recording, c, step, first, last)
 
 
 def _turned(recording: CheckedSamples, c: int, first: int, last: int) -> int:
@@ -120,10 +122,10 @@ def _turned(recording: CheckedSamples, c: int, first: int, last: int) -> int:
     return int((away.any(axis=0) & ~recording.still[first:last]).sum())
 
 
-def _usual(
+def _is_usual_for_noise(
     recording: CheckedSamples, c: int, step: float, first: int, last: int
 ) -> bool:
-    """Whether a run is no wonder where steps are as coarse as the noise.
+    """Whether a run is usual for steps as large as the noise.
 
     In a window whose mean is amid a step it is none; nor is it between windows as long
     as the other axes show that the device is not turned, or the channel goes on from

@@ -1,4 +1,4 @@
-"""Trees of sessions into the store and into Parquet."""
+"""Processing of many sessions: into the store, and from there into a Parquet file."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import pyarrow.parquet as pq
 
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.tree import fingerprint
-from fieldcal.fleet.workers import Pool, results
+from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import LEVELS, StoredSession
 
 CHUNK = 500
-"""Sessions of one row group."""
+"""Number of sessions in a row group of the Parquet file."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionBatch:
-    """What is to be done.
+    """Sessions to be processed with one task.
 
     Attributes
     ----------
-    folders : of the sessions
-    task : with each
-    database : the store
+    folders : session folders
+    task : what to do with each session
+    database : store that receives the results
 
     """
 
@@ -36,8 +36,8 @@ class SessionBatch:
     task: SessionTask
     database: Database
 
-    def left(self) -> list[str]:
-        """Sessions whose row in the store is not of these files and this task."""
+    def unprocessed(self) -> list[str]:
+        """Sessions whose row in the store is missing or of other files or options."""
         known = self.database.done(sessions.fingerprints)
         options = self.task.options
         return [
@@ -46,17 +46,17 @@ class SessionBatch:
             if known.get(str(folder)) != fingerprint(folder, options)
         ]
 
-    def carried_out(
-        self, folders: Sequence[str], pool: Pool
+    def process(
+        self, folders: Sequence[str], pool: WorkerPool
     ) -> Generator[StoredSession, None, None]:
-        """Sessions as they are done, each in the store before it is given."""
-        for made in results(folders, self.task, pool):
+        """Process folders; each result is in the store before it is yielded."""
+        for made in run_tasks(folders, self.task, pool):
             one = made.value or StoredSession(made.item, error=made.error)
             self.database.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
             yield one
 
-    def stored(self) -> Iterator[list[StoredSession]]:
-        """Rows of the store, some at a time."""
+    def stored_rows(self) -> Iterator[list[StoredSession]]:
+        """Yield the stored results of all folders, `CHUNK` at a time."""
         names = [str(folder) for folder in self.folders]
         for first in range(0, len(names), CHUNK):
             some = names[first : first + CHUNK]
@@ -67,20 +67,20 @@ class SessionBatch:
             )
 
     def write(self, path: Path) -> None:
-        """Write the results as Parquet, one row a session, whole or not at all."""
+        """Write the results as Parquet, one row per session, complete or not at all."""
         names: dict[str, None] = {}
-        for rows in self.stored():
+        for rows in self.stored_rows():
             names |= {n: None for one in rows for n in sorted(one.parameters)}
-        table = schema(list(names))
+        table = parquet_schema(list(names))
         part = path.with_name(f".{path.name}.part")
         with pq.ParquetWriter(part, table) as out:
-            for rows in self.stored():
-                out.write_table(pa.Table.from_pylist([*map(_row, rows)], table))
+            for rows in self.stored_rows():
+                out.write_table(pa.Table.from_pylist([*map(_parquet_row, rows)], table))
         part.replace(path)
 
 
-def schema(names: Sequence[str]) -> pa.Schema:
-    """Columns of the table; each parameter has one for its value and its ±."""
+def parquet_schema(names: Sequence[str]) -> pa.Schema:
+    """Return the columns; each parameter has one for its value and one for its ±."""
     text, number, truth = pa.string(), pa.float64(), pa.bool_()
     return pa.schema(
         [
@@ -93,7 +93,7 @@ def schema(names: Sequence[str]) -> pa.Schema:
     )
 
 
-def _row(one: StoredSession) -> dict[str, object]:
+def _parquet_row(one: StoredSession) -> dict[str, object]:
     found = one.diagnosis or {}
     effects = [(e["id"], e["probability"]) for e in found.get("effects", ())]
     return {

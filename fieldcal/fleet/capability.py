@@ -6,8 +6,9 @@ With tolerance +-T about the nominal value, m and t the mean and spread of the u
     Cp = T / (3 t),   Cpk = (T - |m - nominal|) / (3 t)                             (1)
     var Cp = Cp^2 var t / t^2,   var Cpk = var m / (9 t^2) + Cpk^2 var t / t^2      (2)
 
-Without errors of the units, (2) is 1 / (9 n) + Cpk^2 / (2 (n - 1)), that of Bissell,
-Applied Statistics 39 (1990) 331; with them, the spread is known less well.
+If the values of the units have no errors, var Cpk of (2) is 1 / (9 n) + Cpk^2 / (2 (n -
+1)), the result of Bissell, Applied Statistics 39 (1990) 331. Errors of the values make
+the spread less certain.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.samples import Array, Index
 from fieldcal.fleet.control import ControlChart, cusum, ewma
-from fieldcal.fleet.spread import UnitSpread, spread
+from fieldcal.fleet.spread import UnitDistribution, estimate_distribution
 
 FALSE_ALARM = 0.05
 """Chance of a false alarm of any control chart over the whole lot."""
 
 CHARTS = 2
-"""Of each parameter."""
+"""Number of control charts per parameter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,22 +37,22 @@ class LotParameter:
 
     Attributes
     ----------
-    name, unit : of the parameter
-    units : (n,) number of each unit that has it
-    x, sigma : (n,) value and uncertainty
-    about : their spread
-    cp, cp_sigma, cpk, cpk_sigma : (1), (2); None where there is no tolerance
-    tolerance : from nominal
-    charts : in the order of time
+    name, unit : name and unit of the parameter
+    unit_numbers : (n,) number of each unit that has the parameter
+    x, sigma : (n,) value and standard uncertainty, in the order of time
+    distribution : mean and spread over the units
+    cp, cp_sigma, cpk, cpk_sigma : (1), (2); None without a tolerance
+    tolerance : T, largest accepted deviation from the nominal value
+    charts : control charts
 
     """
 
     name: str
     unit: str
-    units: Index
+    unit_numbers: Index
     x: Array
     sigma: Array
-    about: UnitSpread
+    distribution: UnitDistribution
     tolerance: float | None
     cp: float | None
     cp_sigma: float | None
@@ -60,14 +61,14 @@ class LotParameter:
     charts: tuple[ControlChart, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as an object; null where not known."""
+        """Return a JSON object; null where a value is not known."""
         return {
             "unit": self.unit,
             "units": len(self.x),
-            "mean": self.about.mean,
-            "mean_sigma": self.about.mean_sigma,
-            "spread": self.about.spread,
-            "spread_95": [self.about.low, self.about.high],
+            "mean": self.distribution.mean,
+            "mean_sigma": self.distribution.mean_sigma,
+            "spread": self.distribution.spread,
+            "spread_95": [self.distribution.low, self.distribution.high],
             "median_sigma": float(np.median(self.sigma)),
             "tolerance": self.tolerance,
             "cp": self.cp,
@@ -77,7 +78,7 @@ class LotParameter:
         }
 
 
-def capability(
+def lot_parameter(
     name: str,
     unit: str,
     units: Index,
@@ -86,18 +87,18 @@ def capability(
     limits: GradeLimits,
     together: int,
 ) -> LotParameter:
-    """A parameter of a lot.
+    """Calculate spread, process capability and control charts of one parameter.
 
     Parameters
     ----------
-    name, unit : of the parameter
+    name, unit : name and unit of the parameter
     units : (n,) number of each unit
-    x, sigma : (n,) value and uncertainty, in the order of time
-    limits : for the tolerance
-    together : parameters of the lot, which share the chance of a false alarm
+    x, sigma : (n,) value and standard uncertainty, in the order of time
+    limits : limits of the grade, which contain the tolerance
+    together : number of parameters of the lot; they share `FALSE_ALARM`
 
     """
-    about = spread(x, sigma)
+    about = estimate_distribution(x, sigma)
     parsed = ParameterName.of(name)
     tolerance = limits.tolerance(parsed.group)
     cp = cp_sigma = cpk = cpk_sigma = None

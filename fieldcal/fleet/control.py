@@ -10,7 +10,8 @@ chain of Brook and Evans (Biometrika 59, 1972), for (2) by Siegmund's formula,
 
     N = (exp(2 k b) - 2 k b - 1) / (4 k^2),   b = h + 1.166                         (3)
 
-for both sides together. z are cut at `CUT`, so that one odd unit is no shift.
+for both sides together. z is clipped at `CUT`, so that a single odd unit does not count
+as a shift.
 """
 
 from __future__ import annotations
@@ -26,28 +27,29 @@ from scipy.special import ndtr
 from fieldcal.core.samples import Array
 
 WEIGHT = 0.1
-"""r: a chart that looks back over some twenty units finds half a spread soonest."""
+"""r: with a memory of about twenty units, a shift of half a spread is found soonest."""
 
 SLACK = 0.25
-"""k: half of the shift that is to be found soonest, which is half a spread."""
+"""k: half of the shift that is to be found soonest; that shift is half a spread."""
 
 CUT = 3.0
+"""Standard deviations at which z is clipped."""
 
 STATES = 101
-"""Of the Markov chain."""
+"""Number of states of the Markov chain."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControlChart:
-    """A chart with its limits.
+    """A control chart with its limits.
 
     Attributes
     ----------
     name : "EWMA" or "CUSUM"
     values : (n,) e_i, or the larger of both sides' c_i with the sign of its side
-    limit : (n,) bound on their size
-    alarm : number of the first unit beyond it; None where there is none
-    onset : number of the unit that the shift began with, of a CUSUM; None unknown
+    limit : (n,) bound on the absolute value
+    alarm : number of the first unit beyond the limit; None if there is none
+    onset : number of the unit at which the shift began, CUSUM only; None if unknown
 
     """
 
@@ -59,7 +61,10 @@ class ControlChart:
 
 
 def ewma(z: Array, units: float) -> ControlChart:
-    """Chart (1) of standardised values (n,); `units` to a false alarm on average."""
+    """EWMA chart (1) of standardised values (n,).
+
+    `units` is the average number of units to a false alarm.
+    """
     z = np.clip(z, -CUT, CUT)
     values, at = np.zeros(len(z)), 0.0
     for i, one in enumerate(z):
@@ -68,11 +73,11 @@ def ewma(z: Array, units: float) -> ControlChart:
     number = np.arange(1, len(z) + 1)
     wide = WEIGHT / (2 - WEIGHT) * (1 - (1 - WEIGHT) ** (2 * number))
     limit = ewma_limit(units, WEIGHT) * np.sqrt(wide)
-    return ControlChart("EWMA", values, limit, _first(np.abs(values) > limit))
+    return ControlChart("EWMA", values, limit, _first_index(np.abs(values) > limit))
 
 
 def cusum(z: Array, units: float) -> ControlChart:
-    """Chart (2), likewise."""
+    """CUSUM chart (2) of standardised values (n,); `units` as for `ewma`."""
     z = np.clip(z, -CUT, CUT)
     up, down, began_up, began_down = 0.0, 0.0, 0, 0
     values, begins = np.zeros(len(z)), np.zeros(len(z), dtype=int)
@@ -83,17 +88,17 @@ def cusum(z: Array, units: float) -> ControlChart:
         values[i] = up if up >= down else -down
         begins[i] = began_up if up >= down else began_down
     limit = np.full(len(z), cusum_limit(units))
-    alarm = _first(np.abs(values) > limit)
+    alarm = _first_index(np.abs(values) > limit)
     onset = None if alarm is None else int(begins[alarm])
     return ControlChart("CUSUM", values, limit, alarm, onset)
 
 
-def _first(beyond: NDArray[np.bool_]) -> int | None:
+def _first_index(beyond: NDArray[np.bool_]) -> int | None:
     return int(np.argmax(beyond)) if beyond.any() else None
 
 
 def cusum_limit(units: float, slack: float = SLACK) -> float:
-    """Return h of (3).
+    """Limit h of (3) for an average of `units` units to a false alarm.
 
     >>> round(cusum_limit(465, 0.5), 1)
     5.0
@@ -108,20 +113,20 @@ def cusum_limit(units: float, slack: float = SLACK) -> float:
 
 @cache
 def ewma_limit(units: float, weight: float) -> float:
-    """L of (1).
+    """Limit L of (1) for an average of `units` units to a false alarm.
 
     >>> round(ewma_limit(500.0, 0.2), 2), round(ewma_limit(500.0, 0.1), 2)
     (2.96, 2.82)
     """
 
     def over(bound: float) -> float:
-        return float(np.log(_length(bound, weight) / units))
+        return float(np.log(_average_run_length(bound, weight) / units))
 
     return float(brentq(over, 0.5, 7.0, xtol=1e-4))
 
 
-def _length(bound: float, weight: float) -> float:
-    """Average number of units until a chart in control passes its limit."""
+def _average_run_length(bound: float, weight: float) -> float:
+    """Average number of units until a chart without a shift passes its limit."""
     high = bound * np.sqrt(weight / (2 - weight))
     step = 2 * high / STATES
     at = -high + step * (np.arange(STATES) + 0.5)

@@ -1,16 +1,17 @@
-"""The evidence that sessions share something, and at which level.
+"""The evidence that sessions share an effect, and at which level.
 
-An effect of some level has one value in each group of it: each device, lot, station,
-or session. With M_s and q_s of the sessions (`reduced`), and Z_a the incidence of
-sessions in the groups of level a,
+A level divides the sessions into groups: by device, lot, station or session. An effect
+at a level has one value in each group of the level. With M_s and q_s of the sessions
+(`reduced`), and Z_a the incidence of sessions in the groups of level a,
 
     G_ab = sum_s Z_a[s] Z_b[s]^T (x) M_s[a, b],    b_a = sum_s Z_a[s] (x) q_s[a]  (1)
     ln Z = b^T S (I + S G S)^-1 S b / 2 - ln |I + S G S| / 2                       (2)
 
-with S the sizes v of each effect at each level, which are summed over as in one
-session (`model.evidence.sets`). Evidence adds over sessions: what is two sigma in each
-of fifty is fourteen in all. Source: as `model.evidence.gram`; levels are random
-effects, crossed or nested (Searle, Casella and McCulloch, Variance Components, 1992).
+with S the sizes v of each effect at each level; (2) is summed over v as for a single
+session (`model.evidence.sets`). Evidence adds over sessions: a value of two sigma in
+each of fifty sessions has fourteen sigma in all. Source: as `model.evidence.gram`;
+levels are random effects, crossed or nested (Searle, Casella and McCulloch, Variance
+Components, 1992).
 """
 
 from __future__ import annotations
@@ -26,22 +27,23 @@ from fieldcal.model import priors
 from fieldcal.model.evidence.gram import gains
 
 DENSITY = np.log(priors.density())
+"""Logarithm of the prior density of each size."""
 
 EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
 """Index of v = 1."""
 
 ROUNDS = 4
-"""Times that each size is sought beside the others."""
+"""Largest number of passes in which each size is maximised with the others fixed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouping:
-    """One way in which sessions belong together.
+    """Division of the sessions into groups.
 
     Attributes
     ----------
-    names : of the levels that group them so; several where no session tells them apart
-    labels : of the groups
+    names : levels that group the sessions in this way; several if they group alike
+    labels : names of the groups
     index : (s,) number of each session's group
 
     """
@@ -52,7 +54,7 @@ class Grouping:
 
     @classmethod
     def of(cls, name: str, values: Sequence[str]) -> Grouping:
-        """By the value that each session has."""
+        """Group sessions by the value (s,) that each has at a level."""
         labels, index = np.unique(np.array(values), return_inverse=True)
         return cls((name,), tuple(labels.tolist()), index.ravel())
 
@@ -60,10 +62,10 @@ class Grouping:
 def groupings(
     sessions: Sequence[Mapping[str, str]], levels: Iterable[str]
 ) -> list[Grouping]:
-    """Levels that all sessions know, those that group them alike as one.
+    """Return the groupings by all levels that every session states.
 
-    The one with the fewest groups is first; where none has a single group, one of all
-    sessions is added.
+    Levels that group the sessions alike make one grouping. The grouping with the fewest
+    groups is first. If none has a single group, one of all sessions is added.
     """
     found: dict[tuple[int, ...], Grouping] = {}
     for name in levels:
@@ -76,7 +78,7 @@ def groupings(
         if key in found:
             before = found[key]
             names = (*before.names, *made.names)
-            pairs = zip(before.labels, _matched(before, made), strict=True)
+            pairs = zip(before.labels, _matched_labels(before, made), strict=True)
             labels = tuple(f"{a}, {name} {b}" for a, b in pairs)
             made = Grouping(names, labels, before.index)
         found[key] = made
@@ -85,20 +87,20 @@ def groupings(
     return sorted(found.values(), key=lambda one: len(one.labels))
 
 
-def _matched(one: Grouping, other: Grouping) -> list[str]:
-    """Labels of another grouping that is alike, in the order of one."""
+def _matched_labels(one: Grouping, other: Grouping) -> list[str]:
+    """Labels of `other` in the order of `one`; both group the sessions alike."""
     sessions = [int(np.flatnonzero(one.index == g)[0]) for g in range(len(one.labels))]
     return [other.labels[other.index[s]] for s in sessions]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Member:
+class LevelEffect:
     """An effect at a level.
 
     Attributes
     ----------
-    columns : (k,) of the sessions' matrices
-    grouping : the level
+    columns : (k,) numbers of the effect's columns in the sessions' matrices
+    grouping : groups of the level
 
     """
 
@@ -107,40 +109,40 @@ class Member:
 
     @property
     def width(self) -> int:
-        """Columns in all groups together."""
+        """Number of columns in all groups together."""
         return len(self.columns) * len(self.grouping.labels)
 
 
 @dataclass(frozen=True, slots=True)
-class WeighedMembers:
-    """Members with their sizes at the likeliest.
+class EffectSetPosterior:
+    """Posterior of a set of effects at the most probable sizes.
 
     Attributes
     ----------
-    members : of the set
+    effects : effects of the set
     sizes : v of each
-    score : ln of the evidence, summed over sizes
-    mean, covariance : of all values, member by member, group by group, in typical sizes
+    score : log evidence, summed over sizes
+    mean, covariance : of all values, effect by effect, group by group, in typical sizes
 
     """
 
-    members: tuple[Member, ...]
+    effects: tuple[LevelEffect, ...]
     sizes: tuple[float, ...]
     score: float
     mean: Array
     covariance: Array
 
-    def of(self, i: int) -> tuple[Array, Array]:
-        """Values and standard uncertainties of one member, (groups, k) each."""
-        ends = np.cumsum([0, *(m.width for m in self.members)])
+    def effect_values(self, i: int) -> tuple[Array, Array]:
+        """Values and standard uncertainties of effect i, (groups, k) each."""
+        ends = np.cumsum([0, *(m.width for m in self.effects)])
         at = slice(ends[i], ends[i + 1])
-        shape = (len(self.members[i].grouping.labels), -1)
+        shape = (len(self.effects[i].grouping.labels), -1)
         sigma = np.sqrt(np.diag(self.covariance)[at])
         return self.mean[at].reshape(shape), sigma.reshape(shape)
 
 
-class Sessions:
-    """What sessions say of columns that they have in common.
+class PooledSessions:
+    """Information of several sessions about columns that they have in common.
 
     Parameters
     ----------
@@ -151,9 +153,9 @@ class Sessions:
     def __init__(self, matrix: Array, pull: Array) -> None:
         self.matrix, self.pull = matrix, pull
 
-    def weighed(self, members: Sequence[Member]) -> WeighedMembers:
-        """A set with its sizes sought one beside the others."""
-        inner, pull, places = self._together(members)
+    def posterior(self, members: Sequence[LevelEffect]) -> EffectSetPosterior:
+        """Posterior of a set of effects; each size is maximised in turn."""
+        inner, pull, places = self._combined_blocks(members)
         sizes = [EVEN] * len(members)
         profiles: list[Array] = []
         for _ in range(ROUNDS if len(members) > 1 else 1):
@@ -165,25 +167,27 @@ class Sessions:
             if sizes == before and len(members) > 1:
                 break
         wide = [float(priors.SIZES[i]) for i in sizes]
-        score, mean, covariance = _solved(inner, pull, self._spread(wide, places))
+        score, mean, covariance = _posterior_at_sizes(
+            inner, pull, self._sizes_by_column(wide, places)
+        )
         score += sum(float(DENSITY[i]) for i in sizes)
         score += sum(float(np.logaddexp.reduce(p - p.max())) for p in profiles)
-        return WeighedMembers(tuple(members), tuple(wide), score, mean, covariance)
+        return EffectSetPosterior(tuple(members), tuple(wide), score, mean, covariance)
 
-    def offered(self, base: WeighedMembers, member: Member) -> float:
-        """What a further member adds to a set's score with its sizes as they are."""
-        if not base.members:
+    def evidence_gain(self, base: EffectSetPosterior, member: LevelEffect) -> float:
+        """Log evidence that a further effect adds to a set whose sizes are fixed."""
+        if not base.effects:
             blocks = self._blocks(member)
-            gain = gains(*blocks, _own(blocks[0])).sum(axis=0)
+            gain = gains(*blocks, _largest_diagonal(blocks[0])).sum(axis=0)
             return float(np.logaddexp.reduce(gain + DENSITY))
-        every = [*base.members, member]
-        inner, pull, places = self._together(every)
-        known = np.repeat(base.sizes, [m.width for m in base.members])
-        gain = _gain(inner, pull, places[-1], known)
+        every = [*base.effects, member]
+        inner, pull, places = self._combined_blocks(every)
+        known = np.repeat(base.sizes, [m.width for m in base.effects])
+        gain = _evidence_gain(inner, pull, places[-1], known)
         return float(np.logaddexp.reduce(gain + DENSITY))
 
-    def _blocks(self, member: Member) -> tuple[Array, Array]:
-        """G and b of a member by itself, (groups, k, k) and (groups, k)."""
+    def _blocks(self, member: LevelEffect) -> tuple[Array, Array]:
+        """G and b of a single effect, (groups, k, k) and (groups, k)."""
         k, count = len(member.columns), len(member.grouping.labels)
         inner, pull = np.zeros((count, k, k)), np.zeros((count, k))
         at = member.columns
@@ -191,8 +195,10 @@ class Sessions:
         np.add.at(pull, member.grouping.index, self.pull[:, at])
         return inner, pull
 
-    def _together(self, members: Sequence[Member]) -> tuple[Array, Array, list[slice]]:
-        """G, b of (1), and where each member stands in them."""
+    def _combined_blocks(
+        self, members: Sequence[LevelEffect]
+    ) -> tuple[Array, Array, list[slice]]:
+        """G and b of (1), and the rows of each effect in them."""
         ends = np.cumsum([0, *(m.width for m in members)]).tolist()
         places = [slice(a, b) for a, b in pairwise(ends)]
         inner, pull = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
@@ -210,7 +216,7 @@ class Sessions:
         return inner, pull, places
 
     @staticmethod
-    def _spread(wide: Sequence[float], places: Sequence[slice]) -> Array:
+    def _sizes_by_column(wide: Sequence[float], places: Sequence[slice]) -> Array:
         parts = [
             np.full(p.stop - p.start, w) for w, p in zip(wide, places, strict=True)
         ]
@@ -224,20 +230,25 @@ class Sessions:
         sizes: list[int],
         i: int,
     ) -> Array:
-        """F over the sizes of one member, its size being set to the likeliest."""
+        """Log evidence over the sizes of effect i; sizes[i] is set to the best one."""
         others = np.ones(len(pull), dtype=bool)
         others[places[i]] = False
         order = np.concatenate([np.flatnonzero(others), np.flatnonzero(~others)])
-        wide = self._spread([float(priors.SIZES[s]) for s in sizes], places)[others]
+        wide = self._sizes_by_column([float(priors.SIZES[s]) for s in sizes], places)[
+            others
+        ]
         last = slice(int(others.sum()), len(pull))
-        gain = _gain(inner[np.ix_(order, order)], pull[order], last, wide)
+        gain = _evidence_gain(inner[np.ix_(order, order)], pull[order], last, wide)
         profile: Array = gain + DENSITY
         sizes[i] = int(np.argmax(profile))
         return profile
 
 
-def _gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array:
-    """Gain over all sizes of the last columns, those before having sizes (a,)."""
+def _evidence_gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array:
+    """Gain in log evidence for each size of the last columns.
+
+    The columns before them have fixed sizes `wide` (a,).
+    """
     first = slice(0, last.start)
     scaled = inner[first, first] * wide * wide[:, None] + np.eye(last.start)
     right = np.column_stack([inner[first, last], pull[first]]) * wide[:, None]
@@ -245,18 +256,20 @@ def _gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array:
     left = inner[last, first] * wide
     own = inner[last, last]
     less = own - left @ solved[:, :-1]
-    gain: Array = gains(less, pull[last] - left @ solved[:, -1], _own(own))
+    gain: Array = gains(less, pull[last] - left @ solved[:, -1], _largest_diagonal(own))
     return gain
 
 
-def _own(inner: Array) -> Array:
+def _largest_diagonal(inner: Array) -> Array:
     """Largest diagonal element of matrices (..., k, k)."""
     largest: Array = np.diagonal(inner, 0, -2, -1).max(axis=-1, initial=0.0)
     return largest
 
 
-def _solved(inner: Array, pull: Array, wide: Array) -> tuple[float, Array, Array]:
-    """Evidence (2), mean and covariance at sizes (a,)."""
+def _posterior_at_sizes(
+    inner: Array, pull: Array, wide: Array
+) -> tuple[float, Array, Array]:
+    """Log evidence (2), mean (a,) and covariance (a, a) at sizes `wide` (a,)."""
     scaled = inner * wide * wide[:, None] + np.eye(len(wide))
     root = np.linalg.cholesky(scaled)
     half = np.linalg.solve(root, np.diag(wide))

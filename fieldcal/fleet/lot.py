@@ -1,7 +1,7 @@
-"""A lot of units: how they differ, how many are good, which are odd, what has shifted.
+"""Analysis of a lot: yield, spread of the units, odd units, shifts and control charts.
 
-Of each unit the last good session counts. The yield k of n has the interval of
-Jeffreys,
+Each unit is represented by its last good session. A yield of k good units of n has the
+interval of Jeffreys,
 
     Beta(k + 1/2, n - k + 1/2)                                                      (1)
 
@@ -19,31 +19,31 @@ from scipy.stats import beta
 
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import InputError
-from fieldcal.fleet.capability import LotParameter, capability
+from fieldcal.fleet.capability import LotParameter, lot_parameter
 from fieldcal.fleet.levels import Grouping, groupings
-from fieldcal.fleet.odd import discovered, unit_chances
-from fieldcal.fleet.shifts import Shift, shifts
+from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
+from fieldcal.fleet.shifts import Shift, find_shifts
 from fieldcal.history.sessions import LEVELS, StoredSession, values
 
 FEWEST = 5
-"""Units from which a parameter has a spread."""
+"""Smallest number of units for which a spread is estimated."""
 
 
 @dataclass(frozen=True, slots=True)
 class OddUnit:
-    """A unit out of family: by which parameter, and how far."""
+    """A unit that is odd: the parameter and its deviation from the mean of the lot."""
 
     serial: str
     folder: str
     parameter: str
-    off: float
+    deviation: float
     sigma: float
-    chance: float
+    probability: float
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """A control chart that left its limits, at which unit, and since which."""
+    """A control chart beyond its limits: at which unit, and since which."""
 
     parameter: str
     chart: str
@@ -52,20 +52,20 @@ class Alarm:
 
 
 @dataclass(frozen=True, slots=True)
-class Lot:
-    """What is said of a lot.
+class LotAnalysis:
+    """Result of the analysis of a lot.
 
     Attributes
     ----------
-    sessions, failed : how many, and how many of them have no result
-    units : the session that counts of each, in the order of time
-    good, judged : units that are, by GO where that was judged; and all that count
-    share : good of judged, with the ends of its 95 % interval (1)
-    parameters : by name
-    odd : units at the false-discovery rate
-    rate : that rate
-    shifts : by level
-    alarms : of control charts
+    sessions, failed : number of sessions, and of those without a result
+    units : session that represents each unit, in the order of time
+    good, judged : number of good units (GO, if that was judged), and of all units
+    yield_share : good / judged, with the ends of its 95 % interval (1)
+    parameters : parameters by name
+    odd : odd units at the false-discovery rate
+    false_discovery_rate : accepted rate of false discoveries among odd units
+    shifts : levels that shift a parameter
+    alarms : alarms of control charts
 
     """
 
@@ -74,21 +74,21 @@ class Lot:
     units: tuple[StoredSession, ...]
     good: int
     judged: int
-    share: tuple[float, float, float]
+    yield_share: tuple[float, float, float]
     parameters: Mapping[str, LotParameter]
     odd: tuple[OddUnit, ...]
-    rate: float
+    false_discovery_rate: float
     shifts: tuple[Shift, ...]
     alarms: tuple[Alarm, ...]
 
     @property
     def in_control(self) -> bool:
-        """Whether nothing is odd, shifted or beyond its limits."""
+        """Whether there is no odd unit, no shift and no alarm."""
         return not (self.odd or self.shifts or self.alarms)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as an object."""
-        share, low, high = self.share
+        share, low, high = self.yield_share
         return {
             "sessions": self.sessions,
             "without_result": self.failed,
@@ -100,15 +100,15 @@ class Lot:
                 "share_95": [low, high],
             },
             "parameters": {n: p.to_json() for n, p in self.parameters.items()},
-            "false_discovery_rate": self.rate,
+            "false_discovery_rate": self.false_discovery_rate,
             "odd": [
                 {
                     "serial": o.serial,
                     "session": o.folder,
                     "parameter": o.parameter,
-                    "off": o.off,
+                    "off": o.deviation,
                     "sigma": o.sigma,
-                    "chance": o.chance,
+                    "chance": o.probability,
                 }
                 for o in self.odd
             ],
@@ -134,16 +134,16 @@ class Lot:
         }  # fmt: skip
 
 
-def lot(
+def analyse_lot(
     sessions: Sequence[StoredSession], limits: GradeLimits, rate: float = 0.05
-) -> Lot:
-    """What sessions of a lot say together.
+) -> LotAnalysis:
+    """Analyse the sessions of a lot: yield, spread, odd units, shifts and charts.
 
     Parameters
     ----------
-    sessions : from the store
-    limits : of the grade, for the tolerances
-    rate : of false discoveries among odd units
+    sessions : sessions from the store
+    limits : limits of the grade, which contain the tolerances
+    rate : false-discovery rate of odd units
 
     Raises
     ------
@@ -151,7 +151,7 @@ def lot(
         If fewer than `FEWEST` units have a result.
 
     """
-    units = last_of_units(sessions)
+    units = latest_session_per_unit(sessions)
     useful = [one for one in units if one.good]
     if len(useful) < FEWEST:
         raise InputError(
@@ -166,7 +166,7 @@ def lot(
         if known.sum() >= FEWEST:
             found[name] = (np.flatnonzero(known), x[known], sigma[known])
     parameters = {
-        name: capability(
+        name: lot_parameter(
             name, useful[told[0][0]].parameters[name][2], *told, limits, len(found)
         )
         for name, told in found.items()
@@ -177,36 +177,36 @@ def lot(
         if 1 < len(g.labels) < len(useful)
     ]
     judged = [one.go if one.go is not None else bool(one.good) for one in units]
-    return Lot(
+    return LotAnalysis(
         len(sessions),
         sum(one.error is not None for one in sessions),
         tuple(useful),
         sum(judged),
         len(judged),
-        share(sum(judged), len(judged)),
+        yield_interval(sum(judged), len(judged)),
         parameters,
-        tuple(_odd(useful, parameters, rate)),
+        tuple(_find_odd_units(useful, parameters, rate)),
         rate,
-        tuple(s for p in parameters.values() for s in _shifts(p, levels)),
-        tuple(a for p in parameters.values() for a in _alarms(p, useful)),
+        tuple(s for p in parameters.values() for s in _find_shifts(p, levels)),
+        tuple(a for p in parameters.values() for a in _find_alarms(p, useful)),
     )
 
 
-def last_of_units(sessions: Sequence[StoredSession]) -> list[StoredSession]:
-    """The last session of each unit that has a good result, else its last one."""
+def latest_session_per_unit(sessions: Sequence[StoredSession]) -> list[StoredSession]:
+    """Return each unit's last session with a good result, or else its last session."""
     units: dict[str, StoredSession] = {}
-    for one in sorted(sessions, key=_when):
+    for one in sorted(sessions, key=_time_order):
         key = one.serial or one.folder
         before = units.pop(key, None)
         kept = before is not None and before.good and not one.good
         units[key] = before if before is not None and kept else one
-    return sorted(units.values(), key=_when)
+    return sorted(units.values(), key=_time_order)
 
 
-def share(good: int, count: int) -> tuple[float, float, float]:
-    """Share with its 95 % interval, (1).
+def yield_interval(good: int, count: int) -> tuple[float, float, float]:
+    """Share of good units, and the lower and upper end of its 95 % interval, (1).
 
-    >>> [round(x, 3) for x in share(9, 10)]
+    >>> [round(x, 3) for x in yield_interval(9, 10)]
     [0.9, 0.619, 0.989]
     """
     a, b = good + 0.5, count - good + 0.5
@@ -215,22 +215,25 @@ def share(good: int, count: int) -> tuple[float, float, float]:
     return good / count, low, high
 
 
-def _when(one: StoredSession) -> tuple[str, str]:
+def _time_order(one: StoredSession) -> tuple[str, str]:
     return (one.taken_at or "", one.folder)
 
 
-def _odd(
+def _find_odd_units(
     useful: Sequence[StoredSession], parameters: Mapping[str, LotParameter], rate: float
 ) -> list[OddUnit]:
     names = list(parameters)
     chances = np.full((len(useful), len(names)), np.nan)
     off, sigma = chances.copy(), chances.copy()
     for k, one in enumerate(parameters.values()):
-        chances[one.units, k] = one.about.chances(one.x)
-        off[one.units, k], sigma[one.units, k] = one.x - one.about.mean, one.about.sigma
-    together = unit_chances(chances)
+        chances[one.unit_numbers, k] = one.distribution.tail_probabilities(one.x)
+        off[one.unit_numbers, k], sigma[one.unit_numbers, k] = (
+            one.x - one.distribution.mean,
+            one.distribution.sigma,
+        )
+    together = unit_p_values(chances)
     out = []
-    for i in np.flatnonzero(discovered(together, rate)).tolist():
+    for i in np.flatnonzero(benjamini_hochberg(together, rate)).tolist():
         k = int(np.nanargmin(chances[i]))
         unit = useful[i]
         out.append(
@@ -239,22 +242,22 @@ def _odd(
                 float(sigma[i, k]), float(together[i]),
             )
         )  # fmt: skip
-    return sorted(out, key=lambda one: one.chance)
+    return sorted(out, key=lambda one: one.probability)
 
 
-def _shifts(one: LotParameter, levels: Sequence[Grouping]) -> list[Shift]:
+def _find_shifts(one: LotParameter, levels: Sequence[Grouping]) -> list[Shift]:
     some = []
     for level in levels:
-        labels = [level.labels[i] for i in level.index[one.units]]
+        labels = [level.labels[i] for i in level.index[one.unit_numbers]]
         made = Grouping.of(" or ".join(level.names), labels)
         if len(made.labels) > 1:
             some.append(made)
-    return shifts(one.name, one.x, one.sigma, one.about, some)
+    return find_shifts(one.name, one.x, one.sigma, one.distribution, some)
 
 
-def _alarms(one: LotParameter, useful: Sequence[StoredSession]) -> list[Alarm]:
+def _find_alarms(one: LotParameter, useful: Sequence[StoredSession]) -> list[Alarm]:
     def named(number: int) -> str:
-        unit = useful[int(one.units[number])]
+        unit = useful[int(one.unit_numbers[number])]
         return unit.serial or unit.folder
 
     return [

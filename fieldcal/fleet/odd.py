@@ -1,10 +1,12 @@
 """Units out of family at a stated false-discovery rate.
 
-A unit's chance is that of its oddest parameter, times the number of its parameters; of
-all units, those are odd up to the last one, in order, whose chance is below its share
-of the rate (Benjamini and Hochberg, J. R. Stat. Soc. B 57, 1995, 289):
+A unit's p-value is the smallest of its parameters, times the number of its parameters.
+With the p-values of n units in ascending order, the units up to the last i with
 
     p_(i) <= q i / n                                                                (1)
+
+are odd at the false-discovery rate q (Benjamini and Hochberg, J. R. Stat. Soc. B 57,
+1995, 289).
 """
 
 from __future__ import annotations
@@ -15,10 +17,10 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 
 
-def unit_chances(chances: Array) -> Array:
-    """Chance of each unit, (n,), from those of its parameters, (n, k); nan where none.
+def unit_p_values(chances: Array) -> Array:
+    """p-value of each unit, (n,), from those of its parameters, (n, k), nan if absent.
 
-    >>> unit_chances(np.array([[0.5, 0.001], [0.02, np.nan]]))
+    >>> unit_p_values(np.array([[0.5, 0.001], [0.02, np.nan]]))
     array([0.002, 0.02 ])
     """
     count = np.isfinite(chances).sum(axis=1)
@@ -27,10 +29,10 @@ def unit_chances(chances: Array) -> Array:
     return out
 
 
-def discovered(chances: Array, rate: float) -> NDArray[np.bool_]:
-    """Which units are odd, (1).
+def benjamini_hochberg(chances: Array, rate: float) -> NDArray[np.bool_]:
+    """Whether each unit is odd at a false-discovery rate, (n,), (1).
 
-    >>> discovered(np.array([0.001, 0.9, 0.02, 0.04, 0.2]), 0.05)
+    >>> benjamini_hochberg(np.array([0.001, 0.9, 0.02, 0.04, 0.2]), 0.05)
     array([ True, False,  True, False, False])
     """
     order = np.argsort(chances)

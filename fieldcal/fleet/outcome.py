@@ -1,4 +1,4 @@
-"""One session from its folder to what the store keeps; nothing is written here."""
+"""One session, from its folder to its row in the store; nothing is written here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.solution import PreparedSession, solve_prepared
-from fieldcal.fleet.reduced import reduced
+from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, of_calibration
 from fieldcal.session.folder import Session
@@ -22,12 +22,12 @@ from fieldcal.session.folder import Session
 
 @dataclass(frozen=True, slots=True)
 class SessionTask:
-    """What is to be done with each session.
+    """Solve a session and, if asked, diagnose it; called with the folder.
 
     Attributes
     ----------
-    diagnose : whether effects are named as well
-    limits : file of limits, by which every session is judged
+    diagnose : whether a diagnosis is made as well
+    limits : file of limits by which every session is judged; None: its grade's
 
     """
 
@@ -36,16 +36,16 @@ class SessionTask:
 
     @property
     def options(self) -> str:
-        """What counts for whether a session has to be done again."""
+        """Text that differs if a session has to be processed again."""
         bounds = Path(self.limits).read_text("utf-8") if self.limits else ""
         return f"diagnose={self.diagnose}\n{bounds}"
 
     def __call__(self, folder: str) -> StoredSession:
-        """Carry it out; what is wrong with the session is in its row."""
+        """Process a session; an error is stated in the row that is returned."""
         mark = None
         try:
             mark = fingerprint(Path(folder), self.options)
-            return replace(self._carried_out(Path(folder)), fingerprint=mark)
+            return replace(self._process(Path(folder)), fingerprint=mark)
         except FieldcalError as error:
             said = str(error)
             said = said if folder in said else f"{folder}: {said}"
@@ -56,7 +56,7 @@ class SessionTask:
             )
         return StoredSession(folder, fingerprint=mark, error=said)
 
-    def _carried_out(self, folder: Path) -> StoredSession:
+    def _process(self, folder: Path) -> StoredSession:
         session, repaired = with_repaired_bytes(Session.open(folder))
         still = usable_windows(session)
         prepared = PreparedSession(session, still)
@@ -77,19 +77,21 @@ class SessionTask:
             serial=str(session.about.device.get("serial", "")),
             levels=levels_of(session),
             diagnosis=diagnosis,
-            reduced=None if explanation is None else reduced(explanation).to_bytes(),
+            reduced=None
+            if explanation is None
+            else reduce_session(explanation).to_bytes(),
         )
 
 
 def _taken_at(session: Session, found: Calibration) -> str | None:
-    """When, if the session says so."""
+    """Time of the session, if its marks state one."""
     marks = list(session.marks())
     known = any(isinstance(m.get("host_s"), int | float) for m in marks)
     return start_time(marks) if known else None
 
 
 def levels_of(session: Session) -> dict[str, str]:
-    """What session.toml says that a session has in common with others."""
+    """Return the levels that session.toml states: model, lot, station, operator."""
     raw: Mapping[str, Any] = session.about.raw
     device, site = raw.get("device", {}), raw.get("site", {})
     said = {

@@ -1,17 +1,17 @@
-"""What a session says of effects that it may share with others.
+"""Reduction of a session to what it states about effects that sessions may share.
 
-Everything of its own (bias, scale factors, orientations, instability, what walks) is
-eliminated with the sizes that it has there, and what is left is added up:
+All that belongs to the session alone (bias, scale factors, orientations, instability,
+random walks) is eliminated with its sizes in that session. What remains is
 
     M = T (G_kk - G_ka C G_ak) T,  q = T (b_k - G_ka C b_a),  C = (G_aa + S^-2)^-1  (1)
 
-with T typical sizes. M and q of several sessions that share an effect are added; for
-the notation see `model.evidence.gram`. An effect with a time constant has columns at
-powers of two of a second, so that they are the same in every session; one with an
-instant is a session's own.
+with T typical sizes. M and q of sessions that share an effect are added; for the
+notation see `model.evidence.gram`. An effect with a time constant has columns at powers
+of two of a second, so that all sessions have the same columns. An effect with an
+instant belongs to one session.
 
-A function that no physics makes, by which a session explains itself alone, keeps its
-columns: beside others it may turn out to be an effect that they share.
+A smooth function that no effect makes keeps its columns if it explains the session:
+several sessions together may show that it is an effect that they share.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
 
 CLOSE = 0.1
-"""How far the grid of a session may be off a power of two, ln."""
+"""Largest distance of a session's time constant from a power of two, ln."""
 
 
 @dataclass(frozen=True, slots=True)
 class SharedColumn:
-    """A parameter of an effect.
+    """A parameter of an effect that sessions may share.
 
     Attributes
     ----------
-    effect, part : id, and triad where it has one
-    shape : value of the time constant, empty where there is none
-    name, unit, typical : of the parameter
-    chance : that a session has the effect
-    variants : numbers of the parts of the effect that it is in, of which each may be
-        there alone: some of its axes, or all
-    own : whether it is of a function without physics, which no other session shares
+    effect, part : id of the effect, and triad if it has one
+    shape : value of the time constant, empty if there is none
+    name, unit, typical : name, unit and typical size of the parameter
+    chance : prior probability that a session has the effect
+    variants : numbers of the variants of the effect that contain the parameter; a
+        variant is the effect on some of its axes, or on all
+    own : whether it belongs to a smooth function that no effect makes; no other session
+        shares it
 
     """
 
@@ -61,11 +62,11 @@ class SharedColumn:
 
 @dataclass(frozen=True, slots=True)
 class ReducedSession:
-    """One session.
+    """A session, reduced to the effects that it may share.
 
     Attributes
     ----------
-    columns : (k,)
+    columns : (k,) parameters
     matrix, pull : M (k, k) and q (k,) of (1), in typical sizes
 
     """
@@ -75,7 +76,7 @@ class ReducedSession:
     pull: Array
 
     def to_bytes(self) -> bytes:
-        """As the store keeps it: a compressed file of numpy's."""
+        """Return the bytes that the store keeps: a compressed file of numpy."""
         out = io.BytesIO()
         names = json.dumps([asdict(c) for c in self.columns]).encode()
         upper = self.matrix[np.triu_indices(len(self.columns))]
@@ -86,7 +87,7 @@ class ReducedSession:
 
     @classmethod
     def from_bytes(cls, data: bytes) -> ReducedSession:
-        """The same from what the store keeps."""
+        """Read the bytes that `to_bytes` returns."""
         with np.load(io.BytesIO(data), allow_pickle=False) as kept:
             told = json.loads(kept["columns"].tobytes())
             columns = tuple(
@@ -99,8 +100,8 @@ class ReducedSession:
             return cls(columns, matrix, kept["pull"])
 
 
-def reduced(explanation: Explanation) -> ReducedSession:
-    """Reduce a session that was explained, (1)."""
+def reduce_session(explanation: Explanation) -> ReducedSession:
+    """Reduce a session by its explanation, (1)."""
     search, best = explanation.posterior.search, explanation.inferred.best
     wide, _ = search.opened(best)
     own = np.ones(len(wide), dtype=bool)
@@ -115,27 +116,27 @@ def reduced(explanation: Explanation) -> ReducedSession:
         found
         for cause in search.dictionary.causes
         if _shareable(cause)
-        for found in _groups(cause)
+        for found in _groups_on_common_grid(cause)
     ]
     groups += [(c, "", g) for c, g in best.members if c.kind == "unknown"]
     none = np.empty(0, dtype=np.intp)
     columns = np.concatenate([none, *(g.columns for _, _, g in groups)])
     typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
     matrix, pull = less.rest(columns, typical)
-    named = [c for cause, shape, g in groups for c in _named(cause, shape, g)]
+    named = [c for cause, shape, g in groups for c in _shared_columns(cause, shape, g)]
     return ReducedSession(tuple(named), 0.5 * (matrix + matrix.T), pull)
 
 
 def _shareable(cause: Cause) -> bool:
-    """Whether other sessions may have a cause alike: it is physics, and has no date."""
+    """Whether other sessions may have the same cause: an effect without an instant."""
     effect = cause.variants[0].effect
     if cause.kind != "effect" or effect is None:
         return False
     return all(s.kind in ("session", "turn") for s in effect.shapes)
 
 
-def _groups(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
-    """A cause with all its parameters, at the time constants that all have."""
+def _groups_on_common_grid(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
+    """Groups of a cause with all its parameters, at time constants of powers of two."""
     first = cause.variants[0]
     if not first.shape:
         yield cause, "", first
@@ -153,7 +154,7 @@ def _groups(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
         yield cause, f"{2.0**power:g} s", group
 
 
-def _named(cause: Cause, shape: str, group: Group) -> Iterator[SharedColumn]:
+def _shared_columns(cause: Cause, shape: str, group: Group) -> Iterator[SharedColumn]:
     if group.effect is None:
         for i in range(len(group.columns)):
             yield SharedColumn(

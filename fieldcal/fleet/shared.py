@@ -1,8 +1,9 @@
-"""Which effects sessions share, and at which level: the search, and what it says.
+"""Search for the effects that sessions share, and the level of each.
 
-Sets of effects, each at a level, are weighed by evidence (`levels`) times the chance of
-each effect; the best is found by adding, leaving out and putting at another level one
-at a time. Probabilities are the weights of all sets that were looked at.
+A set of effects, each at a level, is weighed by its evidence (`levels`) times the prior
+probability of each effect. The search adds an effect, removes one or moves one to
+another level, one at a time. Probabilities are the weights of all sets that were
+evaluated.
 """
 
 from __future__ import annotations
@@ -15,42 +16,48 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.fleet.levels import Grouping, Member, Sessions, WeighedMembers, groupings
+from fieldcal.fleet.levels import (
+    EffectSetPosterior,
+    Grouping,
+    LevelEffect,
+    PooledSessions,
+    groupings,
+)
 from fieldcal.fleet.reduced import ReducedSession, SharedColumn
 from fieldcal.history.sessions import LEVELS, StoredSession
 from fieldcal.model import priors, thresholds
 
 FOLLOWED = 4
-"""Effects that are weighed in full at each step."""
+"""Number of candidates that are evaluated in full at each step."""
 
 MOST = 8
-"""Steps of one search."""
+"""Largest number of steps of a search."""
 
-Key = tuple[str, str]
-"""Effect and triad."""
+EffectKey = tuple[str, str]
+"""Id of an effect, and triad."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedEffect:
-    """An effect that may be shared.
+    """An effect at a level: a candidate of the search.
 
     Attributes
     ----------
-    key : effect and triad
-    shape : time constant, empty where there is none
+    key : id of the effect, and triad
+    shape : time constant, empty if there is none
     columns : its parameters
-    member : at a level
-    chance : that sessions have it, ln
-    among : of this shape and level among all, ln
+    level_effect : columns of the effect, and groups of the level
+    log_chance : ln of the prior probability that sessions have the effect
+    log_share : ln of the part of this shape and level among all shapes and levels
 
     """
 
-    key: Key
+    key: EffectKey
     shape: str
     columns: tuple[SharedColumn, ...]
-    member: Member
-    chance: float
-    among: float
+    level_effect: LevelEffect
+    log_chance: float
+    log_share: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +66,10 @@ class SharedFinding:
 
     Attributes
     ----------
-    effect : what, and at which level
-    probability : that the sessions have it, at whatever level
-    level_probability : that they have it at this level
-    other : levels and effects that the sessions do not tell from it
+    effect : effect and level
+    probability : posterior probability of the effect, at any level
+    level_probability : posterior probability of the effect at this level
+    alternatives : effects and levels that explain the sessions as well
     values, sigmas : (groups, k) of its parameters, in their units
 
     """
@@ -70,27 +77,27 @@ class SharedFinding:
     effect: SharedEffect
     probability: float
     level_probability: float
-    other: tuple[str, ...]
+    alternatives: tuple[str, ...]
     values: Array
     sigmas: Array
 
     @property
     def level(self) -> str:
-        """Name of the level; several where no session tells them apart."""
-        return " or ".join(self.effect.member.grouping.names)
+        """Name of the level; several if they group the sessions alike."""
+        return " or ".join(self.effect.level_effect.grouping.names)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as an object."""
         name, part = self.effect.key
-        groups = self.effect.member.grouping.labels
+        groups = self.effect.level_effect.grouping.labels
         return {
             "id": name,
             "part": part or None,
             "shape": self.effect.shape or None,
-            "level": list(self.effect.member.grouping.names),
+            "level": list(self.effect.level_effect.grouping.names),
             "probability": self.probability,
             "level_probability": self.level_probability,
-            "or": list(self.other),
+            "or": list(self.alternatives),
             "groups": {
                 label: [
                     {"name": c.name, "value": v, "sigma": s, "unit": c.unit}
@@ -108,7 +115,7 @@ class SharedSearch:
 
     Parameters
     ----------
-    sessions : with their reduced rows and what they have in common
+    sessions : stored sessions, each reduced and with its levels
 
     """
 
@@ -122,16 +129,16 @@ class SharedSearch:
                 f"{bad}: has no rows to be shared, since it cannot be examined; see"
                 " fieldcal solve, or leave it out"
             )
-        tables = [_table(one) for one in sessions]
+        tables = [_level_labels(one) for one in sessions]
         self.groupings = groupings(tables, ("device", *LEVELS, "session"))
-        columns, matrix, pull = together(some)
-        self.sessions = Sessions(matrix, pull)
+        columns, matrix, pull = stack_sessions(some)
+        self.sessions = PooledSessions(matrix, pull)
         self.candidates = list(self._candidates(columns))
-        self.candidates += _unexplained(columns, matrix, self.groupings)
-        self.visited: dict[frozenset[int], tuple[float, WeighedMembers]] = {}
+        self.candidates += _unexplained_effects(columns, matrix, self.groupings)
+        self.visited: dict[frozenset[int], tuple[float, EffectSetPosterior]] = {}
 
     def _candidates(self, columns: Sequence[SharedColumn]) -> list[SharedEffect]:
-        parts: dict[Key, dict[tuple[str, int], list[int]]] = {}
+        parts: dict[EffectKey, dict[tuple[str, int], list[int]]] = {}
         for i, c in enumerate(columns):
             for variant in () if c.own else c.variants:
                 every = parts.setdefault((c.effect, c.part), {})
@@ -141,7 +148,7 @@ class SharedSearch:
                 key,
                 shape,
                 tuple(columns[i] for i in at),
-                Member(np.array(at, dtype=np.intp), level),
+                LevelEffect(np.array(at, dtype=np.intp), level),
                 float(np.log(columns[at[0]].chance)),
                 -float(np.log(len(every) * len(self.groupings))),
             )
@@ -150,38 +157,38 @@ class SharedSearch:
             for level in self.groupings
         ]
 
-    def weighed(self, some: frozenset[int]) -> float:
-        """Score of a set of candidates: evidence times chance, ln."""
+    def score(self, some: frozenset[int]) -> float:
+        """Score of a set of candidates: log evidence plus ln of the prior."""
         if some not in self.visited:
             order = sorted(some)
             effects = [self.candidates[i] for i in order]
-            found = self.sessions.weighed([e.member for e in effects])
-            self.visited[some] = (found.score + self._chance(effects), found)
+            found = self.sessions.posterior([e.level_effect for e in effects])
+            self.visited[some] = (found.score + self._log_prior(effects), found)
         return self.visited[some][0]
 
     @staticmethod
-    def _chance(effects: Sequence[SharedEffect]) -> float:
+    def _log_prior(effects: Sequence[SharedEffect]) -> float:
         names: set[str] = set()
         total = 0.0
         for one in effects:
             again = one.key[0] in names and not one.columns[0].own
-            total += float(np.log(priors.AGAIN)) if again else one.chance
-            total += one.among
+            total += float(np.log(priors.AGAIN)) if again else one.log_chance
+            total += one.log_share
             names.add(one.key[0])
         return total
 
     def run(self) -> list[SharedFinding]:
-        """Effects that are likelier there than not at their levels; surest first."""
+        """Return the effects that are probable at their level, the surest first."""
         best = frozenset[int]()
-        self.weighed(best)
+        self.score(best)
         for _ in range(MOST):
-            better = max([best, *self._near(best)], key=self.weighed)
+            better = max([best, *self._neighbouring_sets(best)], key=self.score)
             if better == best:
                 break
             best = better
         for i in best:
-            for other in self._offers(best - {i})[:FOLLOWED]:
-                self.weighed(best - {i} | {other})
+            for other in self._ranked_candidates(best - {i})[:FOLLOWED]:
+                self.score(best - {i} | {other})
         found = [self._finding(best, i) for i in best]
         found = [
             one for one in found
@@ -190,9 +197,9 @@ class SharedSearch:
         ]  # fmt: skip
         return sorted(found, key=lambda one: -one.level_probability)
 
-    def _near(self, best: frozenset[int]) -> list[frozenset[int]]:
-        """Sets with one more, one less, or one at another level."""
-        found = [best | {i} for i in self._offers(best)[:FOLLOWED]]
+    def _neighbouring_sets(self, best: frozenset[int]) -> list[frozenset[int]]:
+        """Sets with one effect more, one less, or one at another level."""
+        found = [best | {i} for i in self._ranked_candidates(best)[:FOLLOWED]]
         for i in best:
             found.append(best - {i})
             one = self.candidates[i]
@@ -201,12 +208,14 @@ class SharedSearch:
                     found.append(best - {i} | {j})
         return found
 
-    def _offers(self, base: frozenset[int]) -> list[int]:
-        """Candidates beside a set, the best first."""
-        self.weighed(base)
+    def _ranked_candidates(self, base: frozenset[int]) -> list[int]:
+        """Candidates that are not in a set, by the score that each would give it."""
+        self.score(base)
         found = self.visited[base][1]
         scores = {
-            i: self.sessions.offered(found, one.member) + one.chance + one.among
+            i: self.sessions.evidence_gain(found, one.level_effect)
+            + one.log_chance
+            + one.log_share
             for i, one in enumerate(self.candidates)
             if i not in base
         }
@@ -218,25 +227,27 @@ class SharedSearch:
         weight = {s: np.exp(v - top) for s, (v, _) in self.visited.items()}
         name = one.key[0]
         has = [s for s in weight if any(self.candidates[j].key[0] == name for j in s)]
-        level = one.member.grouping
-        here = [s for s in has if any(self._is(j, name, level) for j in s)]
+        level = one.level_effect.grouping
+        here = [
+            s for s in has if any(self._is_effect_at_level(j, name, level) for j in s)
+        ]
         typical = np.array([c.typical for c in one.columns])
-        values, sigmas = self.visited[best][1].of(sorted(best).index(i))
+        values, sigmas = self.visited[best][1].effect_values(sorted(best).index(i))
         return SharedFinding(
             one,
             float(sum(weight[s] for s in has) / sum(weight.values())),
             float(sum(weight[s] for s in here) / sum(weight.values())),
-            tuple(self._instead(best, i)),
+            tuple(self._alternatives(best, i)),
             values * typical,
             sigmas * typical,
         )
 
-    def _is(self, j: int, name: str, level: Grouping) -> bool:
+    def _is_effect_at_level(self, j: int, name: str, level: Grouping) -> bool:
         other = self.candidates[j]
-        return other.key[0] == name and other.member.grouping is level
+        return other.key[0] == name and other.level_effect.grouping is level
 
-    def _instead(self, best: frozenset[int], i: int) -> list[str]:
-        """What explains the sessions as well in the place of one effect."""
+    def _alternatives(self, best: frozenset[int], i: int) -> list[str]:
+        """Effects and levels that explain the sessions as well in place of effect i."""
         own, found = self.visited[best][0], dict[str, None]()
         one = self.candidates[i]
         for j, other in enumerate(self.candidates):
@@ -244,21 +255,21 @@ class SharedSearch:
             if j in best or there not in self.visited:
                 continue
             if self.visited[there][0] > own - thresholds.SAME:
-                level = " or ".join(other.member.grouping.names)
-                if (other.key, other.member.grouping) != (
+                level = " or ".join(other.level_effect.grouping.names)
+                if (other.key, other.level_effect.grouping) != (
                     one.key,
-                    one.member.grouping,
+                    one.level_effect.grouping,
                 ):
                     found[f"{other.key[0]} of {level}"] = None
         return list(found)
 
 
-def _unexplained(
+def _unexplained_effects(
     columns: Sequence[SharedColumn], matrix: Array, levels: Sequence[Grouping]
 ) -> Iterator[SharedEffect]:
-    """Functions without physics, each of those sessions that had it alone."""
+    """Smooth functions that no effect makes, as candidates at the level "session"."""
     sessions = next(level for level in levels if "session" in level.names)
-    parts: dict[Key, list[int]] = {}
+    parts: dict[EffectKey, list[int]] = {}
     for i, c in enumerate(columns):
         if c.own:
             parts.setdefault((c.effect, c.part), []).append(i)
@@ -267,16 +278,18 @@ def _unexplained(
         first = columns[at[0]]
         yield SharedEffect(
             key, "", tuple(columns[i] for i in at),
-            Member(np.array(at, dtype=np.intp), sessions),
+            LevelEffect(np.array(at, dtype=np.intp), sessions),
             having * float(np.log(first.chance)), 0.0,
         )  # fmt: skip
 
 
-def together(some: Sequence[ReducedSession]) -> tuple[list[SharedColumn], Array, Array]:
-    """Columns of all sessions, M (s, k, k) and q (s, k); nothing where one has none.
+def stack_sessions(
+    some: Sequence[ReducedSession],
+) -> tuple[list[SharedColumn], Array, Array]:
+    """Columns of all sessions, with M (s, k, k) and q (s, k), zero where absent.
 
-    Of an effect with a time constant only those count that all sessions have that
-    have the effect: it may be there at another.
+    A column with a time constant is used only if all sessions with the effect have it:
+    in the others the effect may be present at another time constant.
     """
     every: dict[tuple[str, str, str, str], SharedColumn] = {}
     having: dict[tuple[str, str], int] = {}
@@ -285,8 +298,8 @@ def together(some: Sequence[ReducedSession]) -> tuple[list[SharedColumn], Array,
         for key in {(c.effect, c.part) for c in one.columns}:
             having[key] = having.get(key, 0) + 1
         for c in one.columns:
-            every.setdefault(_key(c), c)
-            count[_key(c)] = count.get(_key(c), 0) + 1
+            every.setdefault(_column_key(c), c)
+            count[_column_key(c)] = count.get(_column_key(c), 0) + 1
     names = [
         key for key, c in every.items()
         if not c.shape or count[key] == having[c.effect, c.part]
@@ -295,17 +308,17 @@ def together(some: Sequence[ReducedSession]) -> tuple[list[SharedColumn], Array,
     matrix = np.zeros((len(some), len(names), len(names)))
     pull = np.zeros((len(some), len(names)))
     for s, one in enumerate(some):
-        own = [i for i, c in enumerate(one.columns) if _key(c) in place]
-        at = [place[_key(one.columns[i])] for i in own]
+        own = [i for i, c in enumerate(one.columns) if _column_key(c) in place]
+        at = [place[_column_key(one.columns[i])] for i in own]
         matrix[s][np.ix_(at, at)] = one.matrix[np.ix_(own, own)]
         pull[s, at] = one.pull[own]
     return [every[key] for key in names], matrix, pull
 
 
-def _key(c: SharedColumn) -> tuple[str, str, str, str]:
+def _column_key(c: SharedColumn) -> tuple[str, str, str, str]:
     return (c.effect, c.part, c.shape, c.name)
 
 
-def _table(one: StoredSession) -> Mapping[str, str]:
-    """Level by level, what a session belongs to."""
+def _level_labels(one: StoredSession) -> Mapping[str, str]:
+    """Label of a session at each level."""
     return {"device": one.serial, **one.levels, "session": one.folder}

@@ -1,24 +1,24 @@
-"""How units of a lot differ, with the uncertainty of each taken off.
+"""Spread of the units of a lot, corrected for the uncertainty of each value.
 
-Most units are of the lot, a few may be odd:
+Most units follow a normal distribution; a few may be odd:
 
     x_i ~ (1 - p) N(m, v_i) + p C(m, K v_i^1/2),   v_i = t^2 + s_i^2                (1)
 
-with C that of Cauchy, since some are off by any number of spreads, and s_i the
-uncertainty of the unit's own value. At each spread t the mean and p are found by
-expectation and maximisation, with c_i the probability that a unit is none of the odd
-ones, z_i = (x_i - m) / v_i^1/2 and w_i = c_i + (1 - c_i) 2 / (K^2 + z_i^2); then
+with C the Cauchy distribution, because an odd unit may be off by any number of spreads,
+and s_i the standard uncertainty of the unit's value. At each spread t, expectation
+maximisation gives the mean m and p. c_i is the probability that a unit is not odd, z_i
+= (x_i - m) / v_i^1/2 and w_i = c_i + (1 - c_i) 2 / (K^2 + z_i^2). Then
 
     ln L(t) = sum_i ln density(x_i) - ln(sum_i w_i / v_i) / 2                       (2)
 
-is largest at the spread (restricted maximum likelihood, which counts the mean), and its
-interval is where (2) is less by up to 1.92. What is known of t^2 is, with W_k =
-sum_i c_i / v_i^k,
+is largest at the estimated spread (restricted maximum likelihood, which allows for the
+estimated mean). The 95 % interval is where (2) is less by up to 1.92. With W_k = sum_i
+c_i / v_i^k, the variance of t^2 is
 
     var t^2 = 2 / (W_2 - 2 W_3 / W_1 + W_2^2 / W_1^2)                               (3)
 
-and what t may be is L(t) times the prior of Jeffreys, t W_2^1/2. Source: Harville, J.
-Am. Stat. Assoc. 72 (1977) 320, with (3); Tiao and Tan, Biometrika 52 (1965) 37;
+and the posterior of t is L(t) times the prior of Jeffreys, t W_2^1/2. Source: Harville,
+J. Am. Stat. Assoc. 72 (1977) 320, with (3); Tiao and Tan, Biometrika 52 (1965) 37;
 mixtures for outliers: Tukey's contaminated normal; weights of Cauchy: Lange, Little and
 Taylor, J. Am. Stat. Assoc. 84 (1989) 881.
 """
@@ -34,41 +34,41 @@ from fieldcal.core.chances import DEVIATION
 from fieldcal.core.samples import Array
 
 WIDER = 6.0
-"""K: an odd unit is typically so many times as far off as others."""
+"""K: ratio of the typical deviation of an odd unit to that of others."""
 
 CAUCHY = 0.5 * np.log(2 / np.pi)
-"""Peak of Cauchy's density against that of the normal one, ln."""
+"""ln of the ratio of the peaks of the Cauchy and the normal density."""
 
 ODD = 0.01
-"""p before the units are seen, which counts as `COUNTS` units."""
+"""Prior value of p; it has the weight of `COUNTS` units."""
 
 COUNTS = 20.0
 
 STEPS = 25
-"""Of expectation and maximisation: the weights are settled long before."""
+"""Steps of expectation maximisation: the weights converge long before."""
 
 GRID = 160
-"""Spreads that are tried."""
+"""Number of spreads that are tried."""
 
 WITHIN = 1.92
-"""ln of the likelihood by which the ends of a 95 % interval are less."""
+"""Drop of ln L at the ends of a 95 % interval."""
 
 
 @dataclass(frozen=True, slots=True)
-class UnitSpread:
-    """What most units are.
+class UnitDistribution:
+    """Distribution of a parameter over the units that are not odd.
 
     Attributes
     ----------
     mean, mean_sigma : m with its standard uncertainty
-    spread : t; what units differ by
-    spread_sigma : its standard uncertainty by (3); nan where it is zero
-    low, high : its 95 % interval
-    square : t^2, averaged over every t that it may be
-    odd : p, the part of units that are odd
-    typical : (n,) c_i, probability that each unit is none of the odd ones
-    sigma : (n,) what each unit is off by, its own uncertainty and that of the mean
-        included
+    spread : t, standard deviation of the units
+    spread_sigma : standard uncertainty of the spread by (3); nan if the spread is zero
+    low, high : 95 % interval of the spread
+    mean_square_spread : t^2, averaged over the posterior of t
+    odd_fraction : p, part of the units that are odd
+    typical_probability : (n,) c_i, probability that each unit is not odd
+    sigma : (n,) standard deviation of each value from the mean: spread, uncertainty of
+        the value and uncertainty of the mean
 
     """
 
@@ -78,20 +78,20 @@ class UnitSpread:
     spread_sigma: float
     low: float
     high: float
-    square: float
-    odd: float
-    typical: Array
+    mean_square_spread: float
+    odd_fraction: float
+    typical_probability: Array
     sigma: Array
 
-    def chances(self, x: Array) -> Array:
-        """Probability of values as far off as these, (n,); the spread is uncertain."""
-        dof = max(float(self.typical.sum()) - 1.0, 1.0)
+    def tail_probabilities(self, x: Array) -> Array:
+        """Probability of a deviation of this size or more, (n,), by Student's t."""
+        dof = max(float(self.typical_probability.sum()) - 1.0, 1.0)
         out: Array = 2 * student.sf(np.abs(x - self.mean) / self.sigma, dof)
         return out
 
 
-def spread(x: Array, sigma: Array) -> UnitSpread:
-    """The spread of values (n,) whose uncertainties are (n,); n is two or more."""
+def estimate_distribution(x: Array, sigma: Array) -> UnitDistribution:
+    """Estimate mean and spread of values (n,) with uncertainties (n,); n >= 2."""
     scale = DEVIATION * float(np.median(np.abs(x - np.median(x))))
     scale = scale or float(np.std(x)) or float(np.median(sigma))
     tried = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, GRID) * scale])
@@ -113,11 +113,11 @@ def spread(x: Array, sigma: Array) -> UnitSpread:
     inside = tried[likely > likely[best] - WITHIN]
     weight = np.exp(likely - likely[best]) * np.gradient(tried)
     weight *= tried * np.sqrt((typical / variance**2).sum(axis=1))
-    return UnitSpread(
+    return UnitDistribution(
         float(middle[best]),
         float(told[best] ** -0.5),
         float(tried[best]),
-        _unsure(float(tried[best]), typical[best], variance[best]),
+        _spread_sigma(float(tried[best]), typical[best], variance[best]),
         float(inside.min()),
         float(inside.max()),
         float(weight @ tried**2 / weight.sum()),
@@ -127,8 +127,8 @@ def spread(x: Array, sigma: Array) -> UnitSpread:
     )
 
 
-def _unsure(t: float, typical: Array, variance: Array) -> float:
-    """Standard uncertainty of the spread, (3)."""
+def _spread_sigma(t: float, typical: Array, variance: Array) -> float:
+    """Standard uncertainty of the spread t, (3)."""
     if t == 0:
         return float("nan")
     one, two, three = ((typical / variance**k).sum() for k in (1, 2, 3))

@@ -1,4 +1,4 @@
-"""Sessions in trees of folders, and of what each was made when it was solved."""
+"""Session folders in trees of folders, and the fingerprint of a session's inputs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fieldcal.session.marks import MARKS
 
 
 def sessions_in(folders: Iterable[Path]) -> list[Path]:
-    """Session folders in trees, each once, in order.
+    """Return the session folders below some folders, each once, in order.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def sessions_in(folders: Iterable[Path]) -> list[Path]:
     for folder in asked:
         if not folder.is_dir():
             raise InputError(f"{folder}: is no folder; name one that holds sessions")
-        found |= dict.fromkeys(sorted(_below(folder)))
+        found |= dict.fromkeys(sorted(_session_folders_below(folder)))
     if not found:
         named = ", ".join(map(str, asked))
         raise InputError(
@@ -37,7 +37,7 @@ def sessions_in(folders: Iterable[Path]) -> list[Path]:
     return list(found)
 
 
-def _below(folder: Path) -> Iterator[Path]:
+def _session_folders_below(folder: Path) -> Iterator[Path]:
     for place, inner, files in os.walk(folder):
         inner[:] = [name for name in inner if not name.startswith(".")]
         if DESCRIPTION in files:
@@ -45,9 +45,9 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def fingerprint(folder: Path, options: str = "") -> str:
-    """Of what a session is made, the program and what was asked of it included.
+    """Hash of a session's inputs, the version of the program and the options.
 
-    Samples count by name, size and time of change; they may be many.
+    Of the samples, which may be large, only name, size and time of change count.
     """
     made = hashlib.sha256(f"{__version__}\n{options}\n".encode())
     for path in sorted(folder.iterdir()):

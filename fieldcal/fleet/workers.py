@@ -1,7 +1,7 @@
-"""Work on many items in processes, or on an engine that is there; none is lost.
+"""Tasks for many items, in processes or on a Dask cluster; every item has a result.
 
-A process that dies takes its pool with it. What was under way then is tried again, one
-item at a time, so that the one that kills its process is known and all others are done.
+A process that dies breaks its pool. The items that were running are then tried again,
+one at a time. This identifies the item that kills its process; all others complete.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ from fieldcal.core.errors import InputError
 T = TypeVar("T")
 
 AHEAD = 2
-"""Items given out for each worker, so that none waits for the next."""
+"""Items submitted per worker, so that no worker waits for the next item."""
 
 DIED = "its process was killed, by the system for want of memory perhaps"
 
 
 @dataclass(frozen=True, slots=True)
-class Pool:
-    """Where work is done.
+class WorkerPool:
+    """Workers that carry out tasks.
 
     Attributes
     ----------
-    opened : what opens it; after it broke, once more
-    workers : how many there are
+    open_executor : opens the executor; called again after it broke
+    workers : number of workers
 
     """
 
-    opened: Callable[[], contextlib.AbstractContextManager[Executor]]
+    open_executor: Callable[[], contextlib.AbstractContextManager[Executor]]
     workers: int
 
 
-def processes(count: int, preload: Sequence[str] = ()) -> Pool:
-    """So many processes of this computer; `preload` modules are imported once."""
+def process_pool(count: int, preload: Sequence[str] = ()) -> WorkerPool:
+    """Pool of `count` local processes; `preload` modules are imported once."""
     method = "forkserver"
     if method not in multiprocessing.get_all_start_methods():
         method = "spawn"
     context = multiprocessing.get_context(method)
     if method == "forkserver":
         context.set_forkserver_preload(list(preload))
-    return Pool(
+    return WorkerPool(
         lambda: ProcessPoolExecutor(
             count, mp_context=context, initializer=_end_with_parent
         ),
@@ -66,7 +66,7 @@ def processes(count: int, preload: Sequence[str] = ()) -> Pool:
 
 
 def _end_with_parent() -> None:
-    """End this process when the one it works for has ended, however it did."""
+    """End this process when its parent process has ended for any reason."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -79,8 +79,8 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def scheduled(address: str) -> Iterator[Pool]:
-    """Return the workers of a Dask scheduler that is running.
+def dask_pool(address: str) -> Iterator[WorkerPool]:
+    """Pool of the workers of a running Dask scheduler.
 
     Raises
     ------
@@ -108,28 +108,28 @@ def scheduled(address: str) -> Iterator[Pool]:
                 f"{address}: has no worker; start some with dask worker {address}"
                 " --nthreads 1, where fieldcal is installed and the folders are"
             )
-        yield Pool(client.get_executor, workers)
+        yield WorkerPool(client.get_executor, workers)
 
 
 @dataclass(frozen=True, slots=True)
-class Result(Generic[T]):
-    """What became of an item: a value, or why there is none."""
+class TaskResult(Generic[T]):
+    """Result of an item: a value, or an error that says why there is none."""
 
     item: str
     value: T | None
     error: str = ""
 
 
-def results(
-    items: Sequence[str], work: Callable[[str], T], pool: Pool
-) -> Iterator[Result[T]]:
-    """Results as they come; each item has one, whatever happens to processes."""
+def run_tasks(
+    items: Sequence[str], work: Callable[[str], T], pool: WorkerPool
+) -> Iterator[TaskResult[T]]:
+    """Yield a result for each item in order of completion, even if processes die."""
     waiting, suspects = deque(items), deque[str]()
     while waiting or suspects:
         alone = bool(suspects)
         queue = suspects if alone else waiting
         running: dict[Future[T], str] = {}
-        with pool.opened() as executor:
+        with pool.open_executor() as executor:
             try:
                 while queue or running:
                     width = 1 if alone else AHEAD * pool.workers
@@ -138,20 +138,22 @@ def results(
                         queue.popleft()
                     done, _ = wait(running, return_when=FIRST_COMPLETED)
                     for future in done:
-                        made = _result(running[future], future)
+                        made = _task_result(running[future], future)
                         del running[future]
                         yield made
             except BrokenExecutor:
                 if not alone:
                     suspects.extend(running.values())
                     continue
-                yield from (Result(i, None, f"{i}: {DIED}") for i in running.values())
+                yield from (
+                    TaskResult(i, None, f"{i}: {DIED}") for i in running.values()
+                )
 
 
-def _result(item: str, future: Future[T]) -> Result[T]:
+def _task_result(item: str, future: Future[T]) -> TaskResult[T]:
     try:
-        return Result(item, future.result())
+        return TaskResult(item, future.result())
     except BrokenExecutor:
         raise
     except Exception as error:  # of the engine: the work has caught its own
-        return Result(item, None, f"{item}: {type(error).__name__}: {error}")
+        return TaskResult(item, None, f"{item}: {type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""How errors of an inertial navigator at rest grow, in base axes.
+"""Growth of the errors of an inertial navigator at rest, in base axes.
 
     phi' = -W x phi + (u x dv) / R - e                       attitude               (1)
     dv'  = f x phi + a - 2 W x dv + 2 g (dp . d) d / R       velocity               (2)
@@ -32,30 +32,30 @@ EARTH_RADIUS = 6.371e6
 
 DOWN = np.array([0.0, 1.0, 0.0])
 
-PHI, VELOCITY, PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
-"""Where attitude, velocity and position stand in x."""
+PHI, VELOCITY, POSITION = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Indices of attitude, velocity and position in x."""
 
 
-def matrix(earth: Array, gravity: float) -> Array:
+def error_dynamics(earth: Array, gravity: float) -> Array:
     """F of (1) to (3), (9, 9), by the Earth's rate (3,) rad/s and gravity, m/s^2."""
     f = np.zeros((9, 9))
     f[PHI, PHI] = -cross_matrix(earth)
     f[PHI, VELOCITY] = cross_matrix(-DOWN) / EARTH_RADIUS  # (1)
     f[VELOCITY, PHI] = cross_matrix(force_home(gravity))
     f[VELOCITY, VELOCITY] = -2 * cross_matrix(earth)
-    f[VELOCITY, PLACE] = 2 * gravity / EARTH_RADIUS * np.outer(DOWN, DOWN)  # (2)
-    f[PLACE, VELOCITY] = np.eye(3)  # (3)
+    f[VELOCITY, POSITION] = 2 * gravity / EARTH_RADIUS * np.outer(DOWN, DOWN)  # (2)
+    f[POSITION, VELOCITY] = np.eye(3)  # (3)
     return f
 
 
 @dataclass(frozen=True, slots=True)
-class RunGrowth:
-    """What errors make of a run at instants step, 2 step, ... (m of them).
+class ErrorPropagation:
+    """Effect of errors on x at the m instants step, 2 step, ... of a run.
 
     Attributes
     ----------
-    start : (m, 9, 9) of x at the start
-    constant : (m, 9, 6) of constant errors of rates and of forces
+    start : (m, 9, 9) derivative by x at the start
+    constant : (m, 9, 6) derivative by constant errors of rates and forces
     rate_noise, force_noise : (9 m, 9 m) covariance by white noise of 1 rad/s/sqrt(Hz)
         and 1 m/s^2/sqrt(Hz) about and along each axis
 
@@ -67,8 +67,8 @@ class RunGrowth:
     force_noise: Array
 
 
-def growth(f: Array, step: float, count: int) -> RunGrowth:
-    """Return what a run of `count` steps, s each, makes of errors, (4), (5)."""
+def propagate_errors(f: Array, step: float, count: int) -> ErrorPropagation:
+    """Propagate errors over a run of `count` steps of `step` s, (4), (5)."""
     g = np.zeros((9, 6))
     g[PHI, :3], g[VELOCITY, 3:] = -np.eye(3), np.eye(3)
     whole = np.zeros((15, 15))
@@ -79,12 +79,17 @@ def growth(f: Array, step: float, count: int) -> RunGrowth:
         power = one @ power
         starts.append(power[:9, :9])
         constants.append(power[:9, 9:])
-    noises = [_noise(f, part @ part.T, step, starts) for part in (g[:, :3], g[:, 3:])]
-    return RunGrowth(np.array(starts), np.array(constants), noises[0], noises[1])
+    noises = [
+        _noise_covariance(f, part @ part.T, step, starts)
+        for part in (g[:, :3], g[:, 3:])
+    ]
+    return ErrorPropagation(np.array(starts), np.array(constants), noises[0], noises[1])
 
 
-def _noise(f: Array, density: Array, step: float, powers: list[Array]) -> Array:
-    """Covariance of x at all instants by white noise, (9 m, 9 m), (5)."""
+def _noise_covariance(
+    f: Array, density: Array, step: float, powers: list[Array]
+) -> Array:
+    """Covariance of x at all instants that white noise causes, (9 m, 9 m), (5)."""
     double = np.zeros((18, 18))
     double[:9, :9], double[:9, 9:], double[9:, 9:] = -f, density, f.T
     both = expm(double * step)

@@ -1,6 +1,6 @@
-"""What may be wrong with the set-up of a navigator's runs.
+"""Possible mistakes in the stated set-up of a navigator's runs.
 
-Each mistake is a set-up in which something is known no better than after one.
+A mistake is modelled as a set-up with a larger uncertainty of what it concerns.
 """
 
 from __future__ import annotations
@@ -11,43 +11,48 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.navigator.run_rows import Setup
+from fieldcal.navigator.run_rows import RunSetup
 
 OFF_DEG = 5.0
-"""What level, azimuth and attitudes may be wrong by where they were not as told, 1
-sigma: a mistake of one's own, and still small enough for what is linear."""
+"""Size of a mistake of level, azimuth or attitude, 1 sigma: much larger than errors of
+setting, and small enough for a linear model."""
 
 SET_DEG = 0.5
-"""What all attitudes may be wrong by where they are set by hand, or while the base
-sways, 1 sigma."""
+"""Error of all attitudes if they are set by hand or the base sways, 1 sigma."""
 
 LEVEL, AZIMUTH, ATTITUDES, SCATTER = "level", "azimuth", "attitudes", "scatter"
 
 
-def run_name(r: int) -> str:
-    """Name of the mistake of an attitude, by the place of its run from 0.
+def run_mistake_name(r: int) -> str:
+    """Name of a mistake of the attitude of run r, counted from 0.
 
-    >>> run_name(0)
+    >>> run_mistake_name(0)
     'run 1'
     """
     return f"run {r + 1}"
 
 
-def mistakes(told: Setup) -> Iterator[tuple[str, Setup]]:
-    """Name of each, and the set-up with it: of the base, of all attitudes, and of one.
+def setups_with_mistakes(told: RunSetup) -> Iterator[tuple[str, RunSetup]]:
+    """Yield the name of each mistake and the set-up with it.
 
-    Of one run alone, its attitude and the base are the same.
+    Mistakes concern the base, all attitudes or one attitude. With a single run, an
+    error of its attitude is an error of the base.
     """
-    yield LEVEL, _wider(told, np.array([OFF_DEG, 0.0, OFF_DEG]))
-    yield AZIMUTH, _wider(told, np.array([0.0, OFF_DEG, 0.0]))
-    if len(told.own) == 1:
+    yield LEVEL, _with_wider_base_sigma(told, np.array([OFF_DEG, 0.0, OFF_DEG]))
+    yield AZIMUTH, _with_wider_base_sigma(told, np.array([0.0, OFF_DEG, 0.0]))
+    if len(told.attitude_sigmas) == 1:
         return
-    yield ATTITUDES, replace(told, own=np.maximum(told.own, np.deg2rad(SET_DEG)))
-    for r in range(len(told.own)):
-        own = told.own.copy()
+    yield (
+        ATTITUDES,
+        replace(
+            told, attitude_sigmas=np.maximum(told.attitude_sigmas, np.deg2rad(SET_DEG))
+        ),
+    )
+    for r in range(len(told.attitude_sigmas)):
+        own = told.attitude_sigmas.copy()
         own[r] = max(own[r], np.deg2rad(OFF_DEG))
-        yield run_name(r), replace(told, own=own)
+        yield run_mistake_name(r), replace(told, attitude_sigmas=own)
 
 
-def _wider(told: Setup, degrees: Array) -> Setup:
-    return replace(told, common=np.maximum(told.common, np.deg2rad(degrees)))
+def _with_wider_base_sigma(told: RunSetup, degrees: Array) -> RunSetup:
+    return replace(told, base_sigma=np.maximum(told.base_sigma, np.deg2rad(degrees)))

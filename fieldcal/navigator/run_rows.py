@@ -1,4 +1,4 @@
-"""Rows of runs of a navigator at rest, and what they say of parameters.
+"""Rows of a navigator's runs at rest, and the parameters that they determine.
 
     y_r = H (X_phi (phi + phi_r) + X_p p_r + X_e C e + X_a C (a + k f + j_r)) + n   (1)
     n ~ N(0, N_a^2 K_a + N_g^2 K_g + q^2 I)                                         (2)
@@ -15,34 +15,34 @@ import numpy as np
 
 from fieldcal.core.frames import force_home
 from fieldcal.core.samples import Array
-from fieldcal.navigator.growth import PHI, PLACE, growth, matrix
-from fieldcal.navigator.solution import Run
+from fieldcal.navigator.growth import PHI, POSITION, error_dynamics, propagate_errors
+from fieldcal.navigator.solution import NavigatorRun
 
-BEGAN_M = 10.0
-"""How far from where it is a navigator may begin, m: the first position is noisy."""
+START_POSITION_M = 10.0
+"""Standard deviation of the first position, m: it is noisy."""
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
-    """What is known of the place and the runs.
+class RunSetup:
+    """What is known of the site and of the attitudes of the runs.
 
     Attributes
     ----------
     earth : (3,) rad/s in base axes
     gravity : m/s^2
     attitudes : (r, 3, 3) C of each run, device to base
-    common : (3,) rad, 1 sigma of phi about each base axis
-    own : (r,) rad, 1 sigma of each phi_r about any axis
-    used : which of velocity (3) and position (3) was recorded, East, down, north
+    base_sigma : (3,) rad, 1 sigma of phi about each base axis
+    attitude_sigmas : (r,) rad, 1 sigma of each phi_r about any axis
+    recorded : which of velocity (3) and position (3) was recorded, East, down, north
 
     """
 
     earth: Array
     gravity: float
     attitudes: Array
-    common: Array
-    own: Array
-    used: Sequence[int]
+    base_sigma: Array
+    attitude_sigmas: Array
+    recorded: Sequence[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,43 +51,49 @@ class RunRows:
 
     Attributes
     ----------
-    y : (n,) what the solution is off by
-    design : (n, 12) of the parameters in the order of `NAMES`, and of phi
-    sigma : rad, of phi_r about any axis
-    turn : (n, 3) columns of phi_r
-    began : (n, n) of p_r
-    jitter : (n, n) of j_r of 1 m/s^2
+    y : (n,) errors of the solution
+    design : (n, 12) columns of the parameters in the order of `NAMES`, and of phi
+    attitude_sigma : rad, standard deviation of phi_r about any axis
+    attitude_design : (n, 3) columns of phi_r
+    start_covariance : (n, n) covariance of p_r
+    jitter : (n, n) covariance of j_r of 1 m/s^2
     rate_noise, force_noise : (n, n) K_g and K_a
 
     """
 
     y: Array
     design: Array
-    sigma: float
-    turn: Array
-    began: Array
+    attitude_sigma: float
+    attitude_design: Array
+    start_covariance: Array
     jitter: Array
     rate_noise: Array
     force_noise: Array
 
     def covariance(self, noise: Array) -> Array:
-        """R of the rows by N_a, N_g, q, J, (n, n)."""
+        """Covariance of the rows for N_a, N_g, q, J, (n, n)."""
         force, rate, out, jitter = noise**2
-        turned = self.turn @ self.turn.T
-        whole = self.sigma**2 * turned + self.began + jitter * self.jitter
+        turned = self.attitude_design @ self.attitude_design.T
+        whole = (
+            self.attitude_sigma**2 * turned
+            + self.start_covariance
+            + jitter * self.jitter
+        )
         whole += out * np.eye(len(self.y))
         return np.asarray(whole + force * self.force_noise + rate * self.rate_noise)
 
-    def own(self, noise: Array, mean: Array) -> Array:
-        """phi_r, (3,) rad, where the parameters and phi are `mean`, (12,)."""
+    def attitude_error(self, noise: Array, mean: Array) -> Array:
+        """Estimate phi_r, (3,) rad, if the parameters and phi are `mean`, (12,)."""
         left = np.linalg.solve(self.covariance(noise), self.y - self.design @ mean)
-        return np.asarray(self.sigma**2 * self.turn.T @ left)
+        return np.asarray(self.attitude_sigma**2 * self.attitude_design.T @ left)
 
 
-def run_rows(run: Run, setup: Setup, r: int) -> RunRows:
+def run_rows(run: NavigatorRun, setup: RunSetup, r: int) -> RunRows:
     """Rows of the run numbered r from 0."""
-    grown = growth(matrix(setup.earth, setup.gravity), run.step, len(run.values))
-    used = np.array(setup.used)
+    grown = propagate_errors(
+        error_dynamics(setup.earth, setup.gravity), run.step, len(run.values)
+    )
+    used = np.array(setup.recorded)
     take = (9 * np.arange(len(run.values))[:, None] + 3 + used).ravel()
     start, constant = (
         part.reshape(-1, part.shape[2])[take] for part in (grown.start, grown.constant)
@@ -95,12 +101,12 @@ def run_rows(run: Run, setup: Setup, r: int) -> RunRows:
     c = setup.attitudes[r]
     rate, force = constant[:, :3] @ c, constant[:, 3:] @ c
     f = c.T @ force_home(setup.gravity)
-    began = start[:, PLACE] * (BEGAN_M if used.max() >= len(f) else 0.0)
+    began = start[:, POSITION] * (START_POSITION_M if used.max() >= len(f) else 0.0)
     pick = np.ix_(take, take)
     return RunRows(
         run.values[:, used].ravel(),
         np.hstack([force, force * f, rate, start[:, PHI]]),
-        float(setup.own[r]),
+        float(setup.attitude_sigmas[r]),
         start[:, PHI],
         began @ began.T,
         force @ force.T,
@@ -119,8 +125,8 @@ class RunPosterior:
     chi2: float
 
 
-def posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPosterior:
-    """What all runs say with sizes before them (12,), and noise N_a, N_g, q, J."""
+def run_posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPosterior:
+    """Posterior of all runs with prior `sizes` (12,) and noise N_a, N_g, q, J."""
     g, b, square, log_det = np.zeros((len(sizes),) * 2), np.zeros(len(sizes)), 0.0, 0.0
     for one in rows:
         lower = np.linalg.cholesky(one.covariance(noise))

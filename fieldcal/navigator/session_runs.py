@@ -1,7 +1,7 @@
-"""A session of runs at rest, to what the sensors of its navigator must be.
+"""Calibration of a navigator's sensors from a session of runs at rest.
 
 session.toml gives each [[position]] the attitude that was entered, and in [site] the
-latitude and how level the base is; ``[navigator]`` tells ``solution``, the file,
+latitude and how level the base is; ``[navigator]`` states ``solution``, the file,
 ``azimuth_deg`` and ``azimuth_sd_deg``, where the base's z points from north, and
 ``aligned``: "entered", or "itself" where the navigator levelled by its own sensors.
 """
@@ -21,21 +21,21 @@ from fieldcal.core.frames import earth_rate_home, turn
 from fieldcal.core.positions import angles, third_angles
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join
-from fieldcal.navigator.estimate import Drift, estimate
+from fieldcal.navigator.estimate import DriftEstimate, estimate_from_drift
 from fieldcal.navigator.mistakes import ATTITUDES, AZIMUTH, LEVEL, SCATTER
-from fieldcal.navigator.run_rows import Setup
-from fieldcal.navigator.solution import read, runs
+from fieldcal.navigator.run_rows import RunSetup
+from fieldcal.navigator.solution import read_solution, runs_in_windows
 from fieldcal.session.description import Description
 
-UNSAID_LEVEL_DEG, UNSAID_AZIMUTH_DEG = 3.0, 1.0
-"""What an eye sees of a tilt, and a compass of north, 1 sigma."""
+UNSTATED_LEVEL_DEG, UNSTATED_AZIMUTH_DEG = 3.0, 1.0
+"""Uncertainty of level (by eye) and azimuth (by compass) if not stated, 1 sigma."""
 
 ALIGNED_ITSELF_DEG = 10.0
-"""What a navigator may have taken for level and north."""
+"""Uncertainty of an attitude that the navigator found by its own alignment."""
 
 
-def calibrated(folder: Path, about: Description) -> Calibration:
-    """What the runs of a folder say.
+def calibrate_navigator(folder: Path, about: Description) -> Calibration:
+    """Calibrate the sensors of a navigator from the runs of a session folder.
 
     Raises
     ------
@@ -46,9 +46,11 @@ def calibrated(folder: Path, about: Description) -> Calibration:
 
     """
     table = about.raw.get("navigator", {})
-    solution = read(folder / table.get("solution", "solution.csv"))
-    placed, base = setup(about, solution.used)
-    found = estimate(runs(solution.turned(base), about.windows), placed)
+    solution = read_solution(folder / table.get("solution", "solution.csv"))
+    placed, base = run_setup(about, solution.recorded_columns)
+    found = estimate_from_drift(
+        runs_in_windows(solution.rotated(base), about.windows), placed
+    )
     if not found.names:
         raise NotObservable(
             "these runs determine nothing: longer ones, in more attitudes, would"
@@ -62,13 +64,13 @@ def calibrated(folder: Path, about: Description) -> Calibration:
             "temperature_degc": None,
             "grade": about.grade,
         },
-        "navigator": document(found, placed),
+        "navigator": drift_document(found, placed),
     }
-    return replace(found.calibration(), info=info, warnings=said(found, about))
+    return replace(found.calibration(), info=info, warnings=limitations(found, about))
 
 
-def setup(about: Description, used: list[int]) -> tuple[Setup, Array]:
-    """What is known of place and runs, and the base axes in East, down, north, (3, 3).
+def run_setup(about: Description, used: list[int]) -> tuple[RunSetup, Array]:
+    """Return the set-up of the runs, and the base axes in East, down, north, (3, 3).
 
     Raises
     ------
@@ -91,10 +93,10 @@ def setup(about: Description, used: list[int]) -> tuple[Setup, Array]:
     itself = table.get("aligned", "entered") == "itself"
     setting = about.angle_setting_deg or limits.read(about.grade).angle_setting_deg
     own = [setting if p.sigma is None else np.rad2deg(p.sigma) for p in about.positions]
-    level = UNSAID_LEVEL_DEG if about.level_deg is None else about.level_deg
-    north = float(table.get("azimuth_sd_deg", UNSAID_AZIMUTH_DEG))
+    level = UNSTATED_LEVEL_DEG if about.level_deg is None else about.level_deg
+    north = float(table.get("azimuth_sd_deg", UNSTATED_AZIMUTH_DEG))
     turns = turn(*angles(about.positions), third_angles(about.positions))
-    known = Setup(
+    known = RunSetup(
         base @ earth_rate_home(about.latitude),
         about.gravity,
         np.array([(about.mounting.T @ t).T for t in turns]),
@@ -105,17 +107,18 @@ def setup(about: Description, used: list[int]) -> tuple[Setup, Array]:
     return known, base
 
 
-def said(found: Drift, about: Description) -> tuple[str, ...]:
-    """What the runs cannot tell, a sentence each."""
+def limitations(found: DriftEstimate, about: Description) -> tuple[str, ...]:
+    """Sentences on what the runs cannot determine."""
     out = [
         "scale factors of gyroscopes and cross-coupling hardly show in a run at rest:"
         " they are taken as the navigator has them"
     ]
-    out += _contradicted(found)
-    if found.missing:
+    out += _contradicted_setup(found)
+    if found.undetermined:
         out.append(
-            f"{', '.join(found.missing)}: not determined by these runs: add attitudes"
-            " with each axis up and down, longer runs, or the velocity that is lacking"
+            f"{', '.join(found.undetermined)}: not determined by these runs: add"
+            " attitudes with each axis up and down, longer runs, or the velocity that"
+            " is lacking"
         )
     if about.raw.get("navigator", {}).get("aligned") == "itself":
         out.append(
@@ -125,31 +128,31 @@ def said(found: Drift, about: Description) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _contradicted(found: Drift) -> list[str]:
-    """What of the set-up the runs contradict, a sentence each."""
+def _contradicted_setup(found: DriftEstimate) -> list[str]:
+    """Sentences on what the runs contradict in the stated set-up."""
     (x, y, z), (sx, sy, sz) = np.rad2deg([-found.tilt, found.tilt_sigma])
     out = []
-    if LEVEL in found.off:
+    if LEVEL in found.setup_mistakes:
         out.append(
             f"the base is not as level as stated: it leans by {_deg(x, sx)} about its x"
             f" and by {_deg(z, sz)} about its z; the values allow for that"
         )
-    if AZIMUTH in found.off:
+    if AZIMUTH in found.setup_mistakes:
         out.append(
             f"the base is turned by {_deg(y, sy)} about its y, which points down, from"
             " what azimuth_deg says; the values allow for that"
         )
-    if runs := [name for name in found.off if name.startswith("run")]:
+    if runs := [name for name in found.setup_mistakes if name.startswith("run")]:
         out.append(
             f"{join(runs)}: the device was not in the attitude that was entered; what"
             " such a run tells of biases is used, and nothing of its level"
         )
-    if ATTITUDES in found.off:
+    if ATTITUDES in found.setup_mistakes:
         out.append(
             "the device was in no attitude quite as it was entered: the base sways, or"
             " the angles are not set as well as stated; every ± includes it"
         )
-    if SCATTER in found.off:
+    if SCATTER in found.setup_mistakes:
         out.append(
             f"forces are off by {found.noise[3]:.1g} m/s² from run to run: biases"
             " change between runs, or attitudes were not as entered; every ± includes"
@@ -162,8 +165,8 @@ def _deg(value: float, sigma: float) -> str:
     return " ± ".join(format_with_sigma(float(value), float(sigma))) + "°"
 
 
-def document(found: Drift, placed: Setup) -> dict[str, Any]:
-    """Noise and tilt as they were found."""
+def drift_document(found: DriftEstimate, placed: RunSetup) -> dict[str, Any]:
+    """Noise, tilt and contradictions, as the result file states them."""
     force, rate, out, jitter = found.noise
     return {
         "runs": len(placed.attitudes),
@@ -173,6 +176,6 @@ def document(found: Drift, placed: Setup) -> dict[str, Any]:
         "run_scatter_m_s2": jitter,
         "tilt_deg": np.rad2deg(found.tilt).tolist(),
         "tilt_sigma_deg": np.rad2deg(found.tilt_sigma).tolist(),
-        "missing": list(found.missing),
-        "contradicted": list(found.off),
+        "missing": list(found.undetermined),
+        "contradicted": list(found.setup_mistakes),
     }

@@ -1,9 +1,9 @@
-"""The recorded solution of a navigator, run by run.
+"""The recorded navigation solution, run by run.
 
 A text table with a heading: ``t`` in s, and of the velocity ``vn``, ``ve``, ``vd`` in
-m/s, of the position ``pn``, ``pe``, ``pd`` in m from anywhere, north, East, down; what
-is not there is not used. A run is a [[position]] of session.toml from start_s, where
-the navigator began with its attitude entered and no velocity, to end_s.
+m/s, of the position ``pn``, ``pe``, ``pd`` in m from any origin, north, East, down;
+columns may be absent. A run is a [[position]] of session.toml from start_s, at which
+the navigator began with its entered attitude and zero velocity, to end_s.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ COLUMNS = (("ve", "vd", "vn"), ("pe", "pd", "pn"))
 """East, down, north: the order of the base axes of a base that points north."""
 
 INSTANTS = 24
-"""Of a run that are used, evenly from its start to its end."""
+"""Number of instants of a run that are used, at equal intervals."""
 
 SHORTEST_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
-    """All that was recorded.
+class NavigationSolution:
+    """The recorded navigation solution.
 
     Attributes
     ----------
@@ -42,26 +42,25 @@ class Solution:
     values: Array
 
     @property
-    def used(self) -> list[int]:
+    def recorded_columns(self) -> list[int]:
         """Columns that were recorded."""
         return np.flatnonzero(np.isfinite(self.values).any(axis=0)).tolist()
 
-    def turned(self, base: Array) -> Solution:
-        """In other axes, the rows of `base` (3, 3); what is not there stays so."""
+    def rotated(self, base: Array) -> NavigationSolution:
+        """Return it in other axes, the rows of `base` (3, 3); nan remains nan."""
         known = np.isfinite(self.values)
         both = np.nan_to_num(self.values).reshape(-1, 2, 3) @ base.T
-        return Solution(self.t, np.where(known, both.reshape(-1, 6), np.nan))
+        return NavigationSolution(self.t, np.where(known, both.reshape(-1, 6), np.nan))
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class NavigatorRun:
     """One run, at instants step, 2 step, ... from its start.
 
     Attributes
     ----------
     step : s
-    values : (m, 6) of the solution less what it began with: of the velocity nothing,
-        of the position where it was
+    values : (m, 6) velocity, and position less that at the start of the run
 
     """
 
@@ -69,8 +68,8 @@ class Run:
     values: Array
 
 
-def read(path: Path) -> Solution:
-    """Read the table.
+def read_solution(path: Path) -> NavigationSolution:
+    """Read a navigation solution from a text table.
 
     Raises
     ------
@@ -98,7 +97,7 @@ def read(path: Path) -> Solution:
     for i, name in enumerate(names):
         if name in heading:
             values[:, i] = table[:, heading.index(name)]
-    return Solution(t, values)
+    return NavigationSolution(t, values)
 
 
 def _numbers(path: Path, rows: Sequence[Sequence[str]], width: int) -> Array:
@@ -115,10 +114,10 @@ def _numbers(path: Path, rows: Sequence[Sequence[str]], width: int) -> Array:
     return out
 
 
-def runs(
-    solution: Solution, windows: Sequence[tuple[float, float] | None]
-) -> list[Run]:
-    """The runs of some windows, s.
+def runs_in_windows(
+    solution: NavigationSolution, windows: Sequence[tuple[float, float] | None]
+) -> list[NavigatorRun]:
+    """Cut a solution into runs, one for each window (start, end), s.
 
     Raises
     ------
@@ -144,5 +143,5 @@ def runs(
         at = start + step * np.arange(INSTANTS + 1)
         values = np.stack([np.interp(at, solution.t, v) for v in solution.values.T])
         begun = values[:, :1] * (np.arange(6) >= 3)[:, None]
-        out.append(Run(step, (values - begun).T[1:]))
+        out.append(NavigatorRun(step, (values - begun).T[1:]))
     return out

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fieldcal.calibration.wording import format_unit, format_with_sigma
-from fieldcal.report.blocks import Block, Section, Text, WarningBox, table
+from fieldcal.report.blocks import Paragraph, ReportBlock, Section, WarningBox, table
 from fieldcal.report.diagnosis import verdict_box
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.report.loose import (
     Json,
     format_number,
     list_at,
+    number_or_nan,
     objects_at,
-    real,
     table_at,
 )
 
@@ -24,20 +24,20 @@ DIRECTIONS = {
 }
 
 VERDICTS = {"left_out": "different"}
-"""What a verdict of a diagnosis is called of a comparison, where it is otherwise."""
+"""Names of verdicts that differ between a comparison and a diagnosis."""
 
 COLUMNS = ("what", "", "parameter", ">real", ">simulator", ">real − simulator", "±", "")
 
 
-def against(material: Material) -> Section | None:
+def against_section(material: ReportMaterial) -> Section | None:
     """Verdict, differences and prediction; None where nothing was compared."""
     found = material.against
     if found is None:
         return None
-    blocks: list[Block] = [verdict_box(found, VERDICTS)]
-    blocks.append(Text(f"Compared with {found.get('against', 'a simulator')}."))
+    blocks: list[ReportBlock] = [verdict_box(found, VERDICTS)]
+    blocks.append(Paragraph(f"Compared with {found.get('against', 'a simulator')}."))
     if said := str(found.get("says", "")):
-        blocks.append(Text(format_unit(said)))
+        blocks.append(Paragraph(format_unit(said)))
     rows = [row for one in objects_at(found, "differences") for row in _rows(one)]
     if rows:
         blocks.append(table("What differs", COLUMNS, rows))
@@ -54,7 +54,7 @@ def _rows(one: Json) -> Iterator[tuple[str, ...]]:
     for name in parameters:
         pair = table_at(parameters, name)
         off = table_at(pair, "difference")
-        value, sigma = real(off.get("value")), real(off.get("sigma"))
+        value, sigma = number_or_nan(off.get("value")), number_or_nan(off.get("sigma"))
         shown = (
             format_with_sigma(value, sigma)
             if value == value
@@ -73,8 +73,8 @@ def _rows(one: Json) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _prediction(found: Json) -> Block:
-    """How the recording is predicted, as the simulator is and patched."""
+def _prediction(found: Json) -> ReportBlock:
+    """How the simulator predicts the recording, without and with the patch."""
     columns = ("", ">rms m/s²", ">rms rad/s", ">χ²/dof")
     rows = []
     for label, key in (("simulator", "before"), ("patched", "after")):

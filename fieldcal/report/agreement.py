@@ -1,4 +1,4 @@
-"""Residuals by position, axis and temperature, and how the parameters hang together."""
+"""Residuals by position, axis and temperature, and correlations of the parameters."""
 
 from __future__ import annotations
 
@@ -7,28 +7,34 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.report.blocks import Block, Figure, Matrix, Section, Text
+from fieldcal.report.blocks import (
+    CorrelationMatrix,
+    Figure,
+    Paragraph,
+    ReportBlock,
+    Section,
+)
 from fieldcal.report.charts import SENSORS, Axis, Chart, Series
-from fieldcal.report.gather import Material
-from fieldcal.report.residuals import Residuals, residuals
+from fieldcal.report.gather import ReportMaterial
+from fieldcal.report.residuals import Residuals, window_residuals
 
 LEAST_WARMING = 0.05
-"""Difference of temperatures below which a chart over it says nothing, K."""
+"""Smallest range of temperature for which a chart over temperature is drawn, K."""
 
 STRONG = 0.9
-"""Correlation from which two parameters are named."""
+"""Smallest correlation that is listed."""
 
 
-def agreement(material: Material) -> Section | None:
+def agreement_section(material: ReportMaterial) -> Section | None:
     """Charts of the residuals; None without a calibration or windows."""
-    found = residuals(material)
+    found = window_residuals(material)
     if found is None:
         return None
-    blocks: list[Block] = []
+    blocks: list[ReportBlock] = []
     warm = found.temperature
     span = np.ptp(warm[np.isfinite(warm)]) if np.isfinite(warm).any() else 0.0
     for first, what, unit in SENSORS:
-        values = _values(found, first)
+        values = _rows_by_parameter(found, first)
         if not values:
             continue
         blocks.append(Figure(_by_position(found, values, what, unit), _caption(what)))
@@ -37,12 +43,14 @@ def agreement(material: Material) -> Section | None:
             blocks.append(Figure(chart, "The same over the temperature."))
     if not blocks:
         return None
-    blocks.insert(0, Text("What the calibration leaves of each window's average."))
+    blocks.insert(0, Paragraph("What the calibration leaves of each window's average."))
     return Section("residuals", "Residuals", tuple(blocks))
 
 
-def _values(found: Residuals, first: int) -> list[tuple[str, Array, Array, int]]:
-    """Name, residual, error and tone of what is known of a sensor."""
+def _rows_by_parameter(
+    found: Residuals, first: int
+) -> list[tuple[str, Array, Array, int]]:
+    """Name, residual, error and tone of each known channel of a sensor."""
     sigma = found.sigma
     out = [
         (CHANNELS[i], found.channel[:, i], sigma[:, i], i % 3 + 1)
@@ -111,31 +119,35 @@ def _alt(values: list[tuple[str, Array, Array, int]], unit: str) -> str:
     return "; ".join(said) + "."
 
 
-def correlation(material: Material) -> Section | None:
-    """The correlation matrix, and the pairs that are hard to tell apart."""
+def correlation_section(material: ReportMaterial) -> Section | None:
+    """The correlation matrix, and the strongly correlated pairs."""
     found = material.calibration
     if found is None or len(found.names) < 2:
         return None
-    r = correlations(found)
+    r = correlation_matrix(found)
     names = tuple(parameter_title(n) for n in found.names)
     short = tuple(str(i + 1) for i in range(len(names)))
-    matrix = Matrix(
+    matrix = CorrelationMatrix(
         "Correlations in hundredths; row and column numbers are the same",
         names,
         short,
         tuple(tuple(row) for row in r.tolist()),
     )
-    return Section("correlation", "Correlation", (Text(_strong(names, r)), matrix))
+    return Section(
+        "correlation",
+        "Correlation",
+        (Paragraph(_strong_correlations(names, r)), matrix),
+    )
 
 
-def correlations(found: Calibration) -> Array:
+def correlation_matrix(found: Calibration) -> Array:
     """Correlation matrix, (k, k); 0 where a parameter has no uncertainty."""
     size = np.where(found.sigma > 0, found.sigma, np.inf)
     r: Array = found.covariance / np.outer(size, size)
     return r
 
 
-def _strong(names: tuple[str, ...], r: Array) -> str:
+def _strong_correlations(names: tuple[str, ...], r: Array) -> str:
     pairs = np.argwhere(np.triu(np.abs(r) > STRONG, 1))
     if not len(pairs):
         return f"No two parameters are correlated by more than {STRONG}."

@@ -1,4 +1,4 @@
-"""What a page is made of: sections of texts, tables, charts and matrices.
+"""Blocks of a page: sections of texts, tables, charts and matrices.
 
 Sections are built by pure functions and know nothing of HTML; the template turns them
 into it and escapes every text.
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from fieldcal.report.charts import Chart, Record
+from fieldcal.report.charts import Chart, RecordingChart
 
 Tone = Literal["", "good", "warn", "bad"]
 
@@ -25,7 +25,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Paragraph:
     """A paragraph."""
 
     kind: ClassVar[str] = "text"
@@ -34,7 +34,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class WarningBox:
-    """Something the reader must not pass over."""
+    """A warning or a note in a box."""
 
     kind: ClassVar[str] = "note"
     text: str
@@ -53,15 +53,15 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A chart with what stands below it."""
+    """A chart with its caption."""
 
     kind: ClassVar[str] = "figure"
-    chart: Chart | Record
+    chart: Chart | RecordingChart
     caption: str
 
 
 @dataclass(frozen=True, slots=True)
-class Matrix:
+class CorrelationMatrix:
     """Correlations from -1 to 1, (k, k)."""
 
     kind: ClassVar[str] = "matrix"
@@ -80,23 +80,32 @@ class NameValues:
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
-    """A file as it stands."""
+class FileText:
+    """The text of a file, unchanged."""
 
     kind: ClassVar[str] = "code"
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Fold:
-    """Blocks that the reader opens when wanted; print shows them open."""
+class Collapsible:
+    """Blocks that are closed until the reader opens them; print shows them open."""
 
     kind: ClassVar[str] = "fold"
     summary: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[ReportBlock, ...]
 
 
-Block = Text | WarningBox | Table | Figure | Matrix | NameValues | Code | Fold
+ReportBlock = (
+    Paragraph
+    | WarningBox
+    | Table
+    | Figure
+    | CorrelationMatrix
+    | NameValues
+    | FileText
+    | Collapsible
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +114,7 @@ class Section:
 
     id: str
     title: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[ReportBlock, ...]
 
 
 def table(
@@ -123,10 +132,10 @@ def foldable_table(
     columns: Sequence[str],
     rows: Sequence[Sequence[str | Cell]],
     most: int,
-) -> list[Block]:
+) -> list[ReportBlock]:
     """A table of the first rows; the reader opens the rest."""
     first = table(caption, columns, rows[:most])
     if len(rows) <= most:
         return [first]
     rest = table(f"{caption}, continued", columns, rows[most:])
-    return [first, Fold(f"{len(rows) - most} more", (rest,))]
+    return [first, Collapsible(f"{len(rows) - most} more", (rest,))]

@@ -1,4 +1,4 @@
-"""Chromium without a window, spoken to over two pipes: a page as PDF, as picture.
+"""Headless Chromium, controlled over two pipes: a page as PDF or picture.
 
 The DevTools protocol over pipes needs no port and no library: JSON objects, each ended
 by a zero byte, on the file descriptors 3 (to the browser) and 4 (from it). Source:
@@ -35,17 +35,17 @@ OPTIONS = (
     *("--remote-debugging-pipe", "about:blank"),
 )
 
-PATIENCE = 60.0
+TIMEOUT_S = 60.0
 """Longest wait for an answer, s of the host's clock."""
 
 WIDTH = 1200
 """Width of a picture, CSS pixels."""
 
 _FREE = 10
-"""File descriptors from here on are not in the way of 3 and 4."""
+"""Lowest file descriptor that does not interfere with 3 and 4."""
 
 
-def find() -> str | None:
+def find_browser() -> str | None:
     """Path of a browser that can be used, None if there is none."""
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
@@ -65,7 +65,7 @@ class Browser:
     """
 
     def __init__(self) -> None:
-        program = find()
+        program = find_browser()
         if program is None:
             raise InputError(
                 "no Chromium was found, which makes PDF and PNG: install chromium, or"
@@ -82,11 +82,11 @@ class Browser:
             [program, f"--user-data-dir={self._folder.name}", *OPTIONS]
         )
         try:
-            target = self.ask("Target.createTarget", url="about:blank")["targetId"]
-            opened = self.ask("Target.attachToTarget", targetId=target, flatten=True)
+            target = self.call("Target.createTarget", url="about:blank")["targetId"]
+            opened = self.call("Target.attachToTarget", targetId=target, flatten=True)
             self._session = opened["sessionId"]
             for domain in ("Page", "Runtime", "Log", "Network"):
-                self.ask(f"{domain}.enable")
+                self.call(f"{domain}.enable")
         except BaseException:
             self.close()
             raise
@@ -94,14 +94,14 @@ class Browser:
     def open(self, page: Path) -> None:
         """Open a file and wait until it is loaded."""
         self.events.clear()
-        self.ask("Page.navigate", url=page.resolve().as_uri())
+        self.call("Page.navigate", url=page.resolve().as_uri())
         while not any(method == "Page.loadEventFired" for method, _ in self.events):
-            self._take()
+            self._read_messages()
 
     def pdf(self) -> bytes:
         """The page on A4 paper."""
         size = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
-        made = self.ask("Page.printToPDF", printBackground=True, **size)
+        made = self.call("Page.printToPDF", printBackground=True, **size)
         return base64.b64decode(made["data"])
 
     def png(self, width: int = WIDTH) -> bytes:
@@ -109,12 +109,12 @@ class Browser:
         self.resize(width, 900)
         height = self.value("document.documentElement.scrollHeight")
         self.resize(width, int(height))
-        made = self.ask("Page.captureScreenshot", captureBeyondViewport=True)
+        made = self.call("Page.captureScreenshot", captureBeyondViewport=True)
         return base64.b64decode(made["data"])
 
     def resize(self, width: int, height: int, mobile: bool = False) -> None:
         """Give the page another window, CSS pixels."""
-        self.ask(
+        self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width,
             height=height,
@@ -125,8 +125,8 @@ class Browser:
         self.value("new Promise(r => requestAnimationFrame(() => setTimeout(r, 50)))")
 
     def value(self, expression: str) -> Any:
-        """What a JavaScript expression gives on the page, promises waited for."""
-        found = self.ask(
+        """Evaluate a JavaScript expression on the page; promises are awaited."""
+        found = self.call(
             "Runtime.evaluate",
             expression=expression,
             returnByValue=True,
@@ -136,7 +136,7 @@ class Browser:
             raise InputError(f"the page failed: {found['exceptionDetails']}")
         return found["result"].get("value")
 
-    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Call a method of the protocol and wait for its answer."""
         self._next += 1
         message: dict[str, Any] = {
@@ -148,16 +148,16 @@ class Browser:
             message["sessionId"] = self._session
         os.write(self._to, json.dumps(message).encode() + b"\0")
         while True:
-            answer = self._take()
+            answer = self._read_messages()
             if answer.get("id") == self._next:
                 if "error" in answer:
                     raise InputError(f"Chromium: {method}: {answer['error']}")
                 result: dict[str, Any] = answer["result"]
                 return result
 
-    def _take(self) -> dict[str, Any]:
-        """The next message; events are kept."""
-        until = monotonic() + PATIENCE
+    def _read_messages(self) -> dict[str, Any]:
+        """Read the next message; events are kept."""
+        until = monotonic() + TIMEOUT_S
         while b"\0" not in self._rest:
             ready, _, _ = select.select([self._from], [], [], until - monotonic())
             data = os.read(self._from, 1 << 20) if ready else b""

@@ -54,7 +54,7 @@ class Series:
         for name in ("x", "y", "low", "high"):
             values = getattr(self, name)
             if values is not None:
-                out[name] = numbers(values)
+                out[name] = json_numbers(values)
         return out
 
 
@@ -72,7 +72,7 @@ class LabelledSpan:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class ChartMark:
     """An instant, or a level of the y axis, with a label."""
 
     at: float
@@ -89,7 +89,7 @@ class Chart:
     x: Axis
     y: Axis
     series: tuple[Series, ...]
-    levels: tuple[Mark, ...] = ()
+    levels: tuple[ChartMark, ...] = ()
     spans: tuple[LabelledSpan, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -107,7 +107,7 @@ class Chart:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class RecordingChart:
     """Channels of a recording over device time, one panel each, zoomed together.
 
     `means` (spans, panels) are drawn across the spans, nan where there is none.
@@ -121,7 +121,7 @@ class Record:
     store: Mapping[str, Any]
     spans: tuple[LabelledSpan, ...]
     means: Array
-    marks: tuple[Mark, ...]
+    marks: tuple[ChartMark, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Return the object the page reads."""
@@ -134,13 +134,13 @@ class Record:
             ],
             "x": asdict(Axis(self.clock, "s")),
             "store": self.store,
-            "means": [numbers(row) for row in self.means],
+            "means": [json_numbers(row) for row in self.means],
             "spans": [s.to_json() for s in self.spans],
             "marks": [asdict(m) for m in self.marks],
         }
 
 
-def numbers(values: Array | Sequence[float]) -> list[float | None]:
+def json_numbers(values: Array | Sequence[float]) -> list[float | None]:
     """JSON numbers, rounded; null where there is none."""
     return [
         float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None

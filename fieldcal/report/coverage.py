@@ -1,4 +1,4 @@
-"""Where gravity pointed in the device while it was held, and what was left out.
+"""Directions of gravity in the device, and the largest gap between them.
 
 A device that is held in any attitude is calibrated where gravity has been. The force
 that a calibration gives along a direction u is uncertain by
@@ -17,11 +17,11 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array
-from fieldcal.report.blocks import Block as ReportBlock
-from fieldcal.report.blocks import Figure, Section, Text
+from fieldcal.report.blocks import Figure, Paragraph, Section
+from fieldcal.report.blocks import ReportBlock as ReportBlock
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import Material
-from fieldcal.report.gravity_norm import true_forces
+from fieldcal.report.gather import ReportMaterial
+from fieldcal.report.gravity_norm import calibrated_forces
 
 GRID = 4000
 """Directions that are looked at: 3 degrees apart."""
@@ -29,7 +29,7 @@ GRID = 4000
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """The directions that a session has seen, in device axes.
+    """Directions of gravity in a session, in device axes.
 
     Attributes
     ----------
@@ -49,19 +49,19 @@ class Coverage:
     def of(cls, forces: Array, found: Calibration, gravity: float) -> Coverage:
         """Of forces (n, 3) at rest, whose calibration has bias and scale factors."""
         seen = forces / np.linalg.norm(forces, axis=1, keepdims=True)
-        everywhere = directions(GRID)
+        everywhere = sphere_directions(GRID)
         nearest = (everywhere @ seen.T).max(axis=1)
         worst = int(np.argmin(nearest))
-        sigma = uncertainty(found, gravity * everywhere)
+        sigma = force_sigma(found, gravity * everywhere)
         gap = float(np.rad2deg(np.arccos(np.clip(nearest[worst], -1.0, 1.0))))
         ends = (float(sigma[worst]), float(sigma.min()))
         return cls(seen, everywhere[worst], gap, ends)
 
 
-def directions(count: int) -> Array:
+def sphere_directions(count: int) -> Array:
     """Unit vectors evenly over the sphere, (count, 3), along a spiral of golden angle.
 
-    >>> float(np.abs(directions(500).mean(axis=0)).max()) < 0.01
+    >>> float(np.abs(sphere_directions(500).mean(axis=0)).max()) < 0.01
     True
     """
     k = np.arange(count) + 0.5
@@ -70,7 +70,7 @@ def directions(count: int) -> Array:
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), up])
 
 
-def uncertainty(found: Calibration, force: Array) -> Array:
+def force_sigma(found: Calibration, force: Array) -> Array:
     """Sigma of calibrated forces (n, 3), (n,) m/s^2, by bias and scale factors, (1)."""
     variance = np.zeros(len(force))
     for i, axis in enumerate("xyz"):
@@ -82,13 +82,13 @@ def uncertainty(found: Calibration, force: Array) -> Array:
     return sigma
 
 
-def coverage(material: Material) -> Section | None:
-    """A map of the sphere, where positions have no angles that would say it."""
+def coverage_section(material: ReportMaterial) -> Section | None:
+    """A map of the directions; None if all positions have known angles."""
     found, known = material.calibration, material.session.about.positions
     if found is None or all(p.oriented for p in known):
         return None
     wanted = {f"acc_{kind}.{axis}" for kind in ("bias", "scale") for axis in "xyz"}
-    seen = true_forces(material)
+    seen = calibrated_forces(material)
     if seen is None or not wanted <= set(found.names) or not np.isfinite(seen[0]).all():
         return None
     forces, gravity = seen
@@ -112,7 +112,7 @@ def coverage(material: Material) -> Section | None:
     )
     worst, best = there.sigma
     blocks: tuple[ReportBlock, ...] = (
-        Text(
+        Paragraph(
             f"{said[0].upper()}{said[1:]}. There the calibrated force is known to"
             f" ± {worst:.2g} m/s², at best in any direction to ± {best:.2g} m/s²."
         ),

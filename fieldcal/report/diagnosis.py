@@ -23,26 +23,26 @@ from fieldcal.core.samples import CHANNELS, common_unit
 from fieldcal.diagnosis.wording.lines import verdict_probability
 from fieldcal.report import evidence
 from fieldcal.report.blocks import (
-    Block,
     Cell,
     Figure,
     NameValues,
+    Paragraph,
+    ReportBlock,
     Section,
-    Text,
     Tone,
     WarningBox,
     foldable_table,
     table,
 )
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.report.loose import (
     Json,
     format_number,
     group_alike,
     list_at,
+    number_or_nan,
     objects_at,
-    real,
     table_at,
 )
 
@@ -60,42 +60,42 @@ TONES: dict[str, Tone] = {
 def verdict_box(
     found: Mapping[str, Any], called: Mapping[str, str] | None = None
 ) -> WarningBox:
-    """The verdict of a diagnosis, or as it is called else, with its probability."""
+    """The verdict of a diagnosis with its probability; `called` replaces its name."""
     verdict = str(found.get("verdict", "unknown"))
     named = len(objects_at(found, "lines"))
-    sure = verdict_probability(verdict, real(found.get("probability")), named)
+    sure = verdict_probability(verdict, number_or_nan(found.get("probability")), named)
     name = (called or {}).get(verdict, verdict).replace("_", " ")
     lead = f"{name.upper()}, {sure}"
     return WarningBox(lead, TONES.get(verdict, "warn"))
 
 
-def diagnosis(material: Material) -> Section | None:
-    """Verdict, what to do, effects, and why; None where no diagnosis was made."""
+def diagnosis_section(material: ReportMaterial) -> Section | None:
+    """Verdict, next steps, effects and reasons; None without a diagnosis."""
     found = material.diagnosis
     if found is None:
         return None
-    blocks: list[Block] = [verdict_box(found)]
-    blocks += evidence.next_steps(found)
+    blocks: list[ReportBlock] = [verdict_box(found)]
+    blocks += evidence.next_steps_table(found)
     blocks += _lines(objects_at(found, "lines"))
     effects = objects_at(found, "effects")
     if effects:
         blocks += _fit(table_at(found, "fit"))
     if said := str(found.get("says", "")):
-        blocks.append(Text(format_unit(said)))
+        blocks.append(Paragraph(format_unit(said)))
     blocks += [WarningBox(str(w)) for w in list_at(found, "warnings")]
     mismatch = objects_at(found, "mismatch")
     if mismatch:
         blocks += _mismatch(mismatch)
-    blocks += evidence.curves(objects_at(found, "curves"))
+    blocks += evidence.residual_curves(objects_at(found, "curves"))
     if effects:
         blocks.append(_effects(effects))
         blocks += _calibration(table_at(found, "calibration"))
-    blocks += evidence.replay(table_at(found, "twin"))
-    blocks += evidence.candidates(objects_at(found, "candidates"))
+    blocks += evidence.twin_replay(table_at(found, "twin"))
+    blocks += evidence.candidate_table(objects_at(found, "candidates"))
     return Section("diagnosis", "Diagnosis", tuple(blocks))
 
 
-def _lines(found: Sequence[Json]) -> list[Block]:
+def _lines(found: Sequence[Json]) -> list[ReportBlock]:
     """Each effect in one line, as the terminal shows it."""
     keys = ("what", "size", "sure", "does")
     rows = [[str(line.get(key, "")) for key in keys] for line in found]
@@ -103,18 +103,20 @@ def _lines(found: Sequence[Json]) -> list[Block]:
     return [table("What is left out", columns, rows)] if rows else []
 
 
-def _mismatch(rows: Sequence[Json]) -> list[Block]:
-    sigmas = [real(m.get("sigma")) for m in rows]
+def _mismatch(rows: Sequence[Json]) -> list[ReportBlock]:
+    sigmas = [number_or_nan(m.get("sigma")) for m in rows]
     most = max((s for s in sigmas if math.isfinite(s)), default=1.0) or 1.0
     cells: list[list[str | Cell]] = []
     for names, m in group_alike(rows, "channel"):
-        sigma = real(m.get("sigma"))
+        sigma = number_or_nan(m.get("sigma"))
         finite = math.isfinite(sigma)
         size = Cell(
             f"{sigma:.0f} σ" if finite else "beyond doubt",
             bar=math.sqrt(np.clip(sigma / most, 0.0, 1.0)) if finite else 1.0,
         )
-        span = dict.fromkeys(f"{real(m.get(k)):.1f}" for k in ("from_s", "to_s"))
+        span = dict.fromkeys(
+            f"{number_or_nan(m.get(k)):.1f}" for k in ("from_s", "to_s")
+        )
         cells.append(
             [
                 " ".join(names),
@@ -124,7 +126,7 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
                 ),
                 " – ".join(span),
                 str(m.get("covariate", "")),
-                _rms(names, real(m.get("rms"))),
+                _rms(names, number_or_nan(m.get("rms"))),
                 size,
             ]
         )
@@ -141,18 +143,20 @@ def _mismatch(rows: Sequence[Json]) -> list[Block]:
 
 
 def _rms(names: Sequence[str], rms: float) -> str:
-    """Size of a residual with its unit; sensors with different units have no common."""
+    """Size of a residual with its unit; empty if the sensors have different units."""
     unit = common_unit(names)
     return "–" if unit is None else f"{rms:.3g} {format_unit(unit)}".strip()
 
 
-def _effects(effects: Sequence[Json]) -> Block:
+def _effects(effects: Sequence[Json]) -> ReportBlock:
     rows = []
     for effect in effects:
         proof = table_at(effect, "evidence")
         weight = [
             format_number(proof.get("delta_chi2"), "{:.0f}"),
-            format_number(-100 * real(proof.get("held_out_gain")), "{:+.0f} %"),
+            format_number(
+                -100 * number_or_nan(proof.get("held_out_gain")), "{:+.0f} %"
+            ),
             ", ".join(str(a) for a in list_at(effect, "aliases")),
         ]
         values: list[tuple[str, Any]] = list(table_at(effect, "parameters").items())
@@ -169,14 +173,14 @@ def _effects(effects: Sequence[Json]) -> Block:
 def _quantity(quantity: object) -> tuple[str, str, str]:
     if not isinstance(quantity, Mapping):
         return "", "", ""
-    value, sigma = quantity.get("value"), real(quantity.get("sigma"))
+    value, sigma = quantity.get("value"), number_or_nan(quantity.get("sigma"))
     unit = format_unit(str(quantity.get("unit", "")))
     if not isinstance(value, int | float):
         return str(value if value is not None else ""), "", unit
     return (*format_with_sigma(float(value), sigma), unit)
 
 
-def _fit(fit: Json) -> list[Block]:
+def _fit(fit: Json) -> list[ReportBlock]:
     before, after = table_at(fit, "before"), table_at(fit, "after")
     if not before or not after:
         return []
@@ -186,8 +190,10 @@ def _fit(fit: Json) -> list[Block]:
         ("χ² per degree of freedom", "chi2_per_dof", "{:.2f}"),
         (f"held-out rms, {unit}", "held_out_rms", "{:.3g}"),
     ]
-    blocks: list[Block] = [
-        Text("How well the simulation does before and after the effects are added:"),
+    blocks: list[ReportBlock] = [
+        Paragraph(
+            "How well the simulation does before and after the effects are added:"
+        ),
         NameValues(
             tuple(
                 (
@@ -213,9 +219,12 @@ def _by_channel(before: Json, after: Json) -> Chart | None:
     x = np.arange(len(names), dtype=float)
     series = []
     for tone, (label, values) in ((2, ("before", first)), (1, ("after", then))):
-        y = np.array([real(values[c]) for c in names])
+        y = np.array([number_or_nan(values[c]) for c in names])
         series.append(Series(label, x, y, tone))
-    pairs = [f"{c} {real(first[c]):.2g} to {real(then[c]):.2g}" for c in names]
+    pairs = [
+        f"{c} {number_or_nan(first[c]):.2g} to {number_or_nan(then[c]):.2g}"
+        for c in names
+    ]
     return Chart(
         "diagnosis-channels",
         "Held out, before and after",
@@ -226,7 +235,7 @@ def _by_channel(before: Json, after: Json) -> Chart | None:
     )
 
 
-def _calibration(groups: Json) -> list[Block]:
+def _calibration(groups: Json) -> list[ReportBlock]:
     rows: list[list[str]] = []
     for name, group in groups.items():
         if not isinstance(group, Mapping):
@@ -235,7 +244,7 @@ def _calibration(groups: Json) -> list[Block]:
         triads = (list_at(group, k) for k in ("value", "sigma"))
         for axis, value, sigma in zip("xyz", *triads, strict=False):
             if isinstance(value, int | float):
-                format_number = format_with_sigma(float(value), real(sigma))
+                format_number = format_with_sigma(float(value), number_or_nan(sigma))
                 rows.append([f"{TITLES.get(name, name)} {axis}", *format_number, unit])
     if not rows:
         return []

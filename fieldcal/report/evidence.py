@@ -1,4 +1,4 @@
-"""How a diagnosis came about: residuals over covariates, what was tried, what next."""
+"""Evidence of a diagnosis: residuals over covariates, candidates, next steps."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ import numpy as np
 
 from fieldcal.calibration.wording import format_unit
 from fieldcal.core.samples import Array
-from fieldcal.report.blocks import Block, Cell, Figure, foldable_table, table
-from fieldcal.report.charts import Axis, Chart, Mark, Series
+from fieldcal.report.blocks import Cell, Figure, ReportBlock, foldable_table, table
+from fieldcal.report.charts import Axis, Chart, ChartMark, Series
 from fieldcal.report.loose import (
     Json,
     format_number,
     list_at,
+    number_or_nan,
     objects_at,
-    real,
     table_at,
 )
 
 MOST_CURVES = 6
 MOST_CANDIDATES = 12
-"""How many are shown; the rest of the candidates can be opened."""
+"""Largest numbers that are shown; the other candidates can be opened."""
 
 
-def curves(found: Sequence[Json]) -> list[Block]:
-    """Residual against what it follows, before and after."""
-    blocks: list[Block] = []
+def residual_curves(found: Sequence[Json]) -> list[ReportBlock]:
+    """Charts of the residual over its covariate, without and with the effects."""
+    blocks: list[ReportBlock] = []
     for i, curve in enumerate(found[:MOST_CURVES]):
         channel, covariate = (str(curve.get(k, "")) for k in ("channel", "covariate"))
-        x = np.array([real(v) for v in list_at(curve, "x")])
+        x = np.array([number_or_nan(v) for v in list_at(curve, "x")])
         x += covariate == "position"  # which is counted from 0 in the file
         sigma = _column(curve, "sigma", len(x))
         series = tuple(
@@ -54,7 +54,7 @@ def curves(found: Sequence[Json]) -> list[Block]:
 
 def _column(curve: Json, name: str, n: int) -> Array:
     """The numbers of a column, (n,); nan where they are missing."""
-    values = np.array([real(v) for v in list_at(curve, name)])
+    values = np.array([number_or_nan(v) for v in list_at(curve, name)])
     return values if len(values) == n else np.full(n, np.nan)
 
 
@@ -63,8 +63,8 @@ def _rms(series: Series) -> float:
     return float(np.sqrt((known**2).mean())) if known.size else np.nan
 
 
-def replay(twin: Json) -> list[Block]:
-    """The session replayed by the virtual device: by position, without and with."""
+def twin_replay(twin: Json) -> list[ReportBlock]:
+    """Residuals of the session replayed by the virtual device, by position."""
     places = objects_at(twin, "positions")
     x = np.arange(len(places), dtype=float)
     series = tuple(
@@ -83,7 +83,7 @@ def replay(twin: Json) -> list[Block]:
         Axis("position", names=names),
         Axis("χ² of a mean", log=True),
         series,
-        (Mark(1.0, "noise"),),
+        (ChartMark(1.0, "noise"),),
     )
     return [Figure(chart, "How far a simulation with its own physics is off.")]
 
@@ -94,19 +94,19 @@ def _number(index: object) -> str:
 
 
 def _agreement(places: Sequence[Json], name: str) -> Array:
-    chi2 = [real(table_at(p, name).get("chi2_per_mean")) for p in places]
+    chi2 = [number_or_nan(table_at(p, name).get("chi2_per_mean")) for p in places]
     return np.array([c if c > 0 else np.nan for c in chi2])
 
 
-def candidates(found: Sequence[Json]) -> list[Block]:
-    """The league table: every effect that was tried, and why it lost."""
+def candidate_table(found: Sequence[Json]) -> list[ReportBlock]:
+    """Table of every effect that was tried, with the reason if it was rejected."""
     columns = ("effect", ">Δχ²", ">ΔBIC", ">held-out rms", "why")
     rows: list[list[str | Cell]] = [
         [
             str(c.get("id", "")).replace("_", " "),
             format_number(c.get("delta_chi2"), "{:.0f}"),
             format_number(c.get("delta_bic"), "{:.0f}"),
-            format_number(-100 * real(c.get("held_out_gain")), "{:+.0f} %"),
+            format_number(-100 * number_or_nan(c.get("held_out_gain")), "{:+.0f} %"),
             Cell("chosen", "good")
             if c.get("chosen") is True
             else str(c.get("why", "")),
@@ -118,8 +118,8 @@ def candidates(found: Sequence[Json]) -> list[Block]:
     )
 
 
-def next_steps(found: Json) -> list[Block]:
-    """What to do in the field now, one row each."""
+def next_steps_table(found: Json) -> list[ReportBlock]:
+    """Table of the next steps in the field, one row each."""
     said = found.get("next")
     given = [said] if isinstance(said, str) else list_at(found, "next")
     rows: list[list[str | Cell]] = [[t] for t in dict.fromkeys(map(str, given)) if t]

@@ -1,4 +1,4 @@
-"""What a report is made from: the session's files, read once."""
+"""Input of a report: the session's files, read once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DIAGNOSIS = "diagnosis.json"
 AGAINST = "against.json"
 
 FAR = 1e6
-"""Device time from which on its digits hide what happens in a chart, s."""
+"""Device times above this are shown less their start, s: they have too many digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ class EarlierCalibration:
 
 
 @dataclass(frozen=True, slots=True)
-class Material:
-    """A session with what was derived from it.
+class ReportMaterial:
+    """A session with its results: the input of all sections.
 
     Attributes
     ----------
     session : the folder
     block : its samples, SI
-    still : averages of its windows; None where it has none that can be used
-    trouble : why there are none, empty otherwise
+    windows : averages of its windows; None where it has none that can be used
+    windows_error : why there are none, empty otherwise
     calibration : of result.json, None where it has not been solved
     diagnosis : of diagnosis.json, None where there is none
     marks : what happened, in order
@@ -58,8 +58,8 @@ class Material:
 
     session: Session
     block: Block
-    still: UsableWindows | None
-    trouble: str
+    windows: UsableWindows | None
+    windows_error: str
     calibration: Calibration | None
     diagnosis: Mapping[str, Any] | None
     marks: tuple[Mapping[str, Any], ...]
@@ -68,23 +68,25 @@ class Material:
 
     @property
     def epoch(self) -> float:
-        """What is taken off device times in charts: all but 0 for a clock of dates."""
+        """Offset that charts subtract from device times, s; 0 for small times."""
         start = float(self.block.t[0])
         return float(np.floor(start)) if abs(start) > FAR else 0.0
 
     @property
     def clock(self) -> str:
-        """What the time axis of a chart is called."""
+        """Label of the time axis of a chart."""
         return f"device time − {self.epoch:.0f}" if self.epoch else "device time"
 
     def position_name(self, row: int) -> str:
-        """Number of a position, and its name where it has one."""
+        """Number of a position, with its name if it has one."""
         name = self.session.positions[row].name
         number = row + 1
         return f"{number}" if name == f"position {number}" else f"{number} · {name}"
 
 
-def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Material:
+def gather(
+    folder: Path | str, earlier: Iterable[EarlierCalibration] = ()
+) -> ReportMaterial:
     """Read a session for its report.
 
     Raises
@@ -101,11 +103,11 @@ def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Ma
     except FieldcalError as error:
         trouble = str(error)
     result = _read(session.folder / RESULT)
-    return Material(
+    return ReportMaterial(
         session=session,
         block=block,
-        still=still,
-        trouble=trouble,
+        windows=still,
+        windows_error=trouble,
         calibration=None if result is None else _calibration(session, result),
         diagnosis=_read(session.folder / DIAGNOSIS),
         marks=tuple(session.marks()),
@@ -114,7 +116,7 @@ def gather(folder: Path | str, earlier: Iterable[EarlierCalibration] = ()) -> Ma
     )
 
 
-def earlier_result(path: Path) -> EarlierCalibration:
+def read_earlier_result(path: Path) -> EarlierCalibration:
     """A calibration from a session folder or a result.json.
 
     Raises

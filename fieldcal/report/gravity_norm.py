@@ -15,10 +15,10 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import UsableWindows, build_observations
-from fieldcal.report.blocks import Block as ReportBlock
-from fieldcal.report.blocks import Figure, Section, Text
+from fieldcal.report.blocks import Figure, Paragraph, Section
+from fieldcal.report.blocks import ReportBlock as ReportBlock
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.solve.observations import Observations
 
 
@@ -46,9 +46,9 @@ class NormErrors:
         return float(before), float(after)
 
 
-def true_forces(material: Material) -> tuple[Array, float] | None:
+def calibrated_forces(material: ReportMaterial) -> tuple[Array, float] | None:
     """Calibrated forces of the windows at rest, (n, 3), and gravity, m/s^2."""
-    held = _at_rest(material)
+    held = _windows_with_calibration(material)
     if held is None or material.calibration is None:
         return None
     _, seen = held
@@ -56,21 +56,23 @@ def true_forces(material: Material) -> tuple[Array, float] | None:
     return material.calibration.apply(recorded, seen.nominal).acc, seen.gravity
 
 
-def _at_rest(material: Material) -> tuple[UsableWindows, Observations] | None:
-    """The windows at rest, if there are accelerometers and a calibration of them."""
+def _windows_with_calibration(
+    material: ReportMaterial,
+) -> tuple[UsableWindows, Observations] | None:
+    """The windows at rest; None without accelerometers or their calibration."""
     found = material.calibration
-    if found is None or material.still is None or "acc_bias" not in found.groups:
+    if found is None or material.windows is None or "acc_bias" not in found.groups:
         return None
-    still = material.still.at_rest(material.session)
+    still = material.windows.at_rest(material.session)
     seen = build_observations(
         material.session.about, still.averages, still.position_numbers
     )
     return (still, seen) if seen.has_acc and len(seen) else None
 
 
-def norm_errors(material: Material) -> NormErrors | None:
-    """What the norms miss gravity by; None without accelerometers or a calibration."""
-    held, forces = _at_rest(material), true_forces(material)
+def norm_errors(material: ReportMaterial) -> NormErrors | None:
+    """Norms less gravity; None without accelerometers or a calibration."""
+    held, forces = _windows_with_calibration(material), calibrated_forces(material)
     if held is None or forces is None:
         return None
     (still, seen), (true, _) = held, forces
@@ -83,8 +85,8 @@ def norm_errors(material: Material) -> NormErrors | None:
     return NormErrors(still.position_numbers, before, after, np.sqrt(spread))
 
 
-def gravity_norm(material: Material) -> Section | None:
-    """A chart of both, by position."""
+def gravity_norm_section(material: ReportMaterial) -> Section | None:
+    """Chart of the norm less gravity, before and after calibration, by position."""
     errors = norm_errors(material)
     if errors is None or not np.isfinite([*errors.before, *errors.after]).all():
         return None
@@ -107,7 +109,7 @@ def gravity_norm(material: Material) -> Section | None:
         series,
     )
     blocks: tuple[ReportBlock, ...] = (
-        Text(
+        Paragraph(
             "At rest the accelerometers feel gravity and nothing else, wherever they"
             f" point. Their norm misses it by {said}."
         ),

@@ -1,4 +1,4 @@
-"""The device over the days: its parameters in earlier calibrations and now."""
+"""Parameters of the device in earlier calibrations and in this one."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from fieldcal.calibration import COMPONENTS, Calibration, compare
 from fieldcal.calibration.wording import TITLES, format_unit, parameter_title
 from fieldcal.core.errors import InputError
-from fieldcal.report.blocks import Block, Cell, Figure, Section, table
+from fieldcal.report.blocks import Cell, Figure, ReportBlock, Section, table
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import EarlierCalibration, Material
+from fieldcal.report.gather import EarlierCalibration, ReportMaterial
 
 
-def history(material: Material) -> Section | None:
-    """Each group over the calibrations; None where there is no earlier one."""
+def history_section(material: ReportMaterial) -> Section | None:
+    """Charts of each group over the calibrations; None without an earlier one."""
     now = material.calibration
     if now is None or not material.earlier:
         return None
     every = (*material.earlier, EarlierCalibration("now", now))
-    blocks: list[Block] = []
+    blocks: list[ReportBlock] = []
     for group in COMPONENTS:
         if any(group in e.calibration.groups for e in every):
             blocks.append(

@@ -1,4 +1,4 @@
-"""Reading JSON whose keys may be absent or of another kind: then there is nothing."""
+"""Reading of JSON whose keys may be absent or of another type: the result is empty."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ Json = Mapping[str, Any]
 
 
 def table_at(document: Json, key: str) -> Json:
-    """The object under a key; empty where there is none."""
+    """The object of a key; empty if absent."""
     value = document.get(key)
     return value if isinstance(value, Mapping) else {}
 
 
 def list_at(document: Json, key: str) -> list[Any]:
-    """The list under a key; empty where there is none."""
+    """The list of a key; empty if absent."""
     value = document.get(key)
     return value if isinstance(value, list) else []
 
 
 def objects_at(document: Json, key: str) -> list[Json]:
-    """The objects of the list under a key."""
+    """The objects in the list of a key."""
     return [item for item in list_at(document, key) if isinstance(item, Mapping)]
 
 
 def group_alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
-    """Objects that differ in one key only, together: all its values, and the first.
+    """Group objects that differ in one key only: all its values, and the first object.
 
     >>> rows = [{"at": 1, "of": "x"}, {"at": 1, "of": "y"}, {"at": 2, "of": "x"}]
     >>> group_alike(rows, "of")
@@ -42,10 +42,10 @@ def group_alike(rows: Sequence[Json], but: str) -> list[tuple[list[str], Json]]:
     return list(found.values())
 
 
-def real(value: object) -> float:
-    """A number, nan where there is none.
+def number_or_nan(value: object) -> float:
+    """A value as a number; nan if it is none.
 
-    >>> real(3), real(None), real("3")
+    >>> number_or_nan(3), number_or_nan(None), number_or_nan("3")
     (3.0, nan, nan)
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -54,10 +54,10 @@ def real(value: object) -> float:
 
 
 def format_number(value: object, form: str) -> str:
-    """A number as a text; a dash where there is none.
+    """A number as text; a dash if there is none.
 
     >>> format_number(0.5, "{:.2f}"), format_number(None, "{:.2f}")
     ('0.50', '–')
     """
-    number = real(value)
+    number = number_or_nan(value)
     return form.format(number) if math.isfinite(number) else "–"

@@ -1,4 +1,4 @@
-"""A page of a lot: how units differ, which are odd, what has shifted, drifts."""
+"""Page of a lot: spread of the units, odd units, shifts and control charts."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import numpy as np
 from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.fleet.capability import LotParameter
 from fieldcal.fleet.control import ControlChart
-from fieldcal.fleet.lot import Lot
+from fieldcal.fleet.lot import LotAnalysis
 from fieldcal.report.blocks import (
-    Block,
     Cell,
     Figure,
     NameValues,
+    Paragraph,
+    ReportBlock,
     Section,
     Table,
-    Text,
     Tone,
     table,
 )
-from fieldcal.report.charts import Axis, Chart, Mark, Series
-from fieldcal.report.overview import Head
-from fieldcal.report.page import rendered
+from fieldcal.report.charts import Axis, Chart, ChartMark, Series
+from fieldcal.report.overview import PageHeader
+from fieldcal.report.page import render_page
 
 
-def page(found: Lot, query: str) -> str:
-    """The page as HTML; `query` says which lot it is."""
-    share, low, high = (100 * part for part in found.share)
+def render_lot_page(found: LotAnalysis, query: str) -> str:
+    """Render the analysis of a lot as HTML; `query` names the lot."""
+    share, low, high = (100 * part for part in found.yield_share)
     facts = NameValues(
         (
             ("units", f"{len(found.units)}"),
@@ -35,16 +35,17 @@ def page(found: Lot, query: str) -> str:
             ("yield", f"{share:.1f} % (95 %: {low:.1f} to {high:.1f} %)"),
         )
     )
+    rate = 100 * found.false_discovery_rate
     says = (
         "Spreads are those of the units, with the uncertainty of each taken off; of a"
-        f" unit the last good session counts. Among odd units {100 * found.rate:.3g} %"
+        f" unit the last good session counts. Among odd units {rate:.3g} %"
         " are expected to be false."
     )
-    top = Head(
+    top = PageHeader(
         query, "", _verdict(found), "good" if found.in_control else "warn", says,
         facts, "IMUs of a lot",
     )  # fmt: skip
-    return rendered(
+    return render_page(
         top,
         [
             Section("odd", "Odd units", (_odd(found),)),
@@ -60,8 +61,8 @@ def page(found: Lot, query: str) -> str:
     )
 
 
-def _verdict(found: Lot) -> str:
-    """What there is to look at."""
+def _verdict(found: LotAnalysis) -> str:
+    """Headline of the page, and its tone."""
     if found.in_control:
         return "in control"
     shifted = {(one.parameter, one.level) for one in found.shifts}
@@ -73,21 +74,21 @@ def _verdict(found: Lot) -> str:
     return ", ".join(f"{n} {what}{'s' * (n > 1)}" for n, what in counts if n)
 
 
-def _odd(found: Lot) -> Table | Text:
+def _odd(found: LotAnalysis) -> Table | Paragraph:
     if not found.odd:
-        return Text("No unit is out of family.")
+        return Paragraph("No unit is out of family.")
     rows = []
     for one in found.odd:
-        off = " ± ".join(format_with_sigma(one.off, one.sigma))
+        off = " ± ".join(format_with_sigma(one.deviation, one.sigma))
         unit = format_unit(found.parameters[one.parameter].unit)
         rows.append(
-            [one.serial, one.parameter, off, unit, f"{one.chance:.1g}", one.folder]
+            [one.serial, one.parameter, off, unit, f"{one.probability:.1g}", one.folder]
         )
     columns = ("unit", "parameter", ">off by", "", ">chance", "session")
     return table("Out of family, by the oddest parameter", columns, rows)
 
 
-def _shifts(found: Lot) -> list[Block]:
+def _shifts(found: LotAnalysis) -> list[ReportBlock]:
     rows: list[list[str | Cell]] = []
     for one in found.shifts:
         unit = format_unit(found.parameters[one.parameter].unit)
@@ -101,15 +102,15 @@ def _shifts(found: Lot) -> list[Block]:
     for alarm in found.alarms:
         rows.append([alarm.parameter, f"time, {alarm.chart}", alarm.at, "", "", ""])
     if not rows:
-        return [Text("Nothing differs by lot, station or operator, or drifts.")]
+        return [Paragraph("Nothing differs by lot, station or operator, or drifts.")]
     columns = ("parameter", "by", "group", ">shift", "", ">probability")
     return [table("Against the mean of all", columns, rows)]
 
 
-def _spreads(found: Lot) -> Table:
+def _spreads(found: LotAnalysis) -> Table:
     rows = []
     for one in found.parameters.values():
-        about = one.about
+        about = one.distribution
         cp = "" if one.cp is None else f"{one.cp:.2f} ± {one.cp_sigma:.2f}"
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
         rows.append(
@@ -133,15 +134,17 @@ def _spreads(found: Lot) -> Table:
     return table("Process capability", columns, rows)
 
 
-def _values(found: Lot, one: LotParameter) -> Figure:
+def _values(found: LotAnalysis, one: LotParameter) -> Figure:
     """Units in the order of time, with their own ±."""
-    about, unit = one.about, format_unit(one.unit)
+    about, unit = one.distribution, format_unit(one.unit)
     at = np.arange(len(one.x), dtype=float)
     seen = Series(
         one.name, at, one.x, 1, "points", one.x - one.sigma, one.x + one.sigma
     )
-    levels = [Mark(about.mean, "mean")]
-    levels += [Mark(about.mean + s * about.spread, f"{s:+d} spreads") for s in (-3, 3)]
+    levels = [ChartMark(about.mean, "mean")]
+    levels += [
+        ChartMark(about.mean + s * about.spread, f"{s:+d} spreads") for s in (-3, 3)
+    ]
     alt = (
         f"{len(one.x)} units; mean {about.mean:.4g}, spread {about.spread:.2g} {unit}."
     )
@@ -152,15 +155,15 @@ def _values(found: Lot, one: LotParameter) -> Figure:
     return Figure(chart, "Bars are each unit's own ± 1σ.")
 
 
-def _units(found: Lot, one: LotParameter) -> Axis:
-    """The units that have a parameter, by their serial numbers."""
-    serials = tuple(found.units[i].serial for i in one.units.tolist())
+def _units(found: LotAnalysis, one: LotParameter) -> Axis:
+    """Serial numbers of the units that have a parameter."""
+    serials = tuple(found.units[i].serial for i in one.unit_numbers.tolist())
     return Axis("unit, in order of time", names=serials)
 
 
-def _control(found: Lot) -> list[Block]:
-    out: list[Block] = [
-        Text(
+def _control(found: LotAnalysis) -> list[ReportBlock]:
+    out: list[ReportBlock] = [
+        Paragraph(
             "Of standardised values; the limits are such that 5 of 100 lots in control"
             " have an alarm on any chart."
         )
@@ -171,7 +174,7 @@ def _control(found: Lot) -> list[Block]:
     return out
 
 
-def _chart(found: Lot, one: LotParameter, chart: ControlChart) -> Chart:
+def _chart(found: LotAnalysis, one: LotParameter, chart: ControlChart) -> Chart:
     at = np.arange(len(chart.values), dtype=float)
     limits = [
         Series(f"limit {sign:+d}", at, sign * chart.limit, 2, "line")

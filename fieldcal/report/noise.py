@@ -1,4 +1,4 @@
-"""What averaging can reach: the Allan deviation of the longest stretch at rest."""
+"""Effect of averaging: the Allan deviation of the longest stretch at rest."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from fieldcal.calibration import over_time
 from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS
-from fieldcal.report.blocks import Block as Part
-from fieldcal.report.blocks import Figure, Section, Table, Text, table
+from fieldcal.report.blocks import Figure, Paragraph, Section, Table, table
+from fieldcal.report.blocks import ReportBlock as Part
 from fieldcal.report.charts import SENSORS, Axis, Chart, Series
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.session.noise_file import read_noise
 from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
 from fieldcal.windows.stretches import still_stretches
 
 MOST = 1_000_000
-"""Samples that are looked at: more cost seconds and tell little."""
+"""Largest number of samples that is evaluated; more take seconds and add little."""
 
 
-def noise(material: Material) -> Section:
-    """Allan deviation of accelerometers and gyroscopes, and what noise.json tells."""
+def noise_section(material: ReportMaterial) -> Section:
+    """Allan deviation of both triads, and the contents of noise.json."""
     section = _of_recording(material)
     more: list[Part] = []
     found = read_noise(material.session.folder)
     if found is not None:
-        more.append(averaging(found))
+        more.append(averaging_advice(found))
     if material.calibration is not None and "over_time" in material.calibration.info:
-        more += by_parameter(material.calibration.info["over_time"])
+        more += allan_blocks_by_parameter(material.calibration.info["over_time"])
     return replace(section, blocks=(*section.blocks, *more))
 
 
-def by_parameter(told: Mapping[str, Any]) -> list[Part]:
-    """Each parameter against the averaging time, of the content of a result.json."""
+def allan_blocks_by_parameter(told: Mapping[str, Any]) -> list[Part]:
+    """Charts of each parameter's ± over the averaging time, from result.json."""
     first, *times, unit = over_time.heading(told)
     columns = (first, *(f">{time}" for time in times), unit)
     caption = "± of each parameter by averaging time, of the first part of each window"
-    texts = [Text(f"{s[0].upper()}{s[1:]}.") for s in over_time.sentences(told)]
+    texts = [Paragraph(f"{s[0].upper()}{s[1:]}.") for s in over_time.sentences(told)]
     return [table(caption, columns, over_time.rows(told)), *texts]
 
 
-def averaging(found: Mapping[str, Any]) -> Table:
-    """How long to average, of the content of a noise.json."""
+def averaging_advice(found: Mapping[str, Any]) -> Table:
+    """Recommended averaging time, from noise.json."""
     every = [(name, c, c["averaging"]) for name, c in found["channels"].items()]
     windows = sorted({s for _, _, told in every for s in told["seconds"]})
     rows = []
@@ -68,13 +68,13 @@ def averaging(found: Mapping[str, Any]) -> Table:
     return table(caption, (*columns, "unit"), rows)
 
 
-def _of_recording(material: Material) -> Section:
-    """Allan deviation of the session's longest stretch, or why there is none."""
+def _of_recording(material: ReportMaterial) -> Section:
+    """Allan deviation of the session's longest stretch, or the reason for none."""
     span = _longest(material)
     parts: tuple[Part, ...]
     if span[1] - span[0] < SHORTEST:
         parts = (
-            Text(
+            Paragraph(
                 f"The longest stretch at rest lasts {span[1] - span[0]:.0f} s. Record"
                 f" {SHORTEST:.0f} s or more at rest to see how far averaging helps."
             ),
@@ -85,16 +85,16 @@ def _of_recording(material: Material) -> Section:
         found = allan_deviation(block)
         levels = _table(found)
     except InputError as error:
-        parts = (Text(f"No Allan deviation: {error}."),)
+        parts = (Paragraph(f"No Allan deviation: {error}."),)
     else:
         where = f"From {block.t[0]:.0f} to {block.t[-1]:.0f} s of device time."
         parts = (*_figures(found, where), levels)
     return Section("noise", "Noise", parts)
 
 
-def _longest(material: Material) -> tuple[float, float]:
-    """The longest stretch at rest: a window, or what can be found."""
-    still = material.still
+def _longest(material: ReportMaterial) -> tuple[float, float]:
+    """The longest stretch at rest: a window, or else a stretch found by search."""
+    still = material.windows
     spans = [(a.start, a.end) for a in still.averages] if still is not None else []
     best = max(spans, key=_length, default=(0.0, 0.0))
     whole = float(material.block.t[-1] - material.block.t[0])

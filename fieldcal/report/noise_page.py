@@ -1,4 +1,4 @@
-"""A page of the noise of a device: curves with their bands, sizes, what follows."""
+"""Page of the noise of a device: curves with bands, sizes and consequences."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.noise.document import NoiseResult
 from fieldcal.noise.estimate import ChannelEstimate
 from fieldcal.noise.wording import PROCESSES, TRIADS, consequences, value_or_bound
-from fieldcal.report.blocks import Block as Part
-from fieldcal.report.blocks import Figure, NameValues, Section, Table, Text, table
+from fieldcal.report.blocks import Figure, NameValues, Paragraph, Section, Table, table
+from fieldcal.report.blocks import ReportBlock as Part
 from fieldcal.report.charts import Chart, Series
-from fieldcal.report.noise import allan_chart, averaging
-from fieldcal.report.overview import Head
-from fieldcal.report.page import rendered
+from fieldcal.report.noise import allan_chart, averaging_advice
+from fieldcal.report.overview import PageHeader
+from fieldcal.report.page import render_page
 
 
-def page(found: NoiseResult) -> str:
-    """The page as HTML."""
+def render_noise_page(found: NoiseResult) -> str:
+    """Render the noise of a device as HTML."""
     model = found.model
     name = str(found.device.get("name", "noise at rest"))
     facts = NameValues(
@@ -34,13 +34,17 @@ def page(found: NoiseResult) -> str:
         "Points are what was measured, lines what the processes say, with the band"
         " that holds 68 of 100 recordings of this length."
     )
-    top = Head(name, " · ".join(found.sessions), "noise", "", says, facts, "IMU noise")
-    return rendered(
+    top = PageHeader(
+        name, " · ".join(found.sessions), "noise", "", says, facts, "IMU noise"
+    )
+    return render_page(
         top,
         [
             Section("allan", "Allan deviation", tuple(_figures(found))),
             Section("processes", "Processes", (_processes(found),)),
-            Section("averaging", "How long to average", (averaging(found.to_json()),)),
+            Section(
+                "averaging", "How long to average", (averaging_advice(found.to_json()),)
+            ),
             Section("filters", "What follows", (*_follows(found), _programs(found))),
         ],
     )
@@ -90,7 +94,7 @@ def _named(process: str) -> str:
 
 
 def _follows(found: NoiseResult) -> list[Part]:
-    return [Text(f"{text[0].upper()}{text[1:]}.") for text in consequences(found)]
+    return [Paragraph(f"{text[0].upper()}{text[1:]}.") for text in consequences(found)]
 
 
 def _programs(found: NoiseResult) -> Table:

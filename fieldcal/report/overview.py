@@ -17,17 +17,17 @@ from fieldcal.core.samples import Block as SampleBlock
 from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.model import thresholds
 from fieldcal.report.blocks import (
-    Block,
     Cell,
     NameValues,
+    Paragraph,
+    ReportBlock,
     Section,
     Table,
-    Text,
     Tone,
     WarningBox,
     table,
 )
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.report.gravity_norm import norm_errors
 from fieldcal.report.loose import list_at, objects_at, table_at
 
@@ -36,20 +36,20 @@ WIDEST = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
-    """What stands on top of the page."""
+class PageHeader:
+    """Header of the page."""
 
     name: str
-    under: str
+    subtitle: str
     verdict: str
     tone: Tone
-    says: str
+    advice: str
     facts: NameValues
     kind: str = "IMU calibration report"
 
 
-def head(material: Material) -> Head:
-    """Name of the device, verdict and the facts one looks for first."""
+def page_header(material: ReportMaterial) -> PageHeader:
+    """Name of the device, verdict and main facts."""
     about, found = material.session.about, material.calibration
     folder = material.session.folder.resolve().name
     name = str(about.device.get("name") or folder)
@@ -57,13 +57,13 @@ def head(material: Material) -> Head:
     under = [folder] if folder != name else []
     under += [f"serial {serial}"] if serial else []
     verdict, tone, says = _verdict(found, "nominal" in about.raw, about.nominal)
-    return Head(name, " · ".join(under), verdict, tone, says, _facts(material))
+    return PageHeader(name, " · ".join(under), verdict, tone, says, _facts(material))
 
 
 def _verdict(
     found: Calibration | None, known: bool, nominal: Mapping[str, Array]
 ) -> tuple[str, Tone, str]:
-    """Verdict, its tone, and what to do; a decision by limits goes before.
+    """Verdict, its tone, and advice; a decision by limits takes precedence.
 
     `known` says that `nominal` is the calibration in use, and not that of any device.
     """
@@ -79,12 +79,14 @@ def _verdict(
         return "bad", "bad", "Do not use these numbers."
     says = "Apply it: the numbers hold within their ±."
     if known:
-        says = _compared(found, nominal)
+        says = _advice_on_calibration_in_use(found, nominal)
     return "go" if decision.get("go") is True else "good", "good", says
 
 
-def _compared(found: Calibration, nominal: Mapping[str, Array]) -> str:
-    """Whether the calibration in use has to be changed, and by what most of all."""
+def _advice_on_calibration_in_use(
+    found: Calibration, nominal: Mapping[str, Array]
+) -> str:
+    """Advice whether to change the calibration in use, with the largest change."""
     names = [n for n in found.names if ParameterName.of(n).group in nominal]
     at = [found.names.index(n) for n in names]
     old = [nominal[p.group][p.axis] for p in map(ParameterName.of, names)]
@@ -106,16 +108,16 @@ def _compared(found: Calibration, nominal: Mapping[str, Array]) -> str:
     )
 
 
-def _facts(material: Material) -> NameValues:
+def _facts(material: ReportMaterial) -> NameValues:
     block, found = material.block, material.calibration
     span = float(block.t[-1] - block.t[0])
     facts = [
         ("recorded", f"{_duration(span)}, {len(block):,} samples"),
         ("rate", _rate(block)),
     ]
-    if material.still is not None:
+    if material.windows is not None:
         taken, of = (
-            len(material.still.position_numbers),
+            len(material.windows.position_numbers),
             len(material.session.positions),
         )
         facts.append(("positions", f"{taken} of {of}" if taken < of else f"{of}"))
@@ -151,18 +153,18 @@ def _rate(block: SampleBlock) -> str:
     return f"{found.rate_hz:.4g} Hz, {many}"
 
 
-def calibration(material: Material) -> Section | None:
-    """The parameters with their uncertainties, and what the reader must know."""
+def calibration_section(material: ReportMaterial) -> Section | None:
+    """The parameters with their uncertainties, and warnings."""
     found = material.calibration
     if found is None:
         return None
-    blocks: list[Block] = [_parameters(found, material.session.about.nominal)]
+    blocks: list[ReportBlock] = [_parameters(found, material.session.about.nominal)]
     if found.warnings:
         blocks += [WarningBox(w) for w in found.warnings]
     blocks += _checks(found)
-    left = _without(found)
+    left = _missing_calibration_blocks(found)
     if left:
-        blocks.append(Text(left))
+        blocks.append(Paragraph(left))
     return Section("calibration", "Calibration", tuple(blocks))
 
 
@@ -195,8 +197,8 @@ def _parameters(found: Calibration, nominal: Mapping[str, Array]) -> Table:
     return table(caption, columns, rows)
 
 
-def _checks(found: Calibration) -> list[Block]:
-    """What a decision by limits looked at; none where there was no decision."""
+def _checks(found: Calibration) -> list[ReportBlock]:
+    """Checks of a decision by limits; none without a decision."""
     marks: dict[object, Cell] = {
         True: Cell("kept", "good"),
         False: Cell("not kept", "bad"),
@@ -214,8 +216,8 @@ def _checks(found: Calibration) -> list[Block]:
     return [table("Limits", ("limit", "", "found"), rows)] if rows else []
 
 
-def _without(found: Calibration) -> str:
-    """What the reader gets instead of numbers that are not there."""
+def _missing_calibration_blocks(found: Calibration) -> str:
+    """Blocks that explain why there is no calibration."""
     missing = [g for g in ("acc_scale", "gyr_scale") if g not in found.groups]
     if not missing:
         return ""

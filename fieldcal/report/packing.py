@@ -35,7 +35,7 @@ MISSING = 65535
 
 BASE_BYTES = 3_200_000
 DETAIL_BYTES = 1_300_000
-"""What the page may hold of each, base64."""
+"""Largest size of each in the page, base64."""
 
 _TEXT = 4 / 3
 _VALUE = (2 + 8 / PIECE) * _TEXT
@@ -47,14 +47,16 @@ LONGEST = 4000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class ChannelTable:
     """Channels over time: t (n,) s, values (n, c); nan where missing."""
 
     t: Array
     values: Array
 
 
-def pack(columns: Columns, closely: Iterable[tuple[float, float]]) -> dict[str, Any]:
+def pack(
+    columns: ChannelTable, closely: Iterable[tuple[float, float]]
+) -> dict[str, Any]:
     """Pack a recording.
 
     Parameters
@@ -70,15 +72,15 @@ def pack(columns: Columns, closely: Iterable[tuple[float, float]]) -> dict[str, 
     if len(t) * sample <= BASE_BYTES and span < LONGEST:
         return {"base": _samples(columns), "details": []}
     bins = int(BASE_BYTES / (2 * c * _VALUE))
-    wanted = _chosen(columns, closely, DETAIL_BYTES / sample)
+    wanted = _select_stretches(columns, closely, DETAIL_BYTES / sample)
     details = [_samples(part) for part in wanted]
     return {"base": _bins(columns, bins), "details": details}
 
 
-def _chosen(
-    columns: Columns, closely: Iterable[tuple[float, float]], most: float
-) -> list[Columns]:
-    """Stretches that fit into `most` samples, in order of time, none twice."""
+def _select_stretches(
+    columns: ChannelTable, closely: Iterable[tuple[float, float]], most: float
+) -> list[ChannelTable]:
+    """Select stretches of `most` samples in all, in order of time, without overlap."""
     taken = np.zeros(len(columns.t) + 1, dtype=bool)
     left = most
     for start, end in closely:
@@ -92,21 +94,23 @@ def _chosen(
     paused = np.flatnonzero(np.diff(columns.t) > LONGEST / 2) + 1
     inside = paused[taken[paused - 1] & taken[paused]]
     pairs = np.sort(np.concatenate([edges, inside, inside])).reshape(-1, 2)
-    return [Columns(columns.t[a:b], columns.values[a:b]) for a, b in pairs if b - a > 1]
+    return [
+        ChannelTable(columns.t[a:b], columns.values[a:b]) for a, b in pairs if b - a > 1
+    ]
 
 
-def _samples(columns: Columns) -> dict[str, Any]:
+def _samples(columns: ChannelTable) -> dict[str, Any]:
     start = float(columns.t[0])
     times = np.round((columns.t - start) * 1e6).astype("<u4")
     return {
         "start": start,
         "n": len(times),
         "times": _text(times),
-        "low": [quantised(v) for v in columns.values.T],
+        "low": [quantise(v) for v in columns.values.T],
     }
 
 
-def _bins(columns: Columns, n: int) -> dict[str, Any]:
+def _bins(columns: ChannelTable, n: int) -> dict[str, Any]:
     t = columns.t
     start, dt = float(t[0]), float(t[-1] - t[0]) / n * (1 + 1e-12)
     index = np.minimum((t - start) // dt, n - 1).astype(int)
@@ -118,12 +122,12 @@ def _bins(columns: Columns, n: int) -> dict[str, Any]:
         "start": start,
         "n": n,
         "dt": dt,
-        "low": [quantised(v) for v in low.T],
-        "high": [quantised(v) for v in high.T],
+        "low": [quantise(v) for v in low.T],
+        "high": [quantise(v) for v in high.T],
     }
 
 
-def quantised(values: Array) -> dict[str, str]:
+def quantise(values: Array) -> dict[str, str]:
     """Values (n,) as 16 bit whole numbers with their offsets and steps, base64."""
     n = len(values)
     table = np.full((-(-n // PIECE), PIECE), np.nan)

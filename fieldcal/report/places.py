@@ -1,45 +1,45 @@
-"""Where the device was: angles asked for, and angles its accelerometers show."""
+"""Positions of the device: stated angles, and angles that accelerometers measure."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fieldcal.calibration.wording import format_with_sigma
-from fieldcal.report.blocks import Block, Figure, Section, Table, table
+from fieldcal.report.blocks import Figure, ReportBlock, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.gather import Material
-from fieldcal.report.residuals import MeasuredAngles, reached
+from fieldcal.report.gather import ReportMaterial
+from fieldcal.report.residuals import MeasuredAngles, measured_angles
 
 
-def places(material: Material) -> Section | None:
+def positions_section(material: ReportMaterial) -> Section | None:
     """A chart of the positions in alpha and beta, and the angles with their ±."""
-    where = reached(material)
+    where = measured_angles(material)
     if where is None:
         return None
-    blocks: list[Block] = [Figure(_chart(where), _caption(where, material))]
-    if np.isfinite(where.asked).any():
+    blocks: list[ReportBlock] = [Figure(_chart(where), _caption(where, material))]
+    if np.isfinite(where.stated).any():
         blocks.append(Figure(_misses(where), "Angle shown less angle asked for."))
     blocks.append(_table(where, material))
     return Section("positions", "Where the device was", tuple(blocks))
 
 
-def _caption(where: MeasuredAngles, material: Material) -> str:
+def _caption(where: MeasuredAngles, material: ReportMaterial) -> str:
     said = "Angles by the accelerometers"
     by = "calibrated" if material.calibration is not None else "nominal calibration"
-    if np.isfinite(where.asked).any():
+    if np.isfinite(where.stated).any():
         return f"{said} ({by}). They include the tilt of the base."
     return f"{said} ({by}); no angles were asked for, so they serve to see the spread."
 
 
 def _chart(where: MeasuredAngles) -> Chart:
     series = [
-        Series("shown", where.shown[:, 0], where.shown[:, 1], 1),
+        Series("shown", where.measured[:, 0], where.measured[:, 1], 1),
     ]
-    known = np.isfinite(where.asked).all(axis=1)
+    known = np.isfinite(where.stated).all(axis=1)
     if known.any():
-        asked = where.asked[known]
+        asked = where.stated[known]
         series.insert(0, Series("asked for", asked[:, 0], asked[:, 1], 6))
-    listed = ", ".join(f"({a:.1f}°, {b:.1f}°)" for a, b in where.shown)
+    listed = ", ".join(f"({a:.1f}°, {b:.1f}°)" for a, b in where.measured)
     return Chart(
         "places",
         "Positions in α and β",
@@ -51,7 +51,7 @@ def _chart(where: MeasuredAngles) -> Chart:
 
 
 def _misses(where: MeasuredAngles) -> Chart:
-    off = (where.shown - where.asked + 180) % 360 - 180
+    off = (where.measured - where.stated + 180) % 360 - 180
     x = np.arange(len(where.rows), dtype=float)
     series = tuple(
         Series(
@@ -75,10 +75,10 @@ def _misses(where: MeasuredAngles) -> Chart:
     )
 
 
-def _table(where: MeasuredAngles, material: Material) -> Table:
+def _table(where: MeasuredAngles, material: ReportMaterial) -> Table:
     rows = []
     for row, asked, shown, sigma in zip(
-        where.rows, where.asked, where.shown, where.sigma, strict=True
+        where.rows, where.stated, where.measured, where.sigma, strict=True
     ):
         cells = [material.position_name(row)]
         cells += [f"{a:g}" if np.isfinite(a) else "–" for a in asked]

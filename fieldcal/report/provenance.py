@@ -1,4 +1,4 @@
-"""Where the numbers come from: versions, place, events, and the files with hashes."""
+"""Origin of the numbers: versions, site, events, and files with hashes."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from typing import Any
 
 from fieldcal.core.version import __version__
 from fieldcal.report.blocks import (
-    Block,
-    Code,
-    Fold,
+    Collapsible,
+    FileText,
     NameValues,
+    ReportBlock,
     Section,
     WarningBox,
     table,
 )
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.session.folder import DESCRIPTION
 
 OWN = ("report.html", "report.png", "report.pdf")
 """Files that the report itself makes."""
 
 MOST_EVENTS = 500
-"""Events that are listed; the first ones of more."""
+"""Largest number of events that is listed, from the first."""
 
 
-def provenance(material: Material, made: datetime) -> Section:
-    """Versions, configuration, what happened, and SHA-256 of every file."""
+def provenance_section(material: ReportMaterial, made: datetime) -> Section:
+    """Versions, configuration, events, and SHA-256 of every file."""
     session, found = material.session, material.calibration
     about = session.about
     by = str(found.info.get("software", "")) if found is not None else ""
@@ -45,12 +45,12 @@ def provenance(material: Material, made: datetime) -> Section:
         ("mounting", ", ".join(about.axes)),
         ("grade", about.grade),
     ]
-    blocks: list[Block] = [WarningBox(w) for w in session.warnings]
+    blocks: list[ReportBlock] = [WarningBox(w) for w in session.warnings]
     blocks += [NameValues(tuple(facts)), _files(session.folder)]
     if material.marks:
-        blocks.append(Fold("What happened", (_events(material.marks),)))
+        blocks.append(Collapsible("What happened", (_events(material.marks),)))
     text = (session.folder / DESCRIPTION).read_text(encoding="utf-8")
-    blocks.append(Fold(DESCRIPTION, (Code(text),)))
+    blocks.append(Collapsible(DESCRIPTION, (FileText(text),)))
     return Section("provenance", "Provenance", tuple(blocks))
 
 
@@ -59,7 +59,7 @@ def _libraries() -> str:
     return f"{names}, Python {platform.python_version()}"
 
 
-def _files(folder: Path) -> Block:
+def _files(folder: Path) -> ReportBlock:
     rows = []
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.name not in OWN and not path.name.startswith("."):
@@ -69,7 +69,7 @@ def _files(folder: Path) -> Block:
     return table("Files of the session", ("file", ">bytes", "SHA-256"), rows)
 
 
-def _events(marks: tuple[Mapping[str, Any], ...]) -> Block:
+def _events(marks: tuple[Mapping[str, Any], ...]) -> ReportBlock:
     rows = []
     for mark in marks[:MOST_EVENTS]:
         rest = {k: v for k, v in mark.items() if k not in ("event", "host_s")}

@@ -9,11 +9,11 @@ import numpy as np
 from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.evaluation.observations import UsableWindows
-from fieldcal.report.blocks import Block, Figure, Section, Table, Text, table
-from fieldcal.report.charts import SENSORS, LabelledSpan, Mark, Record
-from fieldcal.report.gather import Material
-from fieldcal.report.loose import Json, objects_at, real
-from fieldcal.report.packing import Columns, pack, stretches_around
+from fieldcal.report.blocks import Figure, Paragraph, ReportBlock, Section, Table, table
+from fieldcal.report.charts import SENSORS, ChartMark, LabelledSpan, RecordingChart
+from fieldcal.report.gather import ReportMaterial
+from fieldcal.report.loose import Json, number_or_nan, objects_at
+from fieldcal.report.packing import ChannelTable, pack, stretches_around
 
 CLOSE = 3.0
 """Stretch about each edge of a window that is packed sample by sample, s."""
@@ -33,35 +33,39 @@ EVENTS = {
 }
 
 
-def recording(material: Material) -> Section:
-    """Every channel over device time, with the windows, and their averages."""
+def recording_section(material: ReportMaterial) -> Section:
+    """All channels over device time, with the windows and their averages."""
     chart = _chart(material)
-    blocks: list[Block] = [
+    blocks: list[ReportBlock] = [
         Figure(
             chart,
             "Shaded: the windows that were averaged, with a line at the average. Drag"
             " to zoom in on a stretch; each panel then fits what is seen.",
         )
     ]
-    if material.still is not None:
-        blocks += averages(material, material.still)
-    if material.trouble:
-        blocks.append(Text(f"No window could be averaged: {material.trouble}."))
+    if material.windows is not None:
+        blocks += averages_tables(material, material.windows)
+    if material.windows_error:
+        blocks.append(
+            Paragraph(f"No window could be averaged: {material.windows_error}.")
+        )
     return Section("recording", "Recording", tuple(blocks))
 
 
-def windows(material: Material) -> tuple[LabelledSpan, ...]:
+def used_windows(material: ReportMaterial) -> tuple[LabelledSpan, ...]:
     """The windows that were averaged, with the number of their position."""
-    if material.still is None:
+    if material.windows is None:
         return ()
-    pairs = zip(material.still.position_numbers, material.still.averages, strict=True)
+    pairs = zip(
+        material.windows.position_numbers, material.windows.averages, strict=True
+    )
     off = material.epoch
     return tuple(
         LabelledSpan(a.start - off, a.end - off, str(row + 1)) for row, a in pairs
     )
 
 
-def _chart(material: Material) -> Record:
+def _chart(material: ReportMaterial) -> RecordingChart:
     block = material.block
     six = block.six
     panels = [
@@ -74,46 +78,49 @@ def _chart(material: Material) -> Record:
     if np.isfinite(block.temperature).any():
         panels.append(("temperature", "°C", 4))
         values = np.column_stack([values, block.temperature])
-    spans, marks = windows(material), _marks(material)
+    spans, marks = used_windows(material), _marks(material)
     edges = [m.at for m in marks] + [e for s in spans for e in (s.start, s.end)]
-    return Record(
+    return RecordingChart(
         "record",
         "Samples over device time",
         _alt(panels, values, float(block.t[-1] - block.t[0]), spans),
         tuple(panels),
         material.clock,
-        pack(Columns(block.t - material.epoch, values), stretches_around(edges, CLOSE)),
+        pack(
+            ChannelTable(block.t - material.epoch, values),
+            stretches_around(edges, CLOSE),
+        ),
         spans,
         _means(material, used, values.shape[1]),
         marks,
     )
 
 
-def _means(material: Material, used: Sequence[int], panels: int) -> Array:
+def _means(material: ReportMaterial, used: Sequence[int], panels: int) -> Array:
     """Averages of the windows, (windows, panels)."""
-    averages = material.still.averages if material.still is not None else ()
+    averages = material.windows.averages if material.windows is not None else ()
     rows = [[*(a.mean[i] for i in used), a.temperature] for a in averages]
     return np.array(rows, dtype=float).reshape(len(rows), len(used) + 1)[:, :panels]
 
 
-def _marks(material: Material) -> tuple[Mark, ...]:
-    """Events with a device time of their own, and what a diagnosis found in samples."""
+def _marks(material: ReportMaterial) -> tuple[ChartMark, ...]:
+    """Events with a device time, and disturbances that a diagnosis found."""
     marks = [
-        Mark(float(m["at_s"]) - material.epoch, EVENTS[m["event"]])
+        ChartMark(float(m["at_s"]) - material.epoch, EVENTS[m["event"]])
         for m in material.marks
         if m.get("event") in EVENTS and isinstance(m.get("at_s"), int | float)
     ]
     return (*marks, *_transients(material.diagnosis or {}, material.epoch))
 
 
-def _transients(diagnosis: Json, epoch: float) -> list[Mark]:
+def _transients(diagnosis: Json, epoch: float) -> list[ChartMark]:
     found: dict[float, list[str]] = {}
     for m in objects_at(diagnosis, "mismatch"):
-        at = real(m.get("from_s"))
-        brief = real(m.get("to_s")) - at < BRIEF
+        at = number_or_nan(m.get("from_s"))
+        brief = number_or_nan(m.get("to_s")) - at < BRIEF
         if m.get("kind") in ("samples", "transient") and brief:
             found.setdefault(round(at - epoch, 1), []).append(str(m.get("channel", "")))
-    return [Mark(at, ", ".join(names)) for at, names in found.items()][:MOST_MARKS]
+    return [ChartMark(at, ", ".join(names)) for at, names in found.items()][:MOST_MARKS]
 
 
 def _alt(
@@ -129,8 +136,8 @@ def _alt(
     return f"{seconds:.0f} s of samples, {len(spans)} windows: {'; '.join(ranges)}."
 
 
-def averages(material: Material, still: UsableWindows) -> list[Table]:
-    """The mean of each window with its standard error, a table a sensor."""
+def averages_tables(material: ReportMaterial, still: UsableWindows) -> list[Table]:
+    """Tables of the mean of each window with its standard error, one per sensor."""
     out = []
     for first, sensor, unit in SENSORS:
         channels = [

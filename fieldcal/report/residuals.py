@@ -1,4 +1,4 @@
-"""What the calibration leaves of the averages, and where the device was.
+"""Residuals of the averages, and the measured angles of the device.
 
     r = <U> - (b + M f' + what else was estimated)                           device axes
 
@@ -30,7 +30,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import build_observations
 from fieldcal.model.causes.planned import state_of
 from fieldcal.physics.experience import Experience
-from fieldcal.report.gather import Material
+from fieldcal.report.gather import ReportMaterial
 from fieldcal.solve.observations import Observations
 
 
@@ -55,15 +55,15 @@ class Residuals:
     temperature: Array
 
 
-def residuals(material: Material) -> Residuals | None:
+def window_residuals(material: ReportMaterial) -> Residuals | None:
     """Residuals of the windows; None without windows or a calibration."""
-    found, still = material.calibration, material.still
+    found, still = material.calibration, material.windows
     if found is None or still is None:
         return None
     seen = build_observations(
         material.session.about, still.averages, still.position_numbers
     )
-    channel = seen.mean - predicted(found, seen)
+    channel = seen.mean - predicted_outputs(found, seen)
     true = found.apply(Block.of(seen.time, *_sensors(seen)), seen.nominal)
     norm = np.where(
         seen.oriented, np.nan, np.linalg.norm(true.acc, axis=1) - seen.gravity
@@ -72,8 +72,8 @@ def residuals(material: Material) -> Residuals | None:
     return Residuals(still.position_numbers, channel, norm, sigma, seen.temperature)
 
 
-def predicted(found: Calibration, seen: Observations) -> Array:
-    """Outputs that the calibration predicts, (n, 6); nan where nothing says where."""
+def predicted_outputs(found: Calibration, seen: Observations) -> Array:
+    """Outputs that the calibration predicts, (n, 6); nan if angles are unknown."""
     x = Experience.at_rest(
         *seen.angles,
         seen.gravity,
@@ -95,12 +95,12 @@ def predicted(found: Calibration, seen: Observations) -> Array:
     out = state.output(state.experienced(x), np.full((1, len(x)), np.inf))
     out[speeds(seen.positions)[0] > 0] = np.nan
     if seen.grade != "navigation":
-        out[:, 3:] += _earth(seen, seen.mean[:, 3:] - out[:, 3:])
+        out[:, 3:] += _estimate_earth_rate(seen, seen.mean[:, 3:] - out[:, 3:])
     return out
 
 
-def _earth(seen: Observations, left: Array) -> Array:
-    """The Earth's rate in the windows, (n, 3) rad/s, as far as it can be known."""
+def _estimate_earth_rate(seen: Observations, left: Array) -> Array:
+    """Estimate the Earth's rate in the windows, (n, 3) rad/s, device axes."""
     known = seen.oriented & np.isfinite(left).all(axis=1)
     if seen.latitude is None or not known.any():
         return np.zeros((len(seen), 3))
@@ -128,29 +128,29 @@ def _sensors(seen: Observations) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredAngles:
-    """Angles the calibrated accelerometers show.
+    """Angles that the calibrated accelerometers measure.
 
     Attributes
     ----------
     rows : (n,) number of each window's position
-    asked : (n, 2) alpha and beta, deg; nan where not known
-    shown : (n, 2) deg
+    stated : (n, 2) alpha and beta, deg; nan where not known
+    measured : (n, 2) deg
     sigma : (n, 2) deg, of noise and calibration
 
     """
 
     rows: tuple[int, ...]
-    asked: Array
-    shown: Array
+    stated: Array
+    measured: Array
     sigma: Array
 
 
-def reached(material: Material) -> MeasuredAngles | None:
-    """Where the device was in each window; None without windows.
+def measured_angles(material: ReportMaterial) -> MeasuredAngles | None:
+    """Measured angles of the device in each window; None without windows.
 
     Without a calibration the nominal one serves.
     """
-    still = material.still
+    still = material.windows
     if still is None:
         return None
     seen = build_observations(
@@ -175,7 +175,7 @@ def reached(material: Material) -> MeasuredAngles | None:
 
 
 def _sigma(force: Array, spread: Array, shown: Array) -> Array:
-    """Uncertainty of the angles by that of each component of the force, (n, 2) deg."""
+    """Uncertainty of the angles from that of the force components, (n, 2) deg."""
     variance = np.zeros_like(shown)
     for axis in range(3):
         moved = force.copy()

@@ -17,9 +17,9 @@ from fieldcal.evaluation.observations import UsableWindows
 from fieldcal.evaluation.window_mean import table_rate, without_table_rotation
 from fieldcal.report import blocks
 from fieldcal.report.blocks import Cell, Figure, Section, Tone, table
-from fieldcal.report.charts import Axis, Chart, Mark, Series
-from fieldcal.report.gather import Material
-from fieldcal.report.recording import windows
+from fieldcal.report.charts import Axis, Chart, ChartMark, Series
+from fieldcal.report.gather import ReportMaterial
+from fieldcal.report.recording import used_windows
 from fieldcal.windows import StillnessLimits
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
 from fieldcal.windows.verdict import judge_window
@@ -31,11 +31,11 @@ POINTS = 4000
 """Most points of the line; the greatest of each group is kept."""
 
 NEAR = 0.8
-"""Part of what is allowed from which a window is marked as close to it."""
+"""Fraction of the limit above which a window is marked as close to it."""
 
 
-def stillness(material: Material) -> Section | None:
-    """Restlessness over time, and how near each window came to be rejected."""
+def stillness_section(material: ReportMaterial) -> Section | None:
+    """Motion over time, and how near each window came to being rejected."""
     cells = _cells(material.block)
     if len(cells) < 2 * SPAN:
         return None
@@ -47,24 +47,26 @@ def stillness(material: Material) -> Section | None:
         Axis(material.clock, "s"),
         Axis("spread over 1 s, times that of rest", log=True),
         (Series("restlessness", *_thinned(t - material.epoch, r), 1, "line"),),
-        (Mark(1.0, "rest"),),
-        windows(material),
+        (ChartMark(1.0, "rest"),),
+        used_windows(material),
     )
     caption = (
         "Spread of means over 0.1 s within 1 s, against the quietest tenth of the"
         " recording. Shaded: the windows."
     )
-    parts: list[blocks.Block] = [Figure(chart, caption)]
-    if material.still is not None:
-        parts.append(_windows(material, material.still))
+    parts: list[blocks.ReportBlock] = [Figure(chart, caption)]
+    if material.windows is not None:
+        parts.append(_windows(material, material.windows))
     found = [mark for mark in material.marks if mark.get("event") == "still"]
     if found:
-        parts.append(_found(material, found))
+        parts.append(_found_rests(material, found))
     return Section("stillness", "Stillness", tuple(parts))
 
 
-def _found(material: Material, marks: Sequence[Mapping[str, Any]]) -> blocks.Table:
-    """Still stretches that an import found, and why they begin and end there."""
+def _found_rests(
+    material: ReportMaterial, marks: Sequence[Mapping[str, Any]]
+) -> blocks.Table:
+    """Stretches at rest that an import found, with the reasons for their ends."""
     rows: list[list[str | Cell]] = [
         [
             str(i),
@@ -102,7 +104,7 @@ def _cells(block: Block) -> CellTable:
     return cells.table
 
 
-def _windows(material: Material, still: UsableWindows) -> blocks.Table:
+def _windows(material: ReportMaterial, still: UsableWindows) -> blocks.Table:
     rows: list[list[str | Cell]] = []
     for row, average in zip(still.position_numbers, still.averages, strict=True):
         end = float(np.nextafter(average.end, np.inf))

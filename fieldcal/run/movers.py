@@ -12,7 +12,7 @@ from typing import Any, Protocol, Self
 
 from fieldcal.core.errors import DeviceError, MoverGone
 from fieldcal.core.positions import Position
-from fieldcal.sim_device.remote import Remote
+from fieldcal.sim_device.remote import RemoteDevice
 
 
 class Mover(Protocol):
@@ -48,7 +48,7 @@ class RunningDevice:
 
     def __init__(self, control: Path | str) -> None:
         self._control = control
-        self._remote: Remote | None = Remote(control)
+        self._remote: RemoteDevice | None = RemoteDevice(control)
 
     def ask(self, **request: Any) -> dict[str, Any]:
         """Send a request to the control socket and return the reply.
@@ -60,7 +60,7 @@ class RunningDevice:
 
         """
         if self._remote is None:
-            self._remote = Remote(self._control)
+            self._remote = RemoteDevice(self._control)
         try:
             return self._remote.ask(**request)
         except DeviceError:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from fieldcal.core.errors import FieldcalError
-from fieldcal.fleet.workers import Pool, results
+from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -32,7 +32,7 @@ class JobQueue:
     """
 
     def __init__(
-        self, jobs: Jobs, database: Database, pool: Pool,
+        self, jobs: Jobs, database: Database, pool: WorkerPool,
         task: Callable[[str], StoredSession] | None = None,
     ) -> None:  # fmt: skip
         self.jobs, self.database, self.pool = jobs, database, pool
@@ -69,7 +69,7 @@ class JobQueue:
     def _done(self, job: Job) -> None:
         job = self.jobs.changed(job, state="working")
         folder = self.jobs.folder(job.id)
-        for made in results([str(folder)], self.task, self.pool):
+        for made in run_tasks([str(folder)], self.task, self.pool):
             one = made.value or StoredSession(made.item, error=made.error)
             said = one.error
             if said is None:

@@ -132,24 +132,24 @@ def effects_of_terms(terms: Sequence[Term], start: float) -> list[SimulatedEffec
         given = _nonzero_parameters(term.effect, term.values)
         if given or not term.effect.params:
             given |= _since_start(term.shape, start)
-            out.append(vocabulary.effect(term.effect.id, given))
+            out.append(vocabulary.checked_effect(term.effect.id, given))
     return out
 
 
 def earth_rate_effects(heading: float | None) -> Iterator[SimulatedEffect]:
     """Simulated effects of the Earth's rate at a heading, rad; none without one."""
     if heading is not None:
-        yield vocabulary.effect("earth_rate", {})
+        yield vocabulary.checked_effect("earth_rate", {})
         if heading:
             psi = float(np.rad2deg(heading))
-            yield vocabulary.effect("heading_error", {"psi_deg": psi})
+            yield vocabulary.checked_effect("heading_error", {"psi_deg": psi})
 
 
 def known_random_effects(about: Description) -> Iterator[SimulatedEffect]:
     """Random effects, and effects on samples, that the simulation has already."""
     for name, given in about.model.items():
         if isinstance(catalogue()[name], Scatter | Chain):
-            yield vocabulary.effect(name, given)
+            yield vocabulary.checked_effect(name, given)
 
 
 def line_effects(tone: SpectralLine, start: float) -> Iterator[SimulatedEffect]:
@@ -166,7 +166,7 @@ def line_effects(tone: SpectralLine, start: float) -> Iterator[SimulatedEffect]:
             continue
         else:
             given[tone.effect.params[j].name] = float(size)
-        yield vocabulary.effect(tone.effect.id, given)
+        yield vocabulary.checked_effect(tone.effect.id, given)
 
 
 def effects_on_samples(
@@ -183,7 +183,7 @@ def effects_on_samples(
         channel = CHANNELS.index(str(given["channel"]))
         block = explanation.prepared.source.block
         given["full_scale"] = WORDS * lsb_of(block.six[:, channel])
-    yield vocabulary.effect(found.id, _since_start(given, start))
+    yield vocabulary.checked_effect(found.id, _since_start(given, start))
 
 
 def temperature_course(warmth: Thermometer, start: float) -> Climate:
@@ -239,7 +239,7 @@ def _since_start(given: Mapping[str, Any], start: float) -> dict[str, Any]:
 
 
 def _with_level(effect: SimulatedEffect, level: float) -> SimulatedEffect:
-    return vocabulary.effect(effect.id, {**effect.parameters, "level": level})
+    return vocabulary.checked_effect(effect.id, {**effect.parameters, "level": level})
 
 
 def _without_repeats(

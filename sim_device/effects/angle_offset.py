@@ -20,7 +20,7 @@ class SimulatedAngleOffset(SimulatedEffect):
     ORDER = 1
     EXAMPLE = Example({"alpha0_deg": 0.8, "beta0_deg": -0.9})
 
-    def setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
+    def joint_setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
         """The offset of each zero."""
         offset = np.deg2rad(self.column(self.VECTOR)[:, 0])
         return lambda angles: angles + offset

@@ -20,7 +20,7 @@ class SimulatedAngleScale(SimulatedEffect):
     ORDER = 0
     EXAMPLE = Example({"alpha": 8e-3, "beta": -6e-3})
 
-    def setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
+    def joint_setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
         """The scale of each gauge."""
         scale = self.column(self.VECTOR)[:, 0]
         return lambda angles: angles * (1 + scale)

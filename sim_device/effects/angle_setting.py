@@ -20,7 +20,7 @@ class SimulatedAngleSetting(SimulatedEffect):
     ORDER = 2
     EXAMPLE = Example({"sigma_deg": 0.15})
 
-    def setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
+    def joint_setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
         """The scatter of the hand that sets the angles."""
         sigma = np.deg2rad(self["sigma_deg"])
         return lambda angles: angles + sigma * rng.standard_normal(2)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.sim_device.effect import Example, SimulatedEffect
-from fieldcal.sim_device.motion import Stand, X, Z
+from fieldcal.sim_device.motion import Installation, X, Z
 from fieldcal.sim_device.quaternion import multiply, turn
 
 
@@ -17,8 +17,8 @@ class SimulatedBaseTilt(SimulatedEffect):
     VECTOR = ("about_x_deg", "about_z_deg")
     EXAMPLE = Example({"about_x_deg": 0.5, "about_z_deg": -0.7})
 
-    def stands(self, stand: Stand) -> Stand:
+    def change_installation(self, installation: Installation) -> Installation:
         """On a base that is tilted, wherever it heads."""
         about_x, about_z = np.deg2rad(self.column(self.VECTOR))
         tilt = multiply(turn(Z, about_z), turn(X, about_x))
-        return replace(stand, base=multiply(stand.base, tilt))
+        return replace(installation, base=multiply(installation.base, tilt))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import SIX, Example, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedBiasDrift(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedBiasDrift(SimulatedEffect):
     VECTOR = SIX
     EXAMPLE = Example({"ax": 5e-5, "gy": 2e-6, "az": -4e-5})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What has drifted since the device was switched on."""
-        more: Array = self.column(SIX) * life.t
+        more: Array = self.column(SIX) * conditions.t
         return more

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import SIX, Example, Number, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedBiasStep(SimulatedEffect):
@@ -20,7 +20,9 @@ class SimulatedBiasStep(SimulatedEffect):
     REPEATS = True
     EXAMPLE = Example({"ax": 0.01, "az": -0.008, "at_s": 101.0})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What has come by the step."""
-        more: Array = self.column(SIX) * np.where(life.t >= self["at_s"], 1.0, 0.0)
+        more: Array = self.column(SIX) * np.where(
+            conditions.t >= self["at_s"], 1.0, 0.0
+        )
         return more

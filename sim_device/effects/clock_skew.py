@@ -17,6 +17,6 @@ class SimulatedClockSkew(SimulatedEffect):
         unmended="the angles do not depend on the pace of the clock",
     )
 
-    def pace(self) -> float:
+    def clock_rate(self) -> float:
         """Seconds of the device's clock in a true second."""
         return 1 + 1e-6 * self["ppm"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import Example, SimulatedEffect, matrix_names, of_acc
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedCrossCoupling(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedCrossCoupling(SimulatedEffect):
     VECTOR = matrix_names("k", diagonal=False)
     EXAMPLE = Example({"k13": 3e-3, "k21": -2e-3, "k32": 4e-3})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the axes across add to the accelerometers."""
-        more: Array = of_acc(self.matrix("k", life.f))
+        more: Array = of_acc(self.matrix("k", conditions.f))
         return more

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_acc
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedCubic(SimulatedEffect):
@@ -18,7 +18,9 @@ class SimulatedCubic(SimulatedEffect):
     VECTOR = AXES
     EXAMPLE = Example({"x": 2e-5, "y": -3e-5, "z": 2e-5})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the cube of the force adds."""
-        more: Array = of_acc(self.column(AXES) * life.f * life.f * life.f)
+        more: Array = of_acc(
+            self.column(AXES) * conditions.f * conditions.f * conditions.f
+        )
         return more

@@ -25,7 +25,7 @@ from fieldcal.sim_device.effect import (
     Range,
     SimulatedEffect,
 )
-from fieldcal.sim_device.impulse_response import Outputs, passed_on, past
+from fieldcal.sim_device.impulse_response import Outputs, convolve, past_instants
 
 LEFT, PER_RADIAN = 12.0, 6
 """Exponent at which the past ends, and steps in a radian of the mode."""
@@ -41,14 +41,17 @@ class SimulatedFlexibleMount(SimulatedEffect):
     }
     EXAMPLE = Example({"x": 3e-4, "y": 2e-4, "z": 4e-4, "damping": 0.2}, in_motion=True)
 
-    def followed(self, outputs: Outputs, t: Array) -> Array:
+    def filtered_outputs(self, outputs: Outputs, t: Array) -> Array:
         """Outputs (6, n) at t (n,) s as the structure passes them on."""
         steps = 2 * int(PER_RADIAN * LEFT / self["damping"] / 2)
-        now, by = outputs(t), past(self._response, LEFT / self["damping"], steps)
+        now, by = (
+            outputs(t),
+            past_instants(self._response, LEFT / self["damping"], steps),
+        )
         for i, axis in enumerate(AXES):
             if b := self[axis]:
                 rows = slice(i, i + 1)
-                now[rows] = passed_on(outputs, t, rows, float(np.sqrt(b)), by)
+                now[rows] = convolve(outputs, t, rows, float(np.sqrt(b)), by)
         return now
 
     def _response(self, age: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_gyr
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedG2Sensitivity(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedG2Sensitivity(SimulatedEffect):
     VECTOR = AXES
     EXAMPLE = Example({"x": 4e-6, "y": -5e-6, "z": 5e-6})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the square of the force adds to the gyroscopes."""
-        more: Array = of_gyr(self.column(AXES) * life.f**2)
+        more: Array = of_gyr(self.column(AXES) * conditions.f**2)
         return more

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import Example, SimulatedEffect, matrix_names, of_gyr
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGSensitivity(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedGSensitivity(SimulatedEffect):
     VECTOR = matrix_names("g")
     EXAMPLE = Example({"g12": 5e-5, "g23": -6e-5, "g31": 7e-5})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the force adds to the gyroscopes."""
-        more: Array = of_gyr(self.matrix("g", life.f))
+        more: Array = of_gyr(self.matrix("g", conditions.f))
         return more

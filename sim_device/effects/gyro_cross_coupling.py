@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import Example, SimulatedEffect, matrix_names, of_gyr
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroCrossCoupling(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedGyroCrossCoupling(SimulatedEffect):
     VECTOR = matrix_names("s", diagonal=False)
     EXAMPLE = Example({"s13": 1e-2, "s31": -1.2e-2, "s23": 1.5e-2})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the axes across add to the gyroscopes."""
-        more: Array = of_gyr(self.matrix("s", life.w))
+        more: Array = of_gyr(self.matrix("s", conditions.w))
         return more

@@ -15,7 +15,7 @@ from fieldcal.sim_device.effect import (
     of_gyr,
     pairs,
 )
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroProducts(SimulatedEffect):
@@ -24,7 +24,7 @@ class SimulatedGyroProducts(SimulatedEffect):
     VECTOR = matrix_names("p")
     EXAMPLE = Example({"p11": 5e-3, "p22": -6e-3, "p33": 4e-3}, turntable=True)
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What products of the rates add."""
-        more: Array = of_gyr(self.matrix("p", pairs(life.w)))
+        more: Array = of_gyr(self.matrix("p", pairs(conditions.w)))
         return more

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import Example, SimulatedEffect, of_gyr
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroScale(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedGyroScale(SimulatedEffect):
     VECTOR = ("s1", "s2", "s3")
     EXAMPLE = Example({"s1": 2e-2, "s2": -1e-2, "s3": 1.5e-2})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the gyroscopes show too much."""
-        more: Array = of_gyr(self.column(self.VECTOR) * life.w)
+        more: Array = of_gyr(self.column(self.VECTOR) * conditions.w)
         return more

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.sim_device.effect import Example, Number, SimulatedEffect
-from fieldcal.sim_device.motion import Stand, Y
+from fieldcal.sim_device.motion import Installation, Y
 from fieldcal.sim_device.quaternion import multiply, turn
 
 
@@ -28,7 +28,7 @@ class SimulatedHeadingError(SimulatedEffect):
         },
     )
 
-    def stands(self, stand: Stand) -> Stand:
+    def change_installation(self, installation: Installation) -> Installation:
         """On a base that is turned about the vertical, however it is tilted."""
         yaw = turn(Y, np.array([-np.deg2rad(self["psi_deg"])]))
-        return replace(stand, base=multiply(yaw, stand.base))
+        return replace(installation, base=multiply(yaw, installation.base))

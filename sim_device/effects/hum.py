@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import ABOVE_ZERO, SIX, Example, Number, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedHum(SimulatedEffect):
@@ -20,8 +20,8 @@ class SimulatedHum(SimulatedEffect):
     REPEATS = True
     EXAMPLE = Example({"ax": 0.01, "ay": 0.008, "hz": 7.0})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """The line in each output."""
-        phase = 2 * np.pi * self["hz"] * life.t + np.deg2rad(self["phase_deg"])
+        phase = 2 * np.pi * self["hz"] * conditions.t + np.deg2rad(self["phase_deg"])
         wave: Array = np.sin(phase)
         return self.column(SIX) * wave

@@ -24,7 +24,7 @@ class SimulatedIncrements(SimulatedEffect):
     NUMBERS = {"sculling": Number(0.0), "coning": Number(0.0)}
     EXAMPLE = Example({"sculling": 0.005, "coning": 4e-4}, in_motion=True)
 
-    def followed(self, outputs: Callable[[Array], Array], t: Array) -> Array:
+    def filtered_outputs(self, outputs: Callable[[Array], Array], t: Array) -> Array:
         """Outputs (6, n) at t (n,) s with rate across force and across its change."""
         now = outputs(t)
         force, rate = now[:3], now[3:]

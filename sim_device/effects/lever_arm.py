@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect
-from fieldcal.sim_device.motion import Stand
+from fieldcal.sim_device.motion import Installation
 
 
 class SimulatedLeverArm(SimulatedEffect):
@@ -19,6 +19,6 @@ class SimulatedLeverArm(SimulatedEffect):
     VECTOR = AXES
     EXAMPLE = Example({"x": 0.2, "y": -0.15, "z": 0.1})
 
-    def stands(self, stand: Stand) -> Stand:
+    def change_installation(self, installation: Installation) -> Installation:
         """Off the turning centre."""
-        return replace(stand, lever=self.column(AXES))
+        return replace(installation, lever=self.column(AXES))

@@ -14,7 +14,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.earth import STANDARD_GRAVITY
 from fieldcal.sim_device.effect import Example, SimulatedEffect, Stage, Word
-from fieldcal.sim_device.motion import Stand, mounting_axes
+from fieldcal.sim_device.motion import Installation, mounting_axes
 
 SignedAxes = tuple[tuple[int, int, int], tuple[float, float, float]]
 """Indices of three axes, and their signs."""
@@ -39,12 +39,12 @@ class SimulatedMounting(SimulatedEffect):
     ORDER = 5
     EXAMPLE = Example({"axes": "+y-x+z"})
 
-    def stands(self, stand: Stand) -> Stand:
+    def change_installation(self, installation: Installation) -> Installation:
         """With other axes, also left-handed ones, if they are given."""
         if not self.words["axes"]:
-            return stand
+            return installation
         index, signs = self._signed("axes")
-        return replace(stand, axes=index, signs=np.array(signs)[:, None])
+        return replace(installation, axes=index, signs=np.array(signs)[:, None])
 
     def stage(self, full_scale: Array) -> Stage | None:
         """In the other unit, and gyroscopes along the other axes, if they are given."""

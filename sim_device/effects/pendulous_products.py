@@ -15,7 +15,7 @@ from fieldcal.sim_device.effect import (
     of_acc,
     pairs,
 )
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedPendulousProducts(SimulatedEffect):
@@ -24,7 +24,7 @@ class SimulatedPendulousProducts(SimulatedEffect):
     VECTOR = matrix_names("l")
     EXAMPLE = Example({"l11": 2e-4, "l22": -2e-4, "l33": 2e-4})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What products of the forces add."""
-        more: Array = of_acc(self.matrix("l", pairs(life.f)))
+        more: Array = of_acc(self.matrix("l", pairs(conditions.f)))
         return more

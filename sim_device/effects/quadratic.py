@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_acc
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedQuadratic(SimulatedEffect):
@@ -18,7 +18,7 @@ class SimulatedQuadratic(SimulatedEffect):
     VECTOR = AXES
     EXAMPLE = Example({"x": 1e-4, "y": -8e-5, "z": 1.2e-4})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the square of the force adds."""
-        more: Array = of_acc(self.column(AXES) * life.f**2)
+        more: Array = of_acc(self.column(AXES) * conditions.f**2)
         return more

@@ -14,6 +14,6 @@ class SimulatedRandomWalk(SimulatedEffect):
     VECTOR = SIX
     EXAMPLE = Example({"ax": 8e-4, "ay": 8e-4, "az": 8e-4})
 
-    def wander(self, rate: float, rng: np.random.Generator) -> Walk:
+    def random_bias(self, rate: float, rng: np.random.Generator) -> Walk:
         """The walk of each bias."""
         return Walk(self.column(SIX)[:, 0], rate, rng)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_acc
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedScaleAsymmetry(SimulatedEffect):
@@ -20,7 +20,7 @@ class SimulatedScaleAsymmetry(SimulatedEffect):
     VECTOR = AXES
     EXAMPLE = Example({"x": 3e-3, "y": -2e-3, "z": 2e-3})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the size of the force adds."""
-        more: Array = of_acc(self.column(AXES) * np.abs(life.f))
+        more: Array = of_acc(self.column(AXES) * np.abs(conditions.f))
         return more

@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import ABOVE_ZERO, SIX, Example, Number, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedSettling(SimulatedEffect):
@@ -22,9 +22,11 @@ class SimulatedSettling(SimulatedEffect):
     REPEATS = True
     EXAMPLE = Example({"ax": 0.03, "ay": 0.02, "az": -0.03, "tau_s": 4.0})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What is left of the last turn."""
-        after = np.exp(-np.maximum(life.since, 0.0) / self["tau_s"])
-        turned = np.where(life.progress > 0, 1.0, 0.0)
-        left: Array = turned * np.where(life.since < 0, life.progress, after)
+        after = np.exp(-np.maximum(conditions.since_turn, 0.0) / self["tau_s"])
+        turned = np.where(conditions.turn_progress > 0, 1.0, 0.0)
+        left: Array = turned * np.where(
+            conditions.since_turn < 0, conditions.turn_progress, after
+        )
         return self.column(SIX) * left

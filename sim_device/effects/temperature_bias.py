@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import SIX, Example, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedTemperatureBias(SimulatedEffect):
@@ -21,7 +21,7 @@ class SimulatedTemperatureBias(SimulatedEffect):
         device={"temperature": {"ramp_k_s": 0.03}},
     )
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the change of temperature adds."""
-        more: Array = self.column(SIX) * life.warmth
+        more: Array = self.column(SIX) * conditions.temperature_rise
         return more

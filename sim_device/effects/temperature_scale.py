@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import AXES, Example, SimulatedEffect, of_acc
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedTemperatureScale(SimulatedEffect):
@@ -20,7 +20,9 @@ class SimulatedTemperatureScale(SimulatedEffect):
         {"x": 4e-4, "y": -3e-4, "z": 3e-4}, device={"temperature": {"ramp_k_s": 0.03}}
     )
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the change of temperature adds to the force."""
-        more: Array = of_acc(self.column(AXES) * life.warmth * life.f)
+        more: Array = of_acc(
+            self.column(AXES) * conditions.temperature_rise * conditions.f
+        )
         return more

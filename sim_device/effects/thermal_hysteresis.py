@@ -11,7 +11,7 @@ import math
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import SIX, Example, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 CYCLING = [[float(t), 20 + 6 * math.sin(t / 35.0)] for t in range(0, 400, 5)]
 """An air that warms and cools, (s, °C)."""
@@ -25,7 +25,7 @@ class SimulatedThermalHysteresis(SimulatedEffect):
         {"ax": 0.15, "ay": -0.1}, device={"temperature": {"points": CYCLING}}
     )
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the rate of the temperature adds."""
-        more: Array = self.column(SIX) * life.warming
+        more: Array = self.column(SIX) * conditions.temperature_rate
         return more

@@ -19,7 +19,7 @@ from fieldcal.sim_device.effect import (
     SimulatedEffect,
     of_acc,
 )
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedVibrationRectification(SimulatedEffect):
@@ -29,11 +29,11 @@ class SimulatedVibrationRectification(SimulatedEffect):
     NUMBERS = {"level": Number(0.3, NOT_NEGATIVE)}
     EXAMPLE = Example({"x": 0.08, "y": -0.09, "z": 0.08}, window_s=25.0, vibration=1.5)
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What the vibration is rectified to."""
-        more: Array = of_acc(self.column(AXES) * life.vibration**2)
+        more: Array = of_acc(self.column(AXES) * conditions.vibration**2)
         return more
 
-    def shaking(self, rng: np.random.Generator) -> float:
+    def vibration_rms(self, rng: np.random.Generator) -> float:
         """A share of the level, another in each position."""
         return self["level"] * float(rng.random())

@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.sim_device.effect import ABOVE_ZERO, SIX, Example, Number, SimulatedEffect
-from fieldcal.sim_device.life import Life
+from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedWarmUp(SimulatedEffect):
@@ -22,7 +22,7 @@ class SimulatedWarmUp(SimulatedEffect):
     REPEATS = True
     EXAMPLE = Example({"ax": 0.03, "ay": -0.02, "gx": 4e-4, "tau_s": 90.0})
 
-    def adds(self, life: Life) -> Array:
+    def added_output(self, conditions: SensorConditions) -> Array:
         """What is left of the start."""
-        more: Array = self.column(SIX) * np.exp(-life.t / self["tau_s"])
+        more: Array = self.column(SIX) * np.exp(-conditions.t / self["tau_s"])
         return more

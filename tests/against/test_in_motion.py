@@ -24,9 +24,9 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.effects import catalogue as known
 from fieldcal.sim_device.effects import catalogue, kind
-from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.profile_file import profile_from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 TESTS = Path(__file__).parent.parent
 NAMES = ("recording", "simulator")
@@ -211,9 +211,11 @@ def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> Non
         HeldWindow(np.deg2rad(a), np.deg2rad(b), 2.0 + 3 * i, 3.0 + 3 * i)
         for i, (a, b) in enumerate(angles)
     ]
-    plain = from_tables({"sampling": {"rate_hz": 50.0}, "motion": {"turn_s": 1.0}})
+    plain = profile_from_tables(
+        {"sampling": {"rate_hz": 50.0}, "motion": {"turn_s": 1.0}}
+    )
     given = kind(name).EXAMPLE.given
-    real = simulate(plain.having(effect(name, given)), windows, seed=3)
+    real = simulate(plain.having(checked_effect(name, given)), windows, seed=3)
     sim = simulate(plain, windows, seed=4, noise=False)
     found = compare_in_motion((real, ABOUT), sim, NAMES)
     assert {d.id for d in found.differences} - CALIBRATION == {name}

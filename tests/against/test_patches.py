@@ -123,7 +123,7 @@ def test_kalibr_has_matrices_and_densities(tmp_path: Path) -> None:
 
 def test_the_virtual_device_takes_its_tables(tmp_path: Path) -> None:
     written("toml", tmp_path)
-    device = profile_file.read(tmp_path / "patch.toml")
+    device = profile_file.read_profile(tmp_path / "patch.toml")
     assert device.truth.acc_bias == tuple(BIAS) and device.sampling.rate_hz == 100.0
     assert device.noise.gyr == (1e-3, 1e-3, 2e-3)
     there = {e.id for e in device.effects}
@@ -204,6 +204,6 @@ def test_what_the_virtual_device_cannot_have_is_said_and_the_rest_written(
     model = SensorModel(effects={"bandwidth": {"acc": -3e-6, "gyr": 0.01}})
     says = patches.write("toml", model, tmp_path / "patch.toml")
     assert any("bandwidth acc = -3e-06 is left out" in one for one in says)
-    device = profile_file.read(tmp_path / "patch.toml")
+    device = profile_file.read_profile(tmp_path / "patch.toml")
     (one,) = (e for e in device.effects if e.id == "bandwidth")
     assert one["gyr"] == 0.01 and one["acc"] == 0.0

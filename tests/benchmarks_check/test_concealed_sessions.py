@@ -14,7 +14,7 @@ from fieldcal.core.positions import forces, speeds
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
 from fieldcal.sim_device.effects import ids, kind
-from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.profile_file import profile_from_tables
 
 
 def test_every_id_that_positions_show_is_concealed_in_some_kind() -> None:
@@ -34,7 +34,7 @@ def test_an_effect_without_a_draw_of_its_own_is_drawn_from_its_example(
     shown = kind(name).EXAMPLE
     for part, table in shown.device.items():
         there = getattr(session.profile, part)
-        made = getattr(from_tables(shown.device), part)
+        made = getattr(profile_from_tables(shown.device), part)
         assert all(getattr(there, key) == getattr(made, key) for key in table)
 
 

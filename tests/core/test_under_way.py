@@ -41,7 +41,7 @@ def test_it_is_the_path_of_a_point_in_space(
 ) -> None:
     """Second differences of places, and first ones of axes, in inertial space."""
     found = UnderWay.at(north, east, latitude, height)
-    rate, pull = earth.carried(latitude, height, north, east)
+    rate, pull = earth.moving_base_terms(latitude, height, north, east)
     np.testing.assert_allclose(found.rate, rate[:, 0], atol=2e-10)
     np.testing.assert_allclose(found.force, pull[:, 0], atol=1e-6)
 
@@ -49,7 +49,7 @@ def test_it_is_the_path_of_a_point_in_space(
 def test_a_base_that_stands_adds_nothing() -> None:
     found = UnderWay.at(0.0, 0.0, 0.9)
     assert not found.rate.any() and not found.force.any() and found.lean == 0.0
-    rate, pull = earth.carried(0.9, 0.0, 0.0, 0.0)
+    rate, pull = earth.moving_base_terms(0.9, 0.0, 0.0, 0.0)
     assert not rate.any() and not pull.any()
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Block
 from fieldcal.diagnosis.signal.chain import check_chain
-from fieldcal.effects.decode_fault import undone
+from fieldcal.effects.decode_fault import undo_decode_fault
 from fieldcal.session import description
 
 LSB = np.repeat([16 * 9.80665 / 2**15, np.deg2rad(1000) / 2**15], 3)
@@ -164,6 +164,6 @@ def test_steps_however_coarse_are_no_slip(steps: float) -> None:
 @given(st.lists(st.integers(-32768, 32767), min_size=2, max_size=60))
 def test_nothing_is_made_of_nothing(counts: list[int]) -> None:
     some = np.array(counts)
-    kind, mended = undone(some)
+    kind, mended = undo_decode_fault(some)
     assert len(mended) == len(some)
     assert bool(kind) or np.array_equal(mended, some)

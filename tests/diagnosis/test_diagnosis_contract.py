@@ -21,9 +21,9 @@ from fieldcal.session.description import Description
 from fieldcal.sim_device.effect import Example
 from fieldcal.sim_device.effects import kind
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.profile_file import profile_from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 POSITIONS = (
     *((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90), (45, 0), (-45, 0)),
@@ -71,9 +71,9 @@ def _device(name: str, example: Example) -> Profile:
     tables = {"sampling": {"rate_hz": RATE_HZ}, **example.device}
     tables["noise"] = NOISE | dict(tables.get("noise", {}))
     tables["temperature"] = {"self_heating_k": 0.0, **tables.get("temperature", {})}
-    plain = from_tables(tables)
-    earth = () if plain.feels_earth else (effect("earth_rate", {}),)
-    return plain.having(*earth, effect(name, example.given))
+    plain = profile_from_tables(tables)
+    earth = () if plain.feels_earth else (checked_effect("earth_rate", {}),)
+    return plain.having(*earth, checked_effect(name, example.given))
 
 
 def _windows(example: Example) -> list[HeldWindow]:
@@ -97,7 +97,7 @@ def _windows(example: Example) -> list[HeldWindow]:
 def _recorded(block: Block, profile: Profile, example: Example) -> Block:
     rng = np.random.default_rng(1)
     if example.host_clock:
-        true = block.t / profile.pace
+        true = block.t / profile.clock_rate
         block = replace(block, t_host=1e5 + true + rng.exponential(1e-3, len(block)))
     keep = np.ones(len(block), dtype=bool)
     for arrival in (e.arrival(rng) for e in profile.effects):

@@ -10,7 +10,7 @@ from fieldcal.diagnosis import Diagnosis, diagnose
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile, Sampling
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 NOISE = 0.01
 CALM = NoiseFigures(
@@ -20,12 +20,12 @@ CALM = NoiseFigures(
 
 def told(folder: Path, at: float, size: float) -> Diagnosis:
     """What is said of 15 minutes at 20 Hz in which one bias jumps."""
-    jump = effect("bias_step", {"az": size, "at_s": at})
+    jump = checked_effect("bias_step", {"az": size, "at_s": at})
     device = Profile(
         noise=CALM,
         temperature=Climate(self_heating_k=0.0),
         sampling=Sampling(rate_hz=20.0),
-        effects=(effect("earth_rate", {}), jump),
+        effects=(checked_effect("earth_rate", {}), jump),
     )
     held = (HeldWindow(0.35, 0.05, 5.0, 905.0),)
     block = simulate(device, held, seed=round(at))

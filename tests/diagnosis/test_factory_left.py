@@ -13,7 +13,7 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import NoiseFigures, Profile, Truth
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 AROUND = [(a, b) for a in (-135.0, -60.0, 0.0, 45.0, 90.0, 180.0) for b in (0.0, 40.0)]
 NOISE = NoiseFigures((3e-3,) * 3, (3e-4,) * 3)
@@ -21,7 +21,9 @@ NOISE = NoiseFigures((3e-3,) * 3, (3e-4,) * 3)
 
 def quadratic_left(folder: Path, truth: Truth) -> float:
     """Size of K2 that the uncertainties of a device in twelve positions have."""
-    profile = Profile(noise=NOISE, truth=truth, effects=(effect("earth_rate", {}),))
+    profile = Profile(
+        noise=NOISE, truth=truth, effects=(checked_effect("earth_rate", {}),)
+    )
     held = places(AROUND)
     written = write_session(folder, recorded(profile, held), held, site=SITE)
     session = Session.open(written)

@@ -38,8 +38,8 @@ from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_can import BusLink
 from fieldcal.sim_device.profile import Sampling
-from fieldcal.sim_device.remote import Remote
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.remote import RemoteDevice
+from fieldcal.sim_device.vocabulary import checked_effect
 
 SLCAN = "interface=slcan&bitrate=500000&dbc=virtual"
 
@@ -100,7 +100,7 @@ def test_slcan_between_two_processes_loses_nothing_of_a_minute_at_1_khz(
     assert health.bad == health.gaps == health.incomplete == health.repeated == 0
     np.testing.assert_allclose(block.t, np.arange(60_000) / 1000, atol=1e-6)
     np.testing.assert_array_equal(block.seq, np.arange(60_000) % 16)
-    earth = effect("earth_rate", {})
+    earth = checked_effect("earth_rate", {})
     profile = Profile(sampling=Sampling(1000.0), effects=(earth,))
     truth = VirtualDevice(profile, seed=4).take(60_000)
     off = np.abs(block.six - truth.six) / LSB
@@ -136,7 +136,7 @@ def test_faults_of_the_line_cost_samples_and_make_none_up(
 ) -> None:
     port, control = start(sims, "--can", "slcan", "--speed", "max")
     twin = VirtualDevice(Profile(), seed=1).take(20_000)
-    with Remote(control) as remote, open_driver(f"can:{port}?{SLCAN}") as imu:
+    with RemoteDevice(control) as remote, open_driver(f"can:{port}?{SLCAN}") as imu:
         got = [some(imu, 500)]
         for fault in ({"lose_bytes": 5}, {"double_bytes": 5}, {"garbage_bytes": 99}):
             remote.ask(fault=fault)
@@ -157,7 +157,7 @@ def test_hang_up_and_return_is_a_gap(
     _, control = start(
         sims, "--can", "slcan", "--port-link", str(link), "--speed", "20"
     )
-    with Remote(control) as remote, open_driver(f"can:{link}?{SLCAN}") as imu:
+    with RemoteDevice(control) as remote, open_driver(f"can:{link}?{SLCAN}") as imu:
         before = some(imu, 50)
         remote.ask(fault={"hangup_s": 4})
         after = some(imu, 500)

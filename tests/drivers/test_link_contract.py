@@ -29,7 +29,7 @@ from fieldcal.drivers import codec
 from fieldcal.drivers.driver import Driver, Health, open_driver
 from fieldcal.evaluation.observations import build_observations
 from fieldcal.session import description
-from fieldcal.sim_device.remote import Remote
+from fieldcal.sim_device.remote import RemoteDevice
 from fieldcal.solve import solve
 from fieldcal.windows import average
 
@@ -102,7 +102,7 @@ def device(sent: str, truth: Path, speed: str, *before: str) -> Iterator[str]:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
         assert sim.stdout
         place, control = (sim.stdout.readline().strip() for _ in range(2))
-        with Remote(control) as remote:
+        with RemoteDevice(control) as remote:
             remote.ask(turn={"alpha_deg": 45, "beta_deg": 5, "at_s": 28.0})
         yield place
 

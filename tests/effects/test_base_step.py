@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 
 def rows(**known: object) -> Experience:
@@ -75,7 +75,7 @@ def test_a_calibration_on_a_base_that_is_knocked_is_right(
     at = taken[-1 if last else 6]["start_s"] - 0.5
     tilt = {"about_x_deg": 0.0 if last else 0.12, "about_z_deg": 0.06 if last else 0.1}
     profile = replace(
-        CALM, effects=(*CALM.effects, effect("base_step", {**tilt, "at_s": at}))
+        CALM, effects=(*CALM.effects, checked_effect("base_step", {**tilt, "at_s": at}))
     )
     write_session(tmp_path / "s", recorded(profile, taken, 5), taken)
     main(["solve", str(tmp_path / "s"), "--json", "--angles", "0.002"])

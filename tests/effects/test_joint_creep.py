@@ -20,7 +20,7 @@ from fieldcal.physics.effect import Sensor
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.session.folder import Session
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 P = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 ANGLES = np.array([[0, 0, 0], [0.8, 0, 0.3], [0.8, -0.5, 0.3], [-0.2, 0.4, 0.3]])
@@ -142,7 +142,7 @@ def test_it_is_nothing_where_nobody_knows_the_joints() -> None:
 
 def session(folder: Path, seed: int, **sizes: float) -> Path:
     """A session of a calm device whose joints creep."""
-    crept = effect("joint_creep", sizes)
+    crept = checked_effect("joint_creep", sizes)
     profile = replace(CALM, effects=(*CALM.effects, crept))
     taken = places(WIDE)
     return write_session(folder, recorded(profile, taken, seed), taken)

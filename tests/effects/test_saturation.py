@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.effects.saturation import rails
+from fieldcal.effects.saturation import samples_at_rails
 from fieldcal.physics.recording import lsb_of
 
 STEP = 1e-3
@@ -24,14 +24,14 @@ def test_gravity_as_much_up_as_down_is_no_full_scale() -> None:
     for seed in range(400):
         values = box(seed, 1.2 * STEP)
         alike += abs(values.max() + values.min()) < 1e-3 * values.max()
-        assert not rails(values, np.nan)
+        assert not samples_at_rails(values, np.nan)
     assert alike > 300
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_what_is_clipped_as_far_down_as_up_is_found(seed: int) -> None:
     values = np.clip(box(seed, 3 * STEP), -9.789, 9.789)
-    found = rails(values, np.nan)
+    found = samples_at_rails(values, np.nan)
     assert len(found) == 2
     for at in found:
         assert set(np.abs(values[at])) == {9.789}
@@ -40,8 +40,8 @@ def test_what_is_clipped_as_far_down_as_up_is_found(seed: int) -> None:
 
 def test_the_declared_range_needs_no_more_than_a_few() -> None:
     values = np.concatenate([np.linspace(-1.0, 8.0, 500), np.full(5, 9.8)])
-    assert [len(at) for at in rails(values, 9.8)] == [5]
-    assert not rails(values, 19.6)
+    assert [len(at) for at in samples_at_rails(values, 9.8)] == [5]
+    assert not samples_at_rails(values, 19.6)
 
 
 def test_a_coarse_step_is_known_though_the_first_rest_shows_two_values() -> None:
@@ -52,7 +52,9 @@ def test_a_coarse_step_is_known_though_the_first_rest_shows_two_values() -> None
     values = np.round((held + rng.normal(0, 0.2 * step, len(held))) / step) * step
     assert len(np.unique(values[:20_000])) == 2
     assert lsb_of(values) == pytest.approx(step, rel=1e-9)
-    assert rails(values, np.nan) and not rails(values, np.nan, coarse=True)
+    assert samples_at_rails(values, np.nan) and not samples_at_rails(
+        values, np.nan, coarse=True
+    )
 
 
 def swung(at: float, seconds: float = 1.0) -> np.ndarray:
@@ -66,12 +68,14 @@ def swung(at: float, seconds: float = 1.0) -> np.ndarray:
 
 def test_a_turn_that_runs_into_the_stop_once_is_clipped() -> None:
     """A single fast turn of a hobby gyroscope at 250 deg/s."""
-    (at,) = rails(swung(4.3633), np.nan)
+    (at,) = samples_at_rails(swung(4.3633), np.nan)
     assert len(at) > 50 and np.ptp(at) == len(at) - 1
-    assert not rails(swung(9.0), np.nan)
+    assert not samples_at_rails(swung(9.0), np.nan)
     # nor is it known of one that begins or ends there
     values = swung(4.3633)
-    assert not rails(values[at[0] :], np.nan) and not rails(values[: at[-1]], np.nan)
+    assert not samples_at_rails(values[at[0] :], np.nan) and not samples_at_rails(
+        values[: at[-1]], np.nan
+    )
 
 
 def test_what_stands_still_on_the_way_up_is_at_no_stop() -> None:
@@ -80,4 +84,4 @@ def test_what_stands_still_on_the_way_up_is_at_no_stop() -> None:
     top = int(np.argmax(values))
     values[top - 30 : top + 60] = values[top - 30]
     assert values.max() == values[top]
-    assert not rails(values, np.nan)
+    assert not samples_at_rails(values, np.nan)

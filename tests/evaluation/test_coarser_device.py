@@ -12,7 +12,7 @@ from session_folders import SITE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile, Truth
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 LADDER = [(0.0, 0.0), (22.5, 0.0), (22.5, 2.5), (45.0, 2.5), (45.0, 5.0)]
 LAID = [(178.0, 1.0), (91.5, -0.5), (-2.0, 88.0)]
@@ -27,12 +27,12 @@ LOW_COST = Profile(
     ),
     temperature=Climate(self_heating_k=0.0),
     effects=(
-        effect("earth_rate", {}),
-        effect(
+        checked_effect("earth_rate", {}),
+        checked_effect(
             "cross_coupling", {"k12": 0.012, "k13": -0.008, "k21": -0.015, "k32": 0.01}
         ),
-        effect("g_sensitivity", {"g12": 8e-5, "g33": -6e-5}),
-        effect("gyro_cross_coupling", {"s12": 0.01, "s31": -0.012}),
+        checked_effect("g_sensitivity", {"g12": 8e-5, "g33": -6e-5}),
+        checked_effect("gyro_cross_coupling", {"s12": 0.01, "s31": -0.012}),
     ),
     truth=Truth((0.1, -0.2, 0.55), (1.012, 0.99, 1.02), (0.03, -0.02, 0.01)),
 )

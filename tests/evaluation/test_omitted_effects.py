@@ -18,7 +18,7 @@ from fieldcal.core.positions import SIX_FACES
 from fieldcal.evaluation import angles_shown, omitted_effects
 from fieldcal.model.posterior.probabilities import Standing
 from fieldcal.sim_device.profile import Profile
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.solve import solve
 
 
@@ -53,7 +53,7 @@ def off(said: dict[str, Any], profile: Profile) -> np.ndarray[Any, np.dtype[Any]
 def test_wrongly_decoded_bytes_are_put_right(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    fault = effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
+    fault = checked_effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
     profile = device(fault)
     code, said = solved(profile, tmp_path / "s", capsys)
     assert code == 0 and said["verdict"] == "good"
@@ -75,7 +75,7 @@ def test_a_drift_is_in_the_result(
     Angles that are set to 0.05° show a drift of 8e-3 m/s² in 5 minutes badly: it is as
     large as was found, and no smaller because it is less certain.
     """
-    profile = device(effect("bias_drift", {"ax": size}))
+    profile = device(checked_effect("bias_drift", {"ax": size}))
     code, said = solved(profile, tmp_path / "s", capsys)
     assert code == 0 and said["verdict"] == "good"
     assert "not_carried" not in said
@@ -117,7 +117,7 @@ def test_intervals_hold_with_a_course_in_them(
     held = places(WIDE)
     pulls: list[float] = []
     for seed, name in enumerate([*COURSES] * 3):
-        profile = device(effect(name, COURSES[name]))
+        profile = device(checked_effect(name, COURSES[name]))
         folder = tmp_path / str(seed)
         write_session(folder, recorded(profile, held, seed), held)
         main(["solve", str(folder), "--json", "--angles", "0.0001"])
@@ -150,7 +150,7 @@ def test_nothing_is_said_of_a_device_that_has_nothing_more(
 def test_cross_coupling_that_was_asked_for_is_carried(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    profile = device(effect("cross_coupling", {"k12": 5e-3, "k31": -4e-3}))
+    profile = device(checked_effect("cross_coupling", {"k12": 5e-3, "k31": -4e-3}))
     code, said = solved(profile, tmp_path / "s", capsys, "--cross")
     assert code == 0
     assert "not_carried" not in said and "carried" not in said
@@ -166,7 +166,7 @@ def test_rates_in_another_unit_are_never_solved_as_good(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str
 ) -> None:
     """At rest nothing shows it: the turns between positions do."""
-    profile = device(effect("mounting", {"unit": unit}))
+    profile = device(checked_effect("mounting", {"unit": unit}))
     code, said = solved(profile, tmp_path / "s", capsys)
     assert (code, said["verdict"]) == (1, "bad")
     assert f"wrong about the mounting (unit = {unit})" in said["warnings"][0]

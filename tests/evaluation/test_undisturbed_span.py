@@ -13,7 +13,7 @@ from session_folders import CALM, FACES, places, recorded, write_session
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.undisturbed_span import undisturbed_span
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.windows import Average
 
 T = np.arange(0.0, 30.0, 0.01)
@@ -52,7 +52,9 @@ def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One part alone is a position that is off, whose bias nothing else contradicts."""
-    knock = effect("base_step", {"about_x_deg": 0.0, "about_z_deg": 0.05, "at_s": 17.0})
+    knock = checked_effect(
+        "base_step", {"about_x_deg": 0.0, "about_z_deg": 0.05, "at_s": 17.0}
+    )
     profile = replace(CALM, effects=(*CALM.effects, knock))
     held = places(FACES)
     assert held[0]["start_s"] < 17.0 < held[0]["end_s"] - 2

@@ -19,7 +19,7 @@ from fieldcal.fleet.batch import SessionBatch
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.reduced import ReducedSession
 from fieldcal.fleet.tree import fingerprint, sessions_in
-from fieldcal.fleet.workers import Pool
+from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.session.folder import RESULT
@@ -48,8 +48,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def inside(monkeypatch: pytest.MonkeyPatch) -> None:
     """Threads in the place of processes, which would import everything again."""
-    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
-    monkeypatch.setattr("fieldcal.fleet.workers.processes", lambda *_: pool)
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    monkeypatch.setattr("fieldcal.fleet.workers.process_pool", lambda *_: pool)
 
 
 @pytest.mark.usefixtures("inside")
@@ -116,16 +116,18 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     found = sessions_in([copy, copy / "x"])
     assert len(found) == 3, "each once"
     batch = SessionBatch(found, Quick(), Database(tmp_path / "h"))
-    done = batch.carried_out(batch.left(), Pool(lambda: ThreadPoolExecutor(1), 1))
+    done = batch.process(
+        batch.unprocessed(), WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    )
     first = next(done).folder
     done.close()
-    left = batch.left()
+    left = batch.unprocessed()
     assert first not in left and len(left) == 2
-    list(batch.carried_out(left, Pool(lambda: ThreadPoolExecutor(1), 1)))
-    assert batch.left() == []
+    list(batch.process(left, WorkerPool(lambda: ThreadPoolExecutor(1), 1)))
+    assert batch.unprocessed() == []
     with (found[0] / "session.toml").open("a") as file:
         file.write("# mended\n")
-    assert batch.left() == [str(found[0])]
+    assert batch.unprocessed() == [str(found[0])]
 
 
 def test_wrong_calls_are_refused(tree: Path, tmp_path: Path) -> None:

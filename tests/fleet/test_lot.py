@@ -13,11 +13,11 @@ from scipy.stats import norm
 from fieldcal.calibration import limits
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
-from fieldcal.fleet.capability import capability
+from fieldcal.fleet.capability import lot_parameter
 from fieldcal.fleet.control import cusum, cusum_limit, ewma, ewma_limit
-from fieldcal.fleet.lot import Lot, lot
-from fieldcal.fleet.odd import discovered
-from fieldcal.fleet.spread import spread
+from fieldcal.fleet.lot import LotAnalysis, analyse_lot
+from fieldcal.fleet.odd import benjamini_hochberg
+from fieldcal.fleet.spread import estimate_distribution
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -30,7 +30,7 @@ def test_the_spread_is_that_of_units_without_their_errors() -> None:
     inside, ratio = 0, []
     for _ in range(60):
         sigma = rng.uniform(0.5, 2.0, 40)
-        found = spread(
+        found = estimate_distribution(
             3 + rng.standard_normal(40) + sigma * rng.standard_normal(40), sigma
         )
         inside += found.low <= 1.0 <= found.high
@@ -47,22 +47,22 @@ def test_what_is_said_of_spread_and_capability_is_what_they_scatter_by() -> None
         sigma = rng.uniform(0.01, 0.03, 60)
         x = 0.05 + 0.02 * rng.standard_normal(60) + sigma * rng.standard_normal(60)
         drawn.append(
-            capability("acc_bias.x", "m/s^2", np.arange(60), x, sigma, BOUNDS, 1)
+            lot_parameter("acc_bias.x", "m/s^2", np.arange(60), x, sigma, BOUNDS, 1)
         )
     for name in ("cp", "cpk"):
         value = np.array([getattr(one, name) for one in drawn])
         stated = np.array([getattr(one, f"{name}_sigma") for one in drawn])
         assert 0.75 < value.std() / np.median(stated) < 1.35, name
-    value = np.array([one.about.spread for one in drawn])
-    stated = np.array([one.about.spread_sigma for one in drawn])
+    value = np.array([one.distribution.spread for one in drawn])
+    stated = np.array([one.distribution.spread_sigma for one in drawn])
     assert 0.8 < value.std() / np.median(stated) < 1.25
-    square = np.array([one.about.square for one in drawn])
+    square = np.array([one.distribution.mean_square_spread for one in drawn])
     assert np.mean(square) > np.mean(value**2), "what is not known of it is in it"
 
 
 def test_without_errors_of_units_capability_is_as_uncertain_as_bissell_has_it() -> None:
     x = 0.1 + 0.05 * norm.ppf((np.arange(80) + 0.5) / 80)
-    one = capability("acc_bias.x", "m/s^2", np.arange(80), x, np.full(80, 1e-9),
+    one = lot_parameter("acc_bias.x", "m/s^2", np.arange(80), x, np.full(80, 1e-9),
                      BOUNDS, 1)  # fmt: skip
     assert one.cpk is not None and one.cp is not None
     assert one.cpk_sigma == pytest.approx(
@@ -73,13 +73,13 @@ def test_without_errors_of_units_capability_is_as_uncertain_as_bissell_has_it() 
 
 def test_units_that_differ_by_their_errors_only_have_no_spread() -> None:
     rng = np.random.default_rng(2)
-    found = spread(0.1 * rng.standard_normal(300), np.full(300, 0.1))
+    found = estimate_distribution(0.1 * rng.standard_normal(300), np.full(300, 0.1))
     assert found.low == 0.0 and found.spread < 0.04
 
 
 def test_units_far_better_known_than_they_differ_have_a_spread() -> None:
     rng = np.random.default_rng(12)
-    found = spread(0.1 * rng.standard_normal(80), np.full(80, 1e-9))
+    found = estimate_distribution(0.1 * rng.standard_normal(80), np.full(80, 1e-9))
     assert found.low > 0.05 and found.spread == pytest.approx(0.1, rel=0.2)
 
 
@@ -87,11 +87,11 @@ def test_odd_units_widen_nothing() -> None:
     rng = np.random.default_rng(3)
     x, sigma = rng.standard_normal(200), np.full(200, 0.3)
     x += sigma * rng.standard_normal(200)
-    clean = spread(x, sigma)
+    clean = estimate_distribution(x, sigma)
     x[:6] += np.array([15, -20, 30, 12, -14, 18])
-    found = spread(x, sigma)
+    found = estimate_distribution(x, sigma)
     assert found.spread == pytest.approx(clean.spread, rel=0.1)
-    assert (found.typical[:6] < 0.01).all()
+    assert (found.typical_probability[:6] < 0.01).all()
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_false_discoveries_are_as_many_as_stated() -> None:
     for _ in range(200):
         z = rng.standard_normal(300)
         z[:15] += 5
-        found = discovered(2 * norm.sf(np.abs(z)), 0.05)
+        found = benjamini_hochberg(2 * norm.sf(np.abs(z)), 0.05)
         wrong, right = wrong + int(found[15:].sum()), right + int(found[:15].sum())
     assert wrong / (wrong + right) < 0.06 and right > 0.85 * 15 * 200
 
@@ -177,8 +177,8 @@ def units(
     return out
 
 
-def of(some: list[StoredSession]) -> Lot:
-    return lot(some, BOUNDS)
+def of(some: list[StoredSession]) -> LotAnalysis:
+    return analyse_lot(some, BOUNDS)
 
 
 def test_a_lot_says_what_it_was_drawn_from() -> None:
@@ -195,8 +195,8 @@ def test_a_lot_says_what_it_was_drawn_from() -> None:
     assert difference == pytest.approx(2e-3, abs=4 * shift.sigmas[at])
     assert not found.alarms
     assert (found.good, found.judged) == (147, 150)
-    assert 0.94 < found.share[1] < 0.98 < found.share[2] < 1.0
-    about = found.parameters["acc_bias.y"].about
+    assert 0.94 < found.yield_share[1] < 0.98 < found.yield_share[2] < 1.0
+    about = found.parameters["acc_bias.y"].distribution
     assert about.low < 0.02 < about.high
     capable = found.parameters["acc_bias.y"].cpk or 0.0
     assert capable == pytest.approx(0.3 / 0.06, rel=0.25)

@@ -14,7 +14,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.fleet.lot_prior import lot_prior
+from fieldcal.fleet.lot_prior import estimate_lot_prior
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -63,7 +63,7 @@ def drawn(
 
 
 def test_mean_and_spread_are_those_of_the_next_unit() -> None:
-    found = lot_prior("lot 7", drawn(np.random.default_rng(1), 400))
+    found = estimate_lot_prior("lot 7", drawn(np.random.default_rng(1), 400))
     assert found.names == NAMES and found.units == (400,) * 4
     np.testing.assert_allclose(found.mean, MIDDLE, atol=4 * (WIDE + ERROR).max() / 20)
     np.testing.assert_allclose(found.sigma, WIDE, rtol=0.2)
@@ -73,10 +73,10 @@ def test_mean_and_spread_are_those_of_the_next_unit() -> None:
 
 @pytest.mark.parametrize("lot", [0.8, -0.8])
 def test_what_goes_together_in_a_lot_is_told_from_errors_that_do(lot: float) -> None:
-    found = lot_prior("7", drawn(np.random.default_rng(2), 300, lot, -lot / 3))
+    found = estimate_lot_prior("7", drawn(np.random.default_rng(2), 300, lot, -lot / 3))
     made = found.covariance[0, 1] / found.sigma[0] / found.sigma[1]
     assert made == pytest.approx(lot, abs=0.15)
-    few = lot_prior("7", drawn(np.random.default_rng(3), 6, lot, -lot / 3))
+    few = estimate_lot_prior("7", drawn(np.random.default_rng(3), 6, lot, -lot / 3))
     assert abs(few.covariance[0, 1]) < 0.75 * few.sigma[0] * few.sigma[1]
 
 
@@ -86,7 +86,7 @@ def test_few_units_leave_as_much_open_as_is_said() -> None:
     rng = np.random.default_rng(4)
     off = []
     for _ in range(10):
-        found = lot_prior("7", drawn(rng, 7))
+        found = estimate_lot_prior("7", drawn(rng, 7))
         following = MIDDLE + WIDE * rng.standard_normal((3, 4))
         off.append((following - found.mean) / found.sigma)
     inside = np.mean(np.abs(off) < 1.96)
@@ -96,13 +96,13 @@ def test_few_units_leave_as_much_open_as_is_said() -> None:
 def test_odd_units_and_the_unit_itself_have_no_say() -> None:
     rng = np.random.default_rng(5)
     some = drawn(rng, 60, 0.5)
-    plain = lot_prior("7", some[1:])
-    itself = lot_prior("7", some, serial="A0", folder="/none")
-    again = lot_prior("7", some, folder=some[0].folder)
+    plain = estimate_lot_prior("7", some[1:])
+    itself = estimate_lot_prior("7", some, serial="A0", folder="/none")
+    again = estimate_lot_prior("7", some, folder=some[0].folder)
     for found in (itself, again):
         np.testing.assert_array_equal(found.covariance, plain.covariance)
     odd = calibration(MIDDLE + 30 * WIDE, ERROR)
-    beside = lot_prior("7", [*some[1:], stored(90, odd)])
+    beside = estimate_lot_prior("7", [*some[1:], stored(90, odd)])
     np.testing.assert_allclose(beside.sigma, plain.sigma, rtol=0.1)
     assert (np.abs(beside.mean - plain.mean) < 0.1 * WIDE).all()
     np.testing.assert_allclose(beside.covariance, plain.covariance, rtol=0.25,
@@ -113,9 +113,9 @@ def test_scale_factors_count_where_gravity_was_known() -> None:
     rng = np.random.default_rng(6)
     nowhere = [stored(i, calibration(MIDDLE + WIDE * rng.standard_normal(4), ERROR),
                       place=False) for i in range(9)]  # fmt: skip
-    assert lot_prior("7", nowhere).names == NAMES[:3]
+    assert estimate_lot_prior("7", nowhere).names == NAMES[:3]
     with pytest.raises(InputError, match="a lot needs 5"):
-        lot_prior("7", nowhere[:4])
+        estimate_lot_prior("7", nowhere[:4])
 
 
 def test_what_was_borrowed_is_not_learned_from_again() -> None:
@@ -135,7 +135,7 @@ def test_what_was_borrowed_is_not_learned_from_again() -> None:
     assert sigma == pytest.approx(ERROR[0])
     rng = np.random.default_rng(7)
     others = drawn(rng, 8)
-    assert lot_prior("7", [*others, one]).units == (9, 9, 8, 9)
+    assert estimate_lot_prior("7", [*others, one]).units == (9, 9, 8, 9)
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from fieldcal.fleet.levels import Grouping, Member, Sessions, groupings
+from fieldcal.fleet.levels import Grouping, LevelEffect, PooledSessions, groupings
 from fieldcal.fleet.reduced import ReducedSession, SharedColumn
-from fieldcal.fleet.shared import SharedFinding, SharedSearch, together
+from fieldcal.fleet.shared import SharedFinding, SharedSearch, stack_sessions
 from fieldcal.history.sessions import StoredSession
 from fieldcal.model import priors
 
@@ -33,13 +33,13 @@ def test_levels_that_group_alike_are_one_and_one_has_all() -> None:
 
 def drawn(
     rng: np.random.Generator, rows: int = 7, columns: int = 3
-) -> tuple[list[np.ndarray], list[np.ndarray], Sessions]:
+) -> tuple[list[np.ndarray], list[np.ndarray], PooledSessions]:
     """Rows with white noise of one, and what is left of them."""
     design = [rng.standard_normal((rows, columns)) for _ in DEVICES]
     seen = [rng.standard_normal(rows) + 2 for _ in DEVICES]
     matrix = np.array([a.T @ a for a in design])
     pull = np.array([a.T @ y for a, y in zip(design, seen, strict=True)])
-    return design, seen, Sessions(matrix, pull)
+    return design, seen, PooledSessions(matrix, pull)
 
 
 def dense(
@@ -62,8 +62,8 @@ def test_the_evidence_is_that_of_all_rows_together() -> None:
     rng = np.random.default_rng(3)
     design, seen, sessions = drawn(rng)
     level = Grouping.of("device", DEVICES)
-    one = Member(np.array([0, 2]), level)
-    found = sessions.weighed([one])
+    one = LevelEffect(np.array([0, 2]), level)
+    found = sessions.posterior([one])
     truth = logsumexp(
         [
             dense(design, seen, [(one.columns, level.index, v)]) + np.log(p)
@@ -71,17 +71,17 @@ def test_the_evidence_is_that_of_all_rows_together() -> None:
         ]
     )
     assert found.score == pytest.approx(truth, abs=1e-9)
-    empty = sessions.weighed([])
+    empty = sessions.posterior([])
     assert empty.score == 0.0
-    assert sessions.offered(empty, one) == pytest.approx(truth, abs=1e-9)
+    assert sessions.evidence_gain(empty, one) == pytest.approx(truth, abs=1e-9)
 
 
 def test_what_a_further_effect_adds_is_exact_beside_the_others() -> None:
     rng = np.random.default_rng(4)
     design, seen, sessions = drawn(rng)
-    first = Member(np.array([0, 1]), Grouping.of("device", DEVICES))
-    second = Member(np.array([2]), Grouping.of("session", list("abcdef")))
-    base = sessions.weighed([first])
+    first = LevelEffect(np.array([0, 1]), Grouping.of("device", DEVICES))
+    second = LevelEffect(np.array([2]), Grouping.of("session", list("abcdef")))
+    base = sessions.posterior([first])
     known = (first.columns, first.grouping.index, base.sizes[0])
     before = dense(design, seen, [known])
     truth = logsumexp(
@@ -91,18 +91,20 @@ def test_what_a_further_effect_adds_is_exact_beside_the_others() -> None:
             for v, p in zip(priors.SIZES, priors.density(), strict=True)
         ]
     )
-    assert sessions.offered(base, second) == pytest.approx(truth - before, abs=1e-8)
-    both = sessions.weighed([first, second])
+    assert sessions.evidence_gain(base, second) == pytest.approx(
+        truth - before, abs=1e-8
+    )
+    both = sessions.posterior([first, second])
     whole = np.vstack(design)
     owner = np.repeat(np.arange(6), 7)
     parts = [
         whole[:, [c]] * (m.grouping.index[owner] == g)[:, None] * v
-        for m, v in zip(both.members, both.sizes, strict=True)
+        for m, v in zip(both.effects, both.sizes, strict=True)
         for g in range(len(m.grouping.labels))
         for c in m.columns
     ]
     ridge = np.hstack(parts)
-    scale = np.repeat(both.sizes, [m.width for m in both.members])
+    scale = np.repeat(both.sizes, [m.width for m in both.effects])
     left = np.linalg.inv(ridge.T @ ridge + np.eye(len(scale)))
     mean = left @ ridge.T @ np.concatenate(seen) * scale
     np.testing.assert_allclose(both.mean, mean, atol=1e-9)
@@ -163,7 +165,7 @@ def test_a_station_is_told_from_devices_and_sessions() -> None:
     value = np.array([0, 0, 0, 0, 4.0, -4.0])
     (one,) = SharedSearch(fleet(rng, 24, value, "R")).run()
     assert (one.effect.key[0], one.level) == ("base_tilt", "station")
-    at = one.effect.member.grouping.labels.index("R")
+    at = one.effect.level_effect.grouping.labels.index("R")
     assert np.argmax(np.abs(one.values[:, 0])) == at
     document = one.to_json()
     assert set(document["groups"]) == {"P", "Q", "R", "S"}
@@ -198,7 +200,7 @@ def test_time_constants_count_that_all_sessions_have() -> None:
         return ReducedSession(columns, np.eye(len(shapes)), np.ones(len(shapes)))
 
     other = ReducedSession(COLUMNS[:2], np.eye(2), np.ones(2))
-    columns, matrix, pull = together([warm("8 s", "16 s"), warm("16 s"), other])
+    columns, matrix, pull = stack_sessions([warm("8 s", "16 s"), warm("16 s"), other])
     assert [(c.effect, c.shape) for c in columns] == [
         ("warm_up", "16 s"), *(("cross_coupling", "") for _ in range(2)),
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from test_shared import fleet
 from fieldcal.cli import main
 from fieldcal.fleet import tree
 from fieldcal.fleet.outcome import SessionTask
-from fieldcal.fleet.workers import Pool
+from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -38,8 +38,8 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         )  # fmt: skip
 
     monkeypatch.setattr(SessionTask, "__call__", solved)
-    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
-    monkeypatch.setattr("fieldcal.fleet.workers.processes", lambda *_: pool)
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    monkeypatch.setattr("fieldcal.fleet.workers.process_pool", lambda *_: pool)
     database = Database(tmp_path / "h")
     for name in list(made)[:-2]:
         kept = solved(SessionTask(diagnose=True), name)

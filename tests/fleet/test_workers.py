@@ -17,7 +17,7 @@ import pytest
 from processes import HANGS
 
 from fieldcal.core.errors import InputError
-from fieldcal.fleet.workers import Pool, processes, results, scheduled
+from fieldcal.fleet.workers import WorkerPool, dask_pool, process_pool, run_tasks
 
 
 def carried_out(item: str) -> str:
@@ -29,7 +29,7 @@ def carried_out(item: str) -> str:
 
 def test_a_process_that_is_killed_costs_its_own_item_only() -> None:
     items = [*map(str, range(6)), "kill a", *map(str, range(6, 12)), "kill b"]
-    found = list(results(items, carried_out, processes(2, [__name__])))
+    found = list(run_tasks(items, carried_out, process_pool(2, [__name__])))
     assert sorted(one.item for one in found) == sorted(items), "each once"
     lost = {one.item: one.error for one in found if one.value is None}
     assert set(lost) == {"kill a", "kill b"}
@@ -42,8 +42,8 @@ def test_an_engine_that_gives_up_an_item_goes_on_with_the_others() -> None:
             raise RuntimeError("its workers died")
         return item
 
-    pool = Pool(lambda: ThreadPoolExecutor(2), 2)
-    found = {one.item: one for one in results(["a", "b", "c"], refused, pool)}
+    pool = WorkerPool(lambda: ThreadPoolExecutor(2), 2)
+    found = {one.item: one for one in run_tasks(["a", "b", "c"], refused, pool)}
     assert found["b"].error == "b: RuntimeError: its workers died"
     assert found["a"].value == "a" and found["c"].value == "c"
 
@@ -57,7 +57,9 @@ def test_no_more_is_given_out_than_keeps_workers_busy() -> None:
             return super().submit(fn, *args)
 
     items = [str(i) for i in range(50)]
-    some: Iterator[object] = results(items, str.upper, Pool(lambda: Counting(1), 1))
+    some: Iterator[object] = run_tasks(
+        items, str.upper, WorkerPool(lambda: Counting(1), 1)
+    )
     next(some)
     assert len(given) <= 3
 
@@ -67,19 +69,22 @@ def test_a_scheduler_of_dask_does_the_same() -> None:
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+            n_workers=1,
+            threads_per_worker=2,
+            processes=False,
+            dashboard_address=None,
         ) as cluster,
-        scheduled(cluster.scheduler_address) as pool,
+        dask_pool(cluster.scheduler_address) as pool,
     ):
         assert pool.workers == 2
-        found = {one.value for one in results(["a", "b", "c"], str.upper, pool)}
+        found = {one.value for one in run_tasks(["a", "b", "c"], str.upper, pool)}
     assert found == {"A", "B", "C"}
 
 
 def test_a_scheduler_that_is_none_is_said() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="no scheduler answers"):
-        with scheduled("nonsense://1"):
+        with dask_pool("nonsense://1"):
             raise AssertionError
 
 
@@ -90,17 +95,17 @@ def test_a_pool_that_cannot_be_opened_again_says_so() -> None:
         yield
 
     with pytest.raises(InputError, match="is gone"):
-        list(results(["a"], str.upper, Pool(shut, 1)))
+        list(run_tasks(["a"], str.upper, WorkerPool(shut, 1)))
 
 
 ALONE = """
 import os, pathlib, time
-from fieldcal.fleet.workers import processes, results
+from fieldcal.fleet.workers import process_pool, run_tasks
 def stay(path):
     pathlib.Path(path).write_text(str(os.getpid()))
     time.sleep(1000)
 if __name__ == "__main__":
-    list(results([{there!r}], stay, processes(1)))
+    list(run_tasks([{there!r}], stay, process_pool(1)))
 """
 
 

@@ -16,9 +16,9 @@ from benchmarks.concealed.navigators import NAVIGATORS
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
-from fieldcal.navigator.growth import growth, matrix
+from fieldcal.navigator.growth import error_dynamics, propagate_errors
 from fieldcal.navigator.large_angles import beyond_first_order
-from fieldcal.navigator.session_runs import calibrated
+from fieldcal.navigator.session_runs import calibrate_navigator
 from fieldcal.session import description
 
 EXACT = Sensors(np.zeros(3), np.ones(3), np.zeros(3))
@@ -29,7 +29,7 @@ def solved(folder: Path, **how: Any) -> tuple[Calibration, Sensors]:
     sensors = how.pop("sensors", None) or Sensors.drawn(rng)
     record(folder, sensors, rng, **how)
     about = description.read(folder / "session.toml")
-    return calibrated(folder, about), sensors
+    return calibrate_navigator(folder, about), sensors
 
 
 def pulls(found: Calibration, sensors: Sensors) -> list[float]:
@@ -54,7 +54,7 @@ def test_errors_grow_as_in_a_navigator_in_other_axes(attitude: tuple[int, int]) 
     v, p = navigated(
         np.tile(true.T @ earth + drift, (n, 1)), np.tile(force, (n, 1)), dt, c, phi, G
     )
-    grown = growth(matrix(earth, G), n * dt / 24, 24)
+    grown = propagate_errors(error_dynamics(earth, G), n * dt / 24, 24)
     both = np.concatenate([c @ drift, c @ bias])
     linear = grown.constant @ both + grown.start[:, :, :3] @ began
     errors = np.concatenate([drift, bias, began])
@@ -77,7 +77,7 @@ def test_noise_grows_as_that_of_many_runs() -> None:
         forces = [0, -G, 0] + 2e-3 / np.sqrt(dt) * rng.standard_normal((n, 3))
         v, p = navigated(rates, forces, dt, np.eye(3), phi, G)
         ends.append(np.concatenate([v[-1], p[-1]]))
-    grown = growth(matrix(earth, G), n * dt / 4, 4)
+    grown = propagate_errors(error_dynamics(earth, G), n * dt / 4, 4)
     whole = 1e-8 * grown.rate_noise + 4e-6 * grown.force_noise
     sigma = np.sqrt(np.diag(whole)[-6:])
     ratio = np.std(ends, axis=0) / sigma
@@ -205,11 +205,11 @@ def test_what_cannot_be_used_is_refused(
     record(tmp_path, EXACT, np.random.default_rng(1), faces=FACES[:1], seconds=20.0)
     (tmp_path / file).write_text(content)
     with pytest.raises(InputError, match=says):
-        calibrated(tmp_path, description.read(tmp_path / "session.toml"))
+        calibrate_navigator(tmp_path, description.read(tmp_path / "session.toml"))
 
 
 def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     record(tmp_path, EXACT, rng, faces=FACES[:1], columns=("vn",), azimuth_deg=9.0)
     with pytest.raises(InputError, match="has one of them"):
-        calibrated(tmp_path, description.read(tmp_path / "session.toml"))
+        calibrate_navigator(tmp_path, description.read(tmp_path / "session.toml"))

@@ -18,7 +18,7 @@ from fieldcal.planning.expected_gain import ExpectedGain
 from fieldcal.session import description
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 LADDER = [Position.deg(a, b) for a in (-45, 0, 45) for b in (-5, 0, 5)]
 ALLOWED = {"acc_bias.x": 0.02, "acc_bias.y": 0.02, "acc_bias.z": 0.02}
@@ -42,7 +42,7 @@ def explained(
         (p.alpha or 0.0, p.beta or 0.0, float(s), float(s) + SECONDS)
         for p, s in zip(positions, starts, strict=True)
     ]
-    effects = tuple(effect(name, given) for name, given in more)
+    effects = tuple(checked_effect(name, given) for name, given in more)
     block = simulate(Profile(effects=effects), windows, seed=4)
     tables = []
     for p, w in zip(positions, windows, strict=True):

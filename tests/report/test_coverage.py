@@ -10,7 +10,7 @@ from session_folders import places, recorded, write_session
 
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
-from fieldcal.report.coverage import Coverage, directions, uncertainty
+from fieldcal.report.coverage import Coverage, force_sigma, sphere_directions
 from fieldcal.sim_device.profile import Profile
 
 NAMES = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xyz")
@@ -23,7 +23,7 @@ def calibration(covariance: np.ndarray) -> Calibration:
 
 
 def test_the_spiral_is_even() -> None:
-    d = directions(4000)
+    d = sphere_directions(4000)
     np.testing.assert_allclose(np.linalg.norm(d, axis=1), 1.0)
     # an even sphere: of every axis the mean is 0 and the mean square a third
     np.testing.assert_allclose(d.mean(axis=0), 0.0, atol=2e-3)
@@ -31,7 +31,7 @@ def test_the_spiral_is_even() -> None:
 
 
 def test_the_farthest_direction_is_across_from_what_was_seen() -> None:
-    upper = directions(400)
+    upper = sphere_directions(400)
     forces = 9.81 * upper[upper[:, 2] > 0]
     found = Coverage.of(forces, calibration(1e-6 * np.eye(6)), 9.81)
     assert found.gap_deg == pytest.approx(90.0, abs=6.0)
@@ -45,12 +45,12 @@ def test_the_uncertainty_is_that_of_drawn_calibrations() -> None:
     rng = np.random.default_rng(2)
     root = rng.normal(0, 1e-3, (6, 6))
     found = calibration(root @ root.T)
-    force = 9.81 * directions(5)
+    force = 9.81 * sphere_directions(5)
     raw = found.values[:3] + found.values[3:] * force
     drawn = rng.multivariate_normal(found.values, found.covariance, 20_000)
     back = (raw[:, None] - drawn[:, :3]) / drawn[:, 3:]
     spread = np.sqrt(((back - force[:, None]) ** 2).mean(axis=1).sum(axis=1))
-    np.testing.assert_allclose(uncertainty(found, force), spread, rtol=0.03)
+    np.testing.assert_allclose(force_sigma(found, force), spread, rtol=0.03)
 
 
 @pytest.mark.parametrize(

@@ -21,12 +21,12 @@ from hypothesis.extra import numpy as hnp
 from fieldcal.cli import main
 from fieldcal.core.positions import FIVE
 from fieldcal.core.samples import Array, Block
-from fieldcal.report import EarlierCalibration, Material, gather, packing, render
-from fieldcal.report.agreement import correlations
+from fieldcal.report import EarlierCalibration, ReportMaterial, gather, packing, render
+from fieldcal.report.agreement import correlation_matrix
 from fieldcal.report.blocks import Figure
 from fieldcal.report.gravity_norm import norm_errors
-from fieldcal.report.packing import MISSING, PIECE, Columns, pack, quantised
-from fieldcal.report.residuals import reached, residuals
+from fieldcal.report.packing import MISSING, PIECE, ChannelTable, pack, quantise
+from fieldcal.report.residuals import measured_angles, window_residuals
 from fieldcal.report.stillness import motion_by_second
 from fieldcal.sim_device.profile import Profile
 from fieldcal.windows.cells import CellAccumulator
@@ -52,7 +52,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def material(bench: Path) -> Material:
+def material(bench: Path) -> ReportMaterial:
     return gather(bench)
 
 
@@ -84,7 +84,7 @@ values = hnp.arrays(
 
 @given(values)
 def test_packed_values_come_back_to_within_half_a_step(x: Array) -> None:
-    back = unquantised(quantised(x))
+    back = unquantised(quantise(x))
     assert (np.isnan(back) == np.isnan(x)).all()
     for first in range(0, len(x), packing.PIECE):
         part = x[first : first + packing.PIECE]
@@ -103,7 +103,9 @@ def test_no_peak_of_a_long_recording_is_lost_and_the_edges_are_whole() -> None:
     t = 100.0 + np.arange(n) / 1000
     x = rng.standard_normal((n, 7))
     x[123_456, 2], x[200_000:201_000, 4] = 50.0, np.nan
-    packed = pack(Columns(t, x), packing.stretches_around([150.0, 151.0, 300.0], 3.0))
+    packed = pack(
+        ChannelTable(t, x), packing.stretches_around([150.0, 151.0, 300.0], 3.0)
+    )
     base = packed["base"]
     index = np.minimum((t - base["start"]) // base["dt"], base["n"] - 1).astype(int)
     for c in range(7):
@@ -120,15 +122,15 @@ def test_no_peak_of_a_long_recording_is_lost_and_the_edges_are_whole() -> None:
 
 def test_a_short_recording_is_packed_sample_by_sample() -> None:
     t = np.cumsum(np.random.default_rng(1).uniform(0.001, 0.2, 5000))
-    packed = pack(Columns(t, np.sin(t)[:, None]), [])
+    packed = pack(ChannelTable(t, np.sin(t)[:, None]), [])
     times = np.frombuffer(base64.b64decode(packed["base"]["times"]), "<u4")
     assert np.abs(packed["base"]["start"] + times * 1e-6 - t).max() < 1e-6
     assert "dt" not in packed["base"] and packed["details"] == []
 
 
 @pytest.mark.thorough
-def test_residuals_are_those_of_the_fit(material: Material) -> None:
-    found = residuals(material)
+def test_residuals_are_those_of_the_fit(material: ReportMaterial) -> None:
+    found = window_residuals(material)
     assert found is not None and material.calibration is not None
     acc, sigma = found.channel[:, :3], found.sigma[:, :3]
     chi2 = float(((acc / sigma) ** 2).sum())
@@ -139,18 +141,18 @@ def test_residuals_are_those_of_the_fit(material: Material) -> None:
 
 
 def test_angles_shown_are_those_of_the_device_within_their_uncertainty(
-    material: Material,
+    material: ReportMaterial,
 ) -> None:
-    where = reached(material)
+    where = measured_angles(material)
     assert where is not None
-    pulls = (where.shown - where.asked - np.array(TILT)) / where.sigma
+    pulls = (where.measured - where.stated - np.array(TILT)) / where.sigma
     assert np.abs(pulls).max() < 4.0
     assert where.sigma.max() < 0.1
 
 
-def test_correlations_are_a_correlation_matrix(material: Material) -> None:
+def test_correlations_are_a_correlation_matrix(material: ReportMaterial) -> None:
     assert material.calibration is not None
-    r = correlations(material.calibration)
+    r = correlation_matrix(material.calibration)
     assert np.allclose(np.diag(r), 1.0) and np.abs(r).max() < 1 + 1e-9
 
 
@@ -257,7 +259,7 @@ def test_a_decision_by_limits_stands_on_top(bench: Path, tmp_path: Path) -> None
     assert "Take position 3 again: it disagrees. Too much bias." in text
 
 
-def test_the_page_opens_with_what_to_do(material: Material) -> None:
+def test_the_page_opens_with_what_to_do(material: ReportMaterial) -> None:
     found = material.calibration
     assert found is not None
     assert "Apply it: the numbers hold" in Tags(render(material)).text
@@ -280,7 +282,9 @@ def test_the_page_opens_with_what_to_do(material: Material) -> None:
         assert says in Tags(render(replace(material, session=session))).text
 
 
-def test_the_norm_misses_gravity_by_bias_and_scale_before(material: Material) -> None:
+def test_the_norm_misses_gravity_by_bias_and_scale_before(
+    material: ReportMaterial,
+) -> None:
     """The virtual device's own numbers, along the force that it was given."""
     errors = norm_errors(material)
     assert errors is not None
@@ -293,8 +297,8 @@ def test_the_norm_misses_gravity_by_bias_and_scale_before(material: Material) ->
     expected = np.linalg.norm(output, axis=1) - g
     np.testing.assert_allclose(errors.before, expected, atol=3e-3)
     assert np.abs(errors.after).max() < 5 * errors.sigma.max() < 0.01
-    assert material.still is not None
-    means = [a.sigma[:3].mean() for a in material.still.averages]
+    assert material.windows is not None
+    means = [a.sigma[:3].mean() for a in material.windows.averages]
     np.testing.assert_allclose(errors.sigma, means, rtol=0.4)
     assert "Gravity, before and after" in Tags(render(material)).text
 
@@ -339,18 +343,18 @@ ITEM = st.dictionaries(
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(st.sampled_from(KEYS), anything | ITEM | st.lists(ITEM)))
 def test_a_diagnosis_of_any_shape_gives_a_section(
-    material: Material, document: dict[str, Any]
+    material: ReportMaterial, document: dict[str, Any]
 ) -> None:
-    from fieldcal.report.diagnosis import diagnosis
+    from fieldcal.report.diagnosis import diagnosis_section
 
-    section = diagnosis(replace(material, diagnosis=document))
+    section = diagnosis_section(replace(material, diagnosis=document))
     assert section is not None and section.blocks
     for block in section.blocks:
         if isinstance(block, Figure):
             json.dumps(block.chart.to_json(), allow_nan=False)
 
 
-def test_a_comparison_with_a_simulator_is_a_section(material: Material) -> None:
+def test_a_comparison_with_a_simulator_is_a_section(material: ReportMaterial) -> None:
     quantity = {"value": 0.1, "sigma": 0.002, "unit": "m/s^2"}
     found = {
         "verdict": "left_out",
@@ -373,7 +377,7 @@ def test_a_comparison_with_a_simulator_is_a_section(material: Material) -> None:
 
 @pytest.mark.parametrize("found", [{}, {"differences": [{}, 3]}, {"prediction": []}])
 def test_a_comparison_of_any_shape_gives_a_section(
-    material: Material, found: dict[str, Any]
+    material: ReportMaterial, found: dict[str, Any]
 ) -> None:
     assert "Against a simulator" in render(replace(material, against=found))
 

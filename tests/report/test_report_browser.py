@@ -14,10 +14,10 @@ from test_report import HOSTILE
 
 from fieldcal.cli import main
 from fieldcal.report.blocks import Figure, NameValues, Section
-from fieldcal.report.browser import Browser, find
+from fieldcal.report.browser import Browser, find_browser
 from fieldcal.report.charts import Axis, Chart, Series
-from fieldcal.report.overview import Head
-from fieldcal.report.page import rendered
+from fieldcal.report.overview import PageHeader
+from fieldcal.report.page import render_page
 
 ERRORS = ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled")
 RECORD = "document.querySelector('#record .canvas')"
@@ -25,7 +25,7 @@ RECORD = "document.querySelector('#record .canvas')"
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    if find() is None:
+    if find_browser() is None:
         pytest.skip("no Chromium here to look at the page with")
     with Browser() as opened:
         yield opened
@@ -121,7 +121,7 @@ def test_every_plot_is_drawn_and_can_be_zoomed(
     whole = view(browser)
     browser.value(f"{RECORD}.focus()")
     for key in ("+", "+", "ArrowRight"):
-        browser.ask("Input.dispatchKeyEvent", type="keyDown", key=key)
+        browser.call("Input.dispatchKeyEvent", type="keyDown", key=key)
     near = view(browser)
     assert near[1] - near[0] == pytest.approx((whole[1] - whole[0]) / 4)
     drag(browser, 400, 460)
@@ -143,10 +143,10 @@ def test_the_band_of_a_model_is_drawn_about_its_line(
     model = Series("model", tau, 1 / tau, 1, "line", 0.5 / tau, 2 / tau)
     axes = Axis("τ", "s", log=True), Axis("σ", "rad/s", log=True)
     figure = Figure(Chart("allan", "Allan deviation", "", *axes, (model,)), "")
-    top = Head("a device with a long name", "", "noise", "", "said " * 99,
+    top = PageHeader("a device with a long name", "", "noise", "", "said " * 99,
                NameValues(()))  # fmt: skip
     page = folder / "band.html"
-    page.write_text(rendered(top, [Section("allan", "Allan", (figure,))]), "utf-8")
+    page.write_text(render_page(top, [Section("allan", "Allan", (figure,))]), "utf-8")
     opened(browser, page)
     band = "document.querySelector('.canvas .cover').getBBox()"
     line = "document.querySelector('.canvas .line').getBBox()"
@@ -165,7 +165,7 @@ def drag(browser: Browser, start: int, end: int, down: int = 0) -> None:
     ):
         left = {"button": "left", "buttons": 1, "clickCount": 1}
         place = {"x": x, "y": y + by}
-        browser.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", **place, **left)
+        browser.call("Input.dispatchMouseEvent", type=f"mouse{kind}", **place, **left)
 
 
 def height_of(browser: Browser, canvas: str) -> float:
@@ -209,10 +209,10 @@ def two_of_one_clock(folder: Path) -> Path:
         Chart("two", "Two", "", time, value, (bias,)),
         Chart("three", "Three", "", Axis("τ", "s"), value, (bias,)),
     ]
-    top = Head("a device", "", "noise", "", "said", NameValues(()))
+    top = PageHeader("a device", "", "noise", "", "said", NameValues(()))
     page = folder / "clock.html"
     figures = tuple(Figure(c, "") for c in charts)
-    page.write_text(rendered(top, [Section("all", "All", figures)]), "utf-8")
+    page.write_text(render_page(top, [Section("all", "All", figures)]), "utf-8")
     return page
 
 
@@ -223,7 +223,7 @@ def test_a_cursor_reads_every_figure_of_the_same_clock(
     canvas = "document.querySelector('#one .canvas')"
     middle = browser.value(f"{canvas}.getBoundingClientRect().left") + 66 + 500
     y = height_of(browser, canvas)
-    browser.ask("Input.dispatchMouseEvent", type="mouseMoved", x=middle, y=y)
+    browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=middle, y=y)
     read = [
         browser.value(f"document.querySelector('#{n} .readout').textContent")
         for n in ("one", "two", "three")

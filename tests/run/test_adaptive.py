@@ -31,11 +31,11 @@ from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.profile import Profile, Sampling
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.windows import Average
 
 BOUNDS = limits.read("tactical")
-TILT = effect("base_tilt", {"about_x_deg": 0.7, "about_z_deg": -0.4})
+TILT = checked_effect("base_tilt", {"about_x_deg": 0.7, "about_z_deg": -0.4})
 
 
 @dataclass

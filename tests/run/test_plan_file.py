@@ -151,8 +151,8 @@ def test_whatever_a_plan_says_it_is_taken_or_refused(tables: dict[str, Any]) -> 
 
 CALLER = """\
 import sys
-from fieldcal.sim_device.remote import Remote
-with Remote({control!r}) as device:
+from fieldcal.sim_device.remote import RemoteDevice
+with RemoteDevice({control!r}) as device:
     device.turn(float(sys.argv[2]), float(sys.argv[3]))
 if sys.argv[1] == {fails!r}:
     sys.exit("the table is jammed")

@@ -26,7 +26,7 @@ from processes import FIELDCAL, HANGS
 from session_folders import places, recorded, write_session
 
 from fieldcal.core.errors import InputError
-from fieldcal.fleet.workers import Pool, processes, results
+from fieldcal.fleet.workers import WorkerPool, process_pool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
@@ -124,7 +124,7 @@ class Served:
 @contextmanager
 def serving(root: Path) -> Iterator[Served]:
     jobs, task = Jobs(root / "jobs", BOUNDS), Held()
-    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
     queue = JobQueue(jobs, Database(root / "h"), pool, task)
     service = Service.of("127.0.0.1", 0, jobs, queue, [TOKEN, "other" * 4])
     thread = threading.Thread(target=service.serve)
@@ -380,7 +380,7 @@ def test_a_recording_is_imported_with_what_is_said_of_it(tmp_path: Path) -> None
     used = JobTask(BOUNDS)
     folder = str(jobs.folder(job.id))
     for _ in range(2):  # and once more, as after a start in the middle
-        (made,) = results([folder], used, processes(1))
+        (made,) = run_tasks([folder], used, process_pool(1))
         one = made.value
         assert one is not None and one.error is None, one
         assert one.serial == "A9" and one.levels["lot"] == "7"

@@ -12,15 +12,15 @@ from browser import Screen
 from processes import HANGS
 from test_service import BOUNDS, Held
 
-from fieldcal.fleet.workers import Pool
+from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history.database import Database
-from fieldcal.report.browser import find
+from fieldcal.report.browser import find_browser
 from fieldcal.service.jobs import Jobs
 from fieldcal.service.queue import JobQueue
 from fieldcal.service.server import Service
 
 pytestmark = pytest.mark.skipif(
-    find() is None, reason="there is no Chromium to show the page in"
+    find_browser() is None, reason="there is no Chromium to show the page in"
 )
 
 SEND = """(async () => {
@@ -35,7 +35,7 @@ SEND = """(async () => {
 def address(tmp_path: Path) -> Iterator[str]:
     jobs, task = Jobs(tmp_path / "jobs", BOUNDS), Held()
     task.may.set()
-    pool = Pool(lambda: ThreadPoolExecutor(1), 1)
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
     with JobQueue(jobs, Database(tmp_path / "h"), pool, task) as queue:
         service = Service.of("127.0.0.1", 0, jobs, queue)
         thread = threading.Thread(target=service.serve)

@@ -27,8 +27,8 @@ from fieldcal.sim_device.profile import (
     Site,
     Truth,
 )
-from fieldcal.sim_device.profile_file import from_tables
-from fieldcal.sim_device.vocabulary import effect, parse
+from fieldcal.sim_device.profile_file import profile_from_tables
+from fieldcal.sim_device.vocabulary import checked_effect, parse
 
 A = float(np.arcsin(0.6))
 RATE = (0.1, 0.2, -0.3)
@@ -82,8 +82,8 @@ def test_every_effect_of_the_catalogue_can_be_given(shared: Path) -> None:
 @pytest.mark.parametrize("id_", catalogue())
 def test_every_effect_shows_somewhere(id_: str) -> None:
     example = catalogue()[id_].EXAMPLE
-    plain = from_tables({"noise": {"acc": 0.01}, **example.device})
-    profile = plain.having(effect(id_, example.given))
+    plain = profile_from_tables({"noise": {"acc": 0.01}, **example.device})
+    profile = plain.having(checked_effect(id_, example.given))
     count = 1_000 if example.in_motion else 12_000  # the way is over soon
     with_, without = (
         (lambda d: (d.spin(RATE, (A, A, 0.0), 1.0), d.take(count))[1])(
@@ -308,7 +308,9 @@ def test_sensors_of_little_bandwidth_show_an_exponential_mean_of_what_was() -> N
     sampling = {"sampling": {"rate_hz": 1 / step}}
     quiet = {**sampling, "noise": {"acc": 0.0, "gyr": 0.0}}
     for given in ({"acc": 0.03, "gyr": 0.08}, {"gyr": 0.08}, {"acc": 0.0}):
-        device = VirtualDevice(from_tables(quiet).having(effect("bandwidth", given)))
+        device = VirtualDevice(
+            profile_from_tables(quiet).having(checked_effect("bandwidth", given))
+        )
         device.take(500)
         device.turn(1.0, 0.4, 0.8)
         moving.append(device.take(1500))
@@ -331,7 +333,9 @@ def test_sensors_of_second_order_follow_the_equation_of_butterworth() -> None:
     step, tau, moving = 1e-3, 0.04, []
     quiet = {"sampling": {"rate_hz": 1 / step}, "noise": {"acc": 0.0, "gyr": 0.0}}
     for given in ({"acc": tau, "gyr": tau}, {"gyr": tau}, {"acc": 0.0}):
-        device = VirtualDevice(from_tables(quiet).having(effect("second_order", given)))
+        device = VirtualDevice(
+            profile_from_tables(quiet).having(checked_effect("second_order", given))
+        )
         device.take(500)
         device.turn(1.0, 0.4, 0.8)
         moving.append(device.take(1500))
@@ -355,7 +359,9 @@ def test_stamps_are_off_and_samples_are_not() -> None:
     quiet = {"sampling": {"rate_hz": 1000.0}, "noise": {"acc": 0.0, "gyr": 0.0}}
     seen = []
     for given in ({"step": 0.003}, {"share": 0.0, "step": 0.003}, {"jitter": 0.0}):
-        device = VirtualDevice(from_tables(quiet).having(effect("stamp_error", given)))
+        device = VirtualDevice(
+            profile_from_tables(quiet).having(checked_effect("stamp_error", given))
+        )
         device.take(500)
         device.turn(1.0, 0.4, 0.8)
         seen.append(device.take(800))
@@ -369,7 +375,7 @@ def test_stamps_are_off_and_samples_are_not() -> None:
 
 
 def test_stamps_scatter_by_their_jitter() -> None:
-    profile = PLAIN.having(effect("stamp_error", {"jitter": 1e-3}))
+    profile = PLAIN.having(checked_effect("stamp_error", {"jitter": 1e-3}))
     off = VirtualDevice(profile, 3).take(4000).t - VirtualDevice(PLAIN, 3).take(4000).t
     assert np.std(off) == pytest.approx(1e-3, rel=0.05)
     assert abs(np.mean(off)) < 1e-4
@@ -380,7 +386,9 @@ def test_a_mount_follows_the_equation_of_its_mode() -> None:
     quiet = {"sampling": {"rate_hz": 1 / step}, "noise": {"acc": 0.0, "gyr": 0.0}}
     moving = []
     for given in ({"y": b, "damping": damping}, {"y": 0.0}):
-        profile = from_tables(quiet).having(effect("flexible_mount", given))
+        profile = profile_from_tables(quiet).having(
+            checked_effect("flexible_mount", given)
+        )
         device = VirtualDevice(profile)
         device.take(800)
         device.turn(1.0, 0.4, 0.4)
@@ -406,7 +414,9 @@ def test_increments_turn_force_and_rate_by_what_the_interval_turns() -> None:
     quiet = {"sampling": {"rate_hz": 1000.0}, "noise": {"acc": 0.0, "gyr": 0.0}}
     seen = []
     for given in ({"sculling": 0.004, "coning": 0.01}, {"sculling": 0.0}):
-        device = VirtualDevice(from_tables(quiet).having(effect("increments", given)))
+        device = VirtualDevice(
+            profile_from_tables(quiet).having(checked_effect("increments", given))
+        )
         device.take(200)
         device.turn(1.0, 0.7, 0.8)
         seen.append(device.take(1000))

@@ -51,7 +51,7 @@ def test_keys_turn_bump_and_quit(
         keys.serve()
         np.testing.assert_allclose(np.rad2deg(device.angles), [22.5, -2.5, 0])
         assert device.busy_until == 24.0
-        assert len(device.body.moves) == 1
+        assert len(device.body.base_motions) == 1
         device.take(2500)
         os.write(person, b"h")
         keys.serve()
@@ -80,13 +80,13 @@ def test_the_line_is_written_over_where_text_of_others_is_only_shown(
 
 def test_orders_and_keys_do_the_same(stream: DeviceStream) -> None:
     carry_out(stream, {"bump": {"push": 1.5, "tilt_deg": 2.0, "seconds": 0.4}})
-    bump, t = stream.device.body.moves[-1], np.linspace(0, 0.4, 4001)
+    bump, t = stream.device.body.base_motions[-1], np.linspace(0, 0.4, 4001)
     assert (bump.start, bump.end) == (0.0, 0.4) and bump.push is not None
     peak = np.linalg.norm(bump.push(t), axis=0).max()
     assert peak == pytest.approx(1.5, rel=1e-5)
     assert np.rad2deg(bump.angle(t).x).max() == pytest.approx(2.0)
     assert carry_out(stream, {"bump": {"at_s": 7.0}})["until_s"] == 7.5
-    assert (stream.device.body.moves[-1].start, stream.device.time) == (7.0, 0.0)
+    assert (stream.device.body.base_motions[-1].start, stream.device.time) == (7.0, 0.0)
     carry_out(stream, {"turn": {"alpha_deg": 10.0}})
     carry_out(stream, {"turn": {"beta_deg": 2.0}})
     np.testing.assert_allclose(np.rad2deg(stream.device.angles), [10, 2, 0])

@@ -7,7 +7,7 @@ from fieldcal.core.samples import Array
 from fieldcal.sim_device.noise import RandomErrors
 from fieldcal.sim_device.profile import ONE, ZERO, Climate, NoiseFigures
 from fieldcal.sim_device.random_process import GaussMarkov, Walk
-from fieldcal.sim_device.temperature import course, recorded
+from fieldcal.sim_device.temperature import recorded_climate, temperature_course
 
 RATE = 10.0
 QUIET = NoiseFigures(ZERO, ZERO, acc_instability=ZERO, gyr_instability=ZERO)
@@ -94,7 +94,7 @@ def test_noise_is_the_same_in_any_pieces(pieces: list[int]) -> None:
 
 def test_the_device_warms_up_in_air_that_warms_up() -> None:
     climate = Climate(20.0, 0.01, 5.0, 100.0)
-    degrees, rate = course(climate, np.array([-5.0, 0.0, 100.0, 1e6]))
+    degrees, rate = temperature_course(climate, np.array([-5.0, 0.0, 100.0, 1e6]))
     np.testing.assert_allclose(
         degrees, [20, 20, 21 + 5 * (1 - np.exp(-1)), 20 + 1e4 + 5]
     )
@@ -103,7 +103,7 @@ def test_the_device_warms_up_in_air_that_warms_up() -> None:
 
 def test_the_air_follows_points() -> None:
     climate = Climate(self_heating_k=0.0, points=((0.0, 20.0), (10.0, 30.0)))
-    degrees, rate = course(climate, np.array([0.0, 5.0, 20.0]))
+    degrees, rate = temperature_course(climate, np.array([0.0, 5.0, 20.0]))
     np.testing.assert_allclose(degrees, [20, 25, 30])
     np.testing.assert_allclose(rate, [1, 1, 0])
 
@@ -113,8 +113,8 @@ def test_a_recorded_temperature_stands_in() -> None:
     true = 20 + 0.01 * t
     measured = true + np.random.default_rng(1).normal(0, 0.1, len(t))
     measured[100:400] = np.nan
-    climate = recorded(Climate(), t, measured)
-    degrees, rate = course(climate, t)
+    climate = recorded_climate(Climate(), t, measured)
+    degrees, rate = temperature_course(climate, t)
     assert np.abs(degrees - true)[50:-50].max() < 0.08
     assert rate[50:-50].mean() == pytest.approx(0.01, rel=0.05)
-    assert recorded(Climate(), t, np.full(len(t), np.nan)) == Climate()
+    assert recorded_climate(Climate(), t, np.full(len(t), np.nan)) == Climate()

@@ -33,8 +33,8 @@ words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 
 def _within(limits: Range) -> st.SearchStrategy[float]:
-    good = (v for v in (0.5, 0.01) if limits.holds(v))
-    return positive if limits.holds(1e3) else st.just(next(good))
+    good = (v for v in (0.5, 0.01) if limits.contains(v))
+    return positive if limits.contains(1e3) else st.just(next(good))
 
 
 def of_id(id_: str) -> st.SearchStrategy[SimulatedEffect]:
@@ -83,7 +83,7 @@ def test_what_is_written_is_read_back(profile: Profile) -> None:
     import tomllib
 
     tables = tomllib.loads(profile_file.to_toml(profile))
-    back = profile_file.from_tables(tables)
+    back = profile_file.profile_from_tables(tables)
     assert replace(back, effects=()) == replace(profile, effects=())
     by_id = {e.id: e.parameters for e in back.effects}
     assert by_id == {e.id: e.parameters for e in profile.effects}
@@ -93,7 +93,7 @@ def test_what_happens_twice_is_written_twice(tmp_path: Path) -> None:
     profile = Profile().having(parse("hum:ax=1,hz=5"), parse("hum:ax=1,hz=6"))
     path = tmp_path / "device.toml"
     path.write_text(profile_file.to_toml(profile))
-    assert profile_file.read(path) == profile
+    assert profile_file.read_profile(path) == profile
     assert path.read_text().count("[[effects.hum]]") == 2
 
 
@@ -110,7 +110,7 @@ def test_a_file_says_only_what_differs(tmp_path: Path) -> None:
         [effects.earth_rate]
         """
     )
-    profile = profile_file.read(path)
+    profile = profile_file.read_profile(path)
     assert profile.noise.acc == (0.01, 0.01, 0.01)
     assert profile.truth.acc_bias == (0.1, 0.0, -1.0)
     assert profile.truth.acc_scale == Truth().acc_scale
@@ -147,9 +147,9 @@ def test_a_file_that_is_wrong_is_refused(tmp_path: Path, text: str, says: str) -
     path = tmp_path / "device.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=f"(?s)device.toml: .*{says}"):
-        profile_file.read(path)
+        profile_file.read_profile(path)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
-        profile_file.read(tmp_path / "none.toml")
+        profile_file.read_profile(tmp_path / "none.toml")

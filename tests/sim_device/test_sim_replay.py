@@ -23,9 +23,9 @@ from fieldcal.sim_device.profile import (
     Profile,
     Truth,
 )
-from fieldcal.sim_device.profile_file import from_tables
+from fieldcal.sim_device.profile_file import profile_from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect, parse
+from fieldcal.sim_device.vocabulary import checked_effect, parse
 
 PLAIN = Profile(
     truth=Truth(ZERO, ONE, ZERO, ONE), temperature=Climate(self_heating_k=0.0)
@@ -153,14 +153,14 @@ def concealed(id_: str, given: dict[str, Any]) -> SimulatedEffect:
             numbers |= dict(zip(named[key], value, strict=True))
         else:
             numbers[key] = value
-    return effect(id_, numbers)
+    return checked_effect(id_, numbers)
 
 
 def told(path: Path) -> tuple[Profile, list[HeldWindow]]:
     """Device and windows that a session.toml of another program says it simulated."""
     tables = tomllib.loads(path.read_text("utf-8"))
     model = tables["model"]
-    profile = from_tables(
+    profile = profile_from_tables(
         {name: tables[name] for name in ("device", "sampling", "site", "frame")}
         | {"truth": tables["nominal"]}
         | {"effects": {id_: model.get(id_, {}) for id_ in model["effects"]}}

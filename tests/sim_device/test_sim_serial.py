@@ -19,8 +19,8 @@ from fieldcal.core.samples import Array, concat
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.line_faults import LineFaults
 from fieldcal.sim_device.link_serial import SerialLink
-from fieldcal.sim_device.remote import Remote
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.remote import RemoteDevice
+from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.sim_device.wire import open_wire
 
 LSB = np.array([16 * 9.80665 / 32768] * 3 + [np.deg2rad(2000) / 32768] * 3)
@@ -99,15 +99,17 @@ def test_the_samples_are_those_of_the_device_at_any_speed(
     sim = start(
         sims, "--speed", speed, "--seed", "7", "--base-tilt=-1,0.5", "--duration", "6"
     )
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         reply = remote.ask(turn={"alpha_deg": 30, "beta_deg": 5, "at_s": 1.0})
         assert reply == {"time_s": 0.0, "until_s": 5.0}
         port = sim.open()
         ms, got = words(read(port, 10**6))
         os.close(port)
     assert sim.ended() == (0, "")
-    tilt = effect("base_tilt", {"about_x_deg": -1, "about_z_deg": 0.5})
-    twin = VirtualDevice(Profile().having(effect("earth_rate", {}), tilt), seed=7)
+    tilt = checked_effect("base_tilt", {"about_x_deg": -1, "about_z_deg": 0.5})
+    twin = VirtualDevice(
+        Profile().having(checked_effect("earth_rate", {}), tilt), seed=7
+    )
     twin.turn(np.deg2rad(30.0), np.deg2rad(5.0), at=1.0)
     block = concat([twin.take(1) for _ in range(600)])
     np.testing.assert_array_equal(ms, np.arange(0, 6000, 10))
@@ -116,7 +118,7 @@ def test_the_samples_are_those_of_the_device_at_any_speed(
 
 def test_a_real_device_does_not_wait_for_its_reader(sims: list[Sim]) -> None:
     sim = start(sims, "--rate", "200", "--seed", "3")
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         while remote.ask(status=True)["time_s"] < 0.5:
             pass
         port = sim.open()
@@ -137,7 +139,7 @@ def test_a_real_device_does_not_wait_for_its_reader(sims: list[Sim]) -> None:
 
 def test_a_fast_device_waits_for_its_reader(sims: list[Sim]) -> None:
     sim = start(sims, "--speed", "max")
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         assert remote.ask(status=True)["time_s"] == 0.0
         port = sim.open()
         ms, _ = words(read(port, 100 * SAMPLE))
@@ -173,7 +175,7 @@ def test_it_can_be_told_to_stop(sims: list[Sim], tmp_path: Path) -> None:
         *("--with", "earth_rate"),
     )
     assert sim.control == str(tmp_path / "orders")
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         assert remote.ask(stop=True)["stopped"] is True
     assert sim.ended() == (0, "")
     assert not (tmp_path / "orders").exists()
@@ -184,7 +186,7 @@ def test_it_can_be_told_to_stop(sims: list[Sim], tmp_path: Path) -> None:
 
 def test_silence_garbage_and_hanging_up(sims: list[Sim]) -> None:
     sim = start(sims, "--speed", "max")
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         port = sim.open()
         read(port, 10 * SAMPLE)
         reply = remote.ask(fault={"silence_s": 2})
@@ -238,7 +240,7 @@ def test_a_device_from_a_file_on_a_text_line(sims: list[Sim], tmp_path: Path) ->
 
 def test_orders_that_are_none_are_refused_and_do_nothing(sims: list[Sim]) -> None:
     sim = start(sims)
-    with Remote(sim.control) as remote:
+    with RemoteDevice(sim.control) as remote:
         for order, says in (
             ({"dance": {}}, "one key of turn"),
             ({"turn": {"alpha": 3}}, "does not take 'alpha'"),
@@ -283,11 +285,11 @@ def test_a_second_device_does_not_take_a_name_that_is_taken(
     first.process.wait()
     assert path.is_socket()
     third = start(sims, "--control", str(path))
-    with Remote(third.control) as remote:
+    with RemoteDevice(third.control) as remote:
         remote.ask(stop=True)
     assert third.ended()[0] == 0
     with pytest.raises(DeviceError, match="no virtual device listens"):
-        Remote(path)
+        RemoteDevice(path)
 
 
 def test_a_stale_link_is_replaced_and_a_file_is_not(

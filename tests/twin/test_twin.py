@@ -37,7 +37,7 @@ def diagnosed(
     code = main(["diagnose", str(folder), "--twin", str(file), "--json"])
     out, err = capsys.readouterr()
     assert "Warning" not in err
-    return code, json.loads(out), profile_file.read(file)
+    return code, json.loads(out), profile_file.read_profile(file)
 
 
 def concealing(

@@ -13,7 +13,7 @@ from typing import Any
 from fieldcal.against.sensor_model import SensorModel
 from fieldcal.core.samples import CHANNELS
 from fieldcal.sim_device.effects import ids, kind
-from fieldcal.sim_device.profile_file import FORMAT, from_tables
+from fieldcal.sim_device.profile_file import FORMAT, profile_from_tables
 
 WHAT = "the virtual device of fieldcal sim"
 ENDING = ".toml"
@@ -36,7 +36,7 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     effects = {n: v for n, v in effects.items() if any(v.values())}
     if effects:
         tables["effects"] = effects
-    from_tables(tables)  # what it refuses is not written
+    profile_from_tables(tables)  # what it refuses is not written
     return tomlkit.dumps(tables), says
 
 
@@ -44,11 +44,11 @@ def _beyond(name: str, values: dict[str, Any]) -> list[str]:
     """Take out what the virtual device cannot have, and say so."""
     takes, says = kind(name).NUMBERS, []
     for part in [p for p in values if p in takes]:
-        if not takes[part].range.holds(float(values[part])):
+        if not takes[part].range.contains(float(values[part])):
             value = float(values.pop(part))
             says.append(
                 f"toml: {name} {part} = {value:.4g} is left out, as the virtual device"
-                f" has it {takes[part].range.says} only"
+                f" has it {takes[part].range.description} only"
             )
     return says
 

@@ -37,7 +37,7 @@ from fieldcal.sim_device.profile import (
     Truth,
 )
 from fieldcal.sim_device.replay import HeldWindow, simulate
-from fieldcal.sim_device.vocabulary import effect
+from fieldcal.sim_device.vocabulary import checked_effect
 
 PLACES = ((0.0, 0.0), (60.0, 0.0), (60.0, -40.0), (-30.0, -40.0), (-30.0, 20.0),
           (20.0, 50.0))  # fmt: skip
@@ -127,7 +127,7 @@ def followed(
 
 @cache
 def ride(name: str) -> Ride:
-    inference, known, turns = followed(*recorded(effect(name, ERRORS[name])))
+    inference, known, turns = followed(*recorded(checked_effect(name, ERRORS[name])))
     d = inference.dictionary
     group = next(c for c in d.causes if c.name == name).variants[0]
     assert group.effect is not None
@@ -201,7 +201,7 @@ def test_a_filter_is_what_its_columns_foretell(acc: float, gyr: float) -> None:
     It bends the turn about two axes alone, and the forces on the way everywhere. There
     a filter of one triad is a delay first of all, whose own square is another column's.
     """
-    low_pass = effect("bandwidth", {"acc": acc, "gyr": gyr})
+    low_pass = checked_effect("bandwidth", {"acc": acc, "gyr": gyr})
     inference, _, turns = followed(*recorded(low_pass))
     d = inference.dictionary
     filters = next(g for g in d.always if g.part == FILTERED)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from fieldcal.core.positions import FIVE, Position
 from fieldcal.drivers.driver import Health
 from fieldcal.planning.steps import Hold
-from fieldcal.report.browser import find
+from fieldcal.report.browser import find_browser
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.server import PageServer
@@ -21,7 +21,7 @@ from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
 pytestmark = pytest.mark.skipif(
-    find() is None, reason="there is no Chromium to show the page in"
+    find_browser() is None, reason="there is no Chromium to show the page in"
 )
 
 PHONE, TABLET = (390, 844), (1180, 820)
@@ -152,13 +152,13 @@ def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> Non
     opened(page, server)
     lost = "!document.getElementById('lost').hidden"
     assert not page.value(lost)
-    page.ask("Network.emulateNetworkConditions", offline=True, latency=0,
+    page.call("Network.emulateNetworkConditions", offline=True, latency=0,
              downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
     page.value("source.close(), listen()")
     page.until(lost)
     assert page.value(WORDS) == "TURN TO"  # what was known last stays in sight
     server.board.position_asked(Hold(2, FIVE[2], 30.0))
-    page.ask("Network.emulateNetworkConditions", offline=False, latency=0,
+    page.call("Network.emulateNetworkConditions", offline=False, latency=0,
              downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
     page.until(lost, False)
     assert page.text("angles") == FIVE[2].name

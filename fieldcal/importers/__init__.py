@@ -16,7 +16,7 @@ from pathlib import Path
 from fieldcal.core.errors import InputError
 from fieldcal.core.plugins import class_in, names
 from fieldcal.drivers import codec
-from fieldcal.importing.files.gzip_stream import head
+from fieldcal.importing.files.gzip_stream import first_bytes
 from fieldcal.importing.recording import ReadOptions, Recording
 
 LAST = ("csv_like", "wire")
@@ -71,14 +71,14 @@ def open_recording(
             f"{path}: is a pipe, and a recording is read more than once; write what"
             " comes through it to a file"
         )
-    first = head(path)
+    first = first_bytes(path)
     if not first:
         raise InputError(f"{path}: is empty; copy it again from where it came")
     for some in [name] if name else formats():
         module = import_module(f"{__name__}.{some}")
         if some == LAST[0]:
             # what a device says while it starts may stand before the first frame
-            first = head(path, MANY)
+            first = first_bytes(path, MANY)
         if name or module.recognises(first, path):
             opened = class_in(module.__name__, Recording)  # type: ignore[type-abstract]
             return opened(path, wanted, repair)

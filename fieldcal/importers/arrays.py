@@ -19,27 +19,27 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
-from fieldcal.importing.arrays.array_groups import imu_groups, within
+from fieldcal.importing.arrays.array_groups import arrays_in_group, imu_groups
 from fieldcal.importing.arrays.array_tables import (
     ROWS,
     WIDEST,
     ArrayTable,
     columns_of,
+    describe_tables,
     hdf5_has_objects,
     hdf5_tables,
     hdf5_units,
-    listed,
     matlab_arrays,
     numpy_tables,
     tables_of,
 )
 from fieldcal.importing.arrays.matlab_objects import holds_objects, object_tables
-from fieldcal.importing.arrays.paired_tables import ArrayPairing, pairing
-from fieldcal.importing.files.gzip_stream import head, on_disk
+from fieldcal.importing.arrays.paired_tables import ArrayPairing, pair_arrays
+from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
-from fieldcal.importing.times.said_rate import rate_of, scalars
+from fieldcal.importing.times.said_rate import named_scalars, stated_rate
 
 WHAT = "arrays: MATLAB, HDF5, NumPy"
 
@@ -82,7 +82,7 @@ class ArrayFile(ColumnRecording):
 
     def needs(self) -> tuple[tuple[str, ...], str]:
         """h5py, where it is HDF5."""
-        return (("h5py",) if _is_hdf5(head(self.path)) else ()), "hdf5"
+        return (("h5py",) if _is_hdf5(first_bytes(self.path)) else ()), "hdf5"
 
     def imus(self) -> dict[str, ReadOptions]:
         """Options of each IMU, of which each may lie in a group of its own."""
@@ -137,14 +137,14 @@ class ArrayFile(ColumnRecording):
     def rate_said(self) -> tuple[float, str] | None:
         """Rate that a number in it says, such as ``fs``."""
         with self._opened():
-            return rate_of(self._scalars)
+            return stated_rate(self._scalars)
 
     def ask(self) -> str:
         """Say which arrays there are."""
         with self._opened() as tables:
             return (
                 f"{self.path}: say which arrays are the channels, such as --columns "
-                f"t=time,ax=acc.0,ay=acc.1; there are {listed(tables)}"
+                f"t=time,ax=acc.0,ay=acc.1; there are {describe_tables(tables)}"
             )
 
     def blocks(self, stream: str) -> Iterator[Block]:
@@ -193,13 +193,14 @@ class ArrayFile(ColumnRecording):
             if name not in tables or int(index) >= tables[name].shape[1]:
                 raise InputError(
                     f"{self.path}: has no column {place!r} for {column}; there are"
-                    f" {listed(tables)}"
+                    f" {describe_tables(tables)}"
                 )
             named[column] = (name, int(index))
         lengths = {tables[name].shape[0] for name, _ in named.values()}
         if len(lengths) > 1:
             raise InputError(
-                f"{self.path}: its arrays are of different lengths: {listed(tables)};"
+                f"{self.path}: its arrays are of different lengths:"
+                f" {describe_tables(tables)};"
                 " import those that belong together"
             )
         return named
@@ -211,7 +212,8 @@ class ArrayFile(ColumnRecording):
         if len(fitting) != 1:
             raise InputError(
                 f"{self.path}: {len(fitting)} of its arrays have {len(given)} columns; "
-                f"name array and column, as in ax=acc.0; there are {listed(tables)}"
+                f"name array and column, as in ax=acc.0; there are"
+                f" {describe_tables(tables)}"
             )
         pairs = {c: (fitting[0], i) for i, c in enumerate(given)}
         return {c: place for c, place in pairs.items() if c != columns.SKIP}
@@ -221,7 +223,7 @@ class ArrayFile(ColumnRecording):
         """Every array of numbers in the file, those of one IMU side by side."""
         with self._arrays() as tables:
             if self._pairing is None:
-                self._pairing = (pairing(tables),)
+                self._pairing = (pair_arrays(tables),)
             (paired,) = self._pairing
             if paired is None:
                 yield tables
@@ -233,10 +235,10 @@ class ArrayFile(ColumnRecording):
     def _arrays(self) -> Iterator[dict[str, ArrayTable]]:
         """Every array of numbers in the file, as it lies there."""
         if self._loaded is not None:
-            yield within(self.group, self._loaded)
+            yield arrays_in_group(self.group, self._loaded)
             return
         with ExitStack() as stack:
-            path = stack.enter_context(on_disk(self.path, self.cut_off))
+            path = stack.enter_context(unpacked_file(self.path, self.cut_off))
             with path.open("rb") as file:
                 first = file.read(520)
             try:
@@ -244,7 +246,7 @@ class ArrayFile(ColumnRecording):
                     tables = self._hdf5(path, stack)
                 elif first.startswith(MATLAB):
                     loaded = matlab_arrays(path)
-                    self._scalars = dict(scalars(loaded))
+                    self._scalars = dict(named_scalars(loaded))
                     if holds_objects(loaded):
                         loaded |= object_tables(path)
                     tables = self._loaded = tables_of(loaded)
@@ -258,7 +260,7 @@ class ArrayFile(ColumnRecording):
                     f"{self.path}: is not whole: {error or type(error).__name__}; copy"
                     " it again from where it came"
                 ) from error
-            yield within(self.group, tables)
+            yield arrays_in_group(self.group, tables)
 
     def _hdf5(self, path: Path, stack: ExitStack) -> dict[str, ArrayTable]:
         import h5py
@@ -268,4 +270,6 @@ class ArrayFile(ColumnRecording):
             self._units = hdf5_units(file)
             if hdf5_has_objects(file):
                 self._objects = tables_of(object_tables(path))
-        return hdf5_tables(file, within(self.group, self._units)) | dict(self._objects)
+        return hdf5_tables(file, arrays_in_group(self.group, self._units)) | dict(
+            self._objects
+        )

@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import on_disk
+from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.recording import ImuStream, Recording
 
 WHAT = "blackbox of Betaflight, INAV: .bbl, .bfl"
@@ -59,7 +59,7 @@ class BlackboxLog(Recording):
 
     def streams(self) -> list[ImuStream]:
         """Flights with samples of an accelerometer or a gyroscope."""
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             many = self._opened(path, 1).reader.log_count
             names = {n: self._opened(path, n).field_names for n in range(1, many + 1)}
         says = "m/s^2, rad/s, filtered by the firmware"
@@ -73,7 +73,7 @@ class BlackboxLog(Recording):
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return what the log says of the device."""
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             headers = self._opened(path, _number(stream)).headers
         said = ("Firmware type", "Firmware revision", "Craft name", "acc_1G",
                 "gyro_scale", FINE, "gyro_lowpass_hz", "acc_lpf_hz")  # fmt: skip
@@ -84,7 +84,7 @@ class BlackboxLog(Recording):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a flight, many at a time."""
         rows: list[list[float]] = []
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             log = self._opened(path, _number(stream))
             scales = _scales(self.path, log.headers)
             places = {name: i for i, name in enumerate(log.field_names)}

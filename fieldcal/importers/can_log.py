@@ -21,7 +21,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.options import Options
-from fieldcal.importing.files.gzip_stream import head, open_unpacked
+from fieldcal.importing.files.gzip_stream import first_bytes, open_unpacked
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.clock_text import ClockText
 
@@ -36,7 +36,7 @@ PIECE = 8192
 
 
 class CanLogKind(NamedTuple):
-    """A kind of log: how it begins, and what python-can calls its reader."""
+    """A kind of log: its first bytes, and the name of its reader in python-can."""
 
     name: str
     begins: re.Pattern[bytes]
@@ -90,7 +90,7 @@ class CanLog(Recording):
 
     def streams(self) -> list[ImuStream]:
         """Return the one IMU that the map describes."""
-        if PRINTED.match(head(self.path)):
+        if PRINTED.match(first_bytes(self.path)):
             raise InputError(
                 f"{self.path}: is what candump prints; record with candump -l"
             )
@@ -168,7 +168,7 @@ class CanLog(Recording):
     def _messages(self) -> Iterator[Any]:
         import can
 
-        first = head(self.path)
+        first = first_bytes(self.path)
         kind = next(k for k in KINDS if k.begins.match(first))
         with open_unpacked(self.path, self.cut_off) as file:
             if kind.name == "blf":
@@ -229,7 +229,7 @@ def _canboat(recording: CanLog, text: io.TextIOWrapper) -> Iterator[Any]:
 
 
 class _Lines:
-    """Lines of a text that are counted, without one that was cut off."""
+    """Counts the lines of a text and leaves out a truncated last line."""
 
     def __init__(self, text: io.TextIOWrapper, recording: CanLog) -> None:
         self._text, self._recording, self.number = text, recording, 0

@@ -21,31 +21,31 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.codec import recognise
 from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
-from fieldcal.importing.files.text_encoding import is_plain, wide
+from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
-from fieldcal.importing.text.instances import Instances, instances_in
+from fieldcal.importing.text.instances import ImuInstances, find_instances
 from fieldcal.importing.text.number_table import NumberTable
 from fieldcal.importing.text.text_form import TextForm
 from fieldcal.importing.text.text_forms import CLOCK, forms_of
 from fieldcal.importing.text.text_lines import (
     TOP,
-    behind,
+    cell_count,
+    skip_lines,
     split_lines,
     top_lines,
-    width_of,
 )
 from fieldcal.importing.text.text_source import TextSource
 from fieldcal.importing.text.text_top import (
+    count_top_lines,
+    find_separator,
+    find_stated_rate,
     headings_above,
-    numbers_of,
-    rate_above,
-    rows_begin,
-    separator_of,
+    parse_numbers,
 )
-from fieldcal.importing.words.file_names import SENSOR, sensor_of
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
+from fieldcal.importing.words.heading_words import heading_meaning
 
 WHAT = "text with columns"
 
@@ -68,14 +68,14 @@ _CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether these are the first bytes of a text."""
-    if wide(head) is not None:
+    if utf16_encoding(head) is not None:
         return True
     lines = head.split(b"\n")[1:-1]
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
         # of a format of its own, a port's bytes; of others physics tells the units
         fits = recognise(head, SECONDS)
-        return is_plain(head) and (fits is None or fits[0] == PLAIN)
-    return is_plain(head)
+        return is_mostly_text(head) and (fits is None or fits[0] == PLAIN)
+    return is_mostly_text(head)
 
 
 def _is_checked(line: bytes) -> bool:
@@ -110,15 +110,16 @@ class TextColumns(ColumnRecording):
             if form.names:
                 found = [Heading([Column("", name) for name in form.names], SKIP)]
             if form.clock is not None:
-                found = [_clocked(one, form.clock) for one in found]
+                found = [_with_clock_column(one, form.clock) for one in found]
         found = [one for way in found if (one := self._fitted(way)) is not None]
-        sensor = self.sensor or sensor_of(self.path.name.split(".")[0])
+        sensor = self.sensor or sensor_of_file_name(self.path.name.split(".")[0])
         if not sensor:
             return found
         if not found and self._numbers.shape[1] == len(AXES):
             found = [Heading([Column("", axis) for axis in AXES], SKIP)]
         ways = [
-            Heading([_of(sensor, c) for c in way.columns], way.skip) for way in found
+            Heading([_of_sensor(sensor, c) for c in way.columns], way.skip)
+            for way in found
         ]
         if not self.sensor and ways != found:
             of_it = f"its axes are those of the {SENSOR[sensor]}, as the file is called"
@@ -189,7 +190,7 @@ class TextColumns(ColumnRecording):
         lines = self._top or [""]
         return (
             f"{self.path}: say what its columns are, such as --columns"
-            f" {columns.such_as(self._numbers.shape[1])}; its first line is"
+            f" {columns.column_placeholders(self._numbers.shape[1])}; its first line is"
             f" {lines[0][:60]!r}"
         )
 
@@ -204,11 +205,11 @@ class TextColumns(ColumnRecording):
             lines += split_lines(data)
             if len(lines) > BEGINNING:
                 break
-        return numbers_of(lines[:BEGINNING], self.wanted.separator)
+        return parse_numbers(lines[:BEGINNING], self.wanted.separator)
 
     def rate_said(self) -> tuple[float, str] | None:
         """Rate that a line above its numbers says."""
-        return rate_above(self._lines, self.wanted.separator)
+        return find_stated_rate(self._lines, self.wanted.separator)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, a piece of the file at a time."""
@@ -218,7 +219,7 @@ class TextColumns(ColumnRecording):
         yield from self.paired(self._samples())
 
     def _samples(self) -> Iterator[Block]:
-        columns.check(self.wanted)
+        columns.check_columns(self.wanted)
         names = [c for c in self.wanted.columns]
         use = [i for i, name in enumerate(names) if name != SKIP]
         samples, t0, first_lines = columns.ColumnReader(self.wanted), None, [""]
@@ -228,8 +229,8 @@ class TextColumns(ColumnRecording):
                 first_lines = self._begin(data, use)
                 if not 0 <= self._skip < len(first_lines):
                     break
-                data, first = behind(data, self._skip), first_lines[self._skip]
-                separator = self.wanted.separator or separator_of(first)
+                data, first = skip_lines(data, self._skip), first_lines[self._skip]
+                separator = self.wanted.separator or find_separator(first)
                 self._check_width(first, separator)
                 if separator != "," and "," in first:
                     self.says.append("its numbers have decimal commas")
@@ -261,7 +262,7 @@ class TextColumns(ColumnRecording):
         lines = [""]
         for many in (NAMED, TOP):
             lines = top_lines(data, many)
-            self._skip = rows_begin(lines, self.wanted, use)
+            self._skip = count_top_lines(lines, self.wanted, use)
             if 0 <= self._skip < len(lines):
                 break
         return lines
@@ -281,10 +282,10 @@ class TextColumns(ColumnRecording):
                 for data in pieces)  # fmt: skip
 
     @cached_property
-    def _in_turn(self) -> Instances | None:
+    def _in_turn(self) -> ImuInstances | None:
         """What tells several IMUs apart whose rows come in turn."""
         first = next((top_lines(d) for d in self._text.pieces(self._forms)), [])
-        return instances_in(first, self.wanted.separator)
+        return find_instances(first, self.wanted.separator)
 
     @cached_property
     def _forms(self) -> list[TextForm]:
@@ -297,7 +298,7 @@ class TextColumns(ColumnRecording):
         return self._text.top()
 
     def _check_width(self, line: str, separator: str | None) -> None:
-        width, named = width_of(line, separator), len(self.wanted.columns)
+        width, named = cell_count(line, separator), len(self.wanted.columns)
         if width != named:
             more = " (_... at the end skips the others)" if named < width else ""
             raise InputError(
@@ -306,16 +307,16 @@ class TextColumns(ColumnRecording):
             )
 
 
-def _of(sensor: str, column: Column) -> Column:
+def _of_sensor(sensor: str, column: Column) -> Column:
     """Column of which a bare axis, whose unit does not say it, is the sensor's."""
     bare = column.name.strip().strip('"').strip()
     axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
-    said = meaning(bare, column.unit)
+    said = heading_meaning(bare, column.unit)
     told = said is not None and bool(said.kind)
     return column._replace(name=f"{sensor} {bare}" if axis and not told else bare)
 
 
-def _clocked(heading: Heading, clock: int) -> Heading:
+def _with_clock_column(heading: Heading, clock: int) -> Heading:
     """A heading with the column of which the clock was read."""
     named = [
         Column("", CLOCK) if i == clock else column

@@ -29,7 +29,7 @@ from fieldcal.importing.messages.dataflash_messages import (
     DataflashMessages,
 )
 from fieldcal.importing.recording import ImuStream, Recording
-from fieldcal.importing.times.fifo_time import Batch, FifoBatches
+from fieldcal.importing.times.fifo_time import FifoBatch, FifoBatches
 
 WHAT = "ArduPilot dataflash log, .bin"
 
@@ -180,8 +180,8 @@ class DataflashLog(Recording):
             self._sampled[int(row["instance"])] = (steps[0], steps[1])
 
 
-def _batch(row: np.void) -> Batch:
-    return Batch(
+def _batch(row: np.void) -> FifoBatch:
+    return FifoBatch(
         gyro=bool(row["type"]),
         start=1e-6 * float(row["SampleUS"]),
         period=1 / float(row["smp_rate"]),

@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.importers.arrays import ArrayFile
-from fieldcal.importing.arrays.array_groups import within
+from fieldcal.importing.arrays.array_groups import arrays_in_group
 from fieldcal.importing.arrays.array_tables import ArrayTable, table_of
 from fieldcal.importing.files.text_encoding import as_utf8
 from fieldcal.importing.records.json_lists import json_lists
 from fieldcal.importing.text.text_form import MOSTLY
 from fieldcal.importing.times.clock_text import is_clock
-from fieldcal.importing.times.said_rate import scalars
+from fieldcal.importing.times.said_rate import named_scalars
 
 WHAT = "JSON: records or lists"
 
@@ -61,7 +61,7 @@ def _is_record(line: bytes) -> bool:
     if BEFORE.fullmatch(line.decode(errors="replace").strip()) is None:
         return False
     try:
-        return isinstance(_of_line(line.decode()), dict)
+        return isinstance(_parse_line(line.decode()), dict)
     except (ValueError, RecursionError):
         return False
 
@@ -79,10 +79,10 @@ class JsonLog(ArrayFile):
         if self._loaded is None:
             text = b"".join(as_utf8(self.pieces())).decode(errors="replace")
             document = self._document(text)
-            self._scalars = dict(scalars(document))
+            self._scalars = dict(named_scalars(document))
             lists = json_lists(document, says=self.says)
             self._loaded = {name: table_of(values) for name, values in lists}
-        yield within(self.group, self._loaded)
+        yield arrays_in_group(self.group, self._loaded)
 
     def _document(self, text: str) -> Any:
         """What the text holds; lines of records as a list.
@@ -102,7 +102,7 @@ class JsonLog(ArrayFile):
             if not line.strip():
                 continue
             try:
-                found.append(_of_line(line))
+                found.append(_parse_line(line))
             except (ValueError, RecursionError) as error:
                 if not found and not BEGINS.match(line.encode()):
                     # what a device says while it starts
@@ -111,20 +111,20 @@ class JsonLog(ArrayFile):
         return found
 
 
-def _of_line(line: str) -> Any:
-    """What a line holds; what stands before a record in it is its time or its topic."""
+def _parse_line(line: str) -> Any:
+    """Contents of a line; the text before a record is its time or topic."""
     said = BEFORE.fullmatch(line.strip())
     if said is None or not said[1]:
-        return _of_text(line)
-    found = _of_text(said[2])
+        return _parse_text(line)
+    found = _parse_text(said[2])
     if isinstance(found, dict):
         clock = said[1].strip(" []")
         found.setdefault(CLOCK if is_clock(clock) else "topic", clock)
     return found
 
 
-def _of_text(text: str) -> Any:
-    """What a text holds, in JSON or as Python prints it, with single quotes."""
+def _parse_text(text: str) -> Any:
+    """Contents of a text in JSON, or as Python prints it with single quotes."""
     try:
         return json.loads(text)
     except ValueError as error:

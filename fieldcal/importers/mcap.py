@@ -17,7 +17,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import on_disk
+from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.messages.mcap_messages import (
     Decoders,
     QuietDecoders,
@@ -27,8 +27,8 @@ from fieldcal.importing.messages.ros_messages import (
     IMU,
     MANY,
     TEMPERATURE,
-    block_of,
-    row_of,
+    message_row,
+    samples_of_rows,
 )
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -62,7 +62,7 @@ class McapLog(Recording):
 
     def _topics(self) -> dict[str, str]:
         """Kind of the messages of each topic."""
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             if self.repair:
                 said = messages(path, self.damaged, self.cut_off)
                 return {one.channel.topic: one.kind for one in said}
@@ -80,7 +80,7 @@ class McapLog(Recording):
         if summary is None:
             raise InputError(
                 f"{self.path}: has no summary at its end, as if cut off;"
-                f" {_whole(path)}, or copy it again from where it came"
+                f" {_describe_undamaged(path)}, or copy it again from where it came"
             )
         kinds = {n: schema.name for n, schema in summary.schemas.items()}
         return {
@@ -93,7 +93,7 @@ class McapLog(Recording):
         degrees = {t for t, kind in self._topics().items() if kind == TEMPERATURE}
         rows: list[tuple[float, ...]] = []
         warm = dict[str, float]()
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             found = self._streamed if self.repair else self._indexed
             for topic, logged, said in found(path, stream, degrees):
                 try:
@@ -101,7 +101,7 @@ class McapLog(Recording):
                         warm[said.header.frame_id] = said.temperature
                         continue
                     degrees_now = warm.get(said.header.frame_id, np.nan)
-                    rows.append(row_of(said, degrees_now, logged))
+                    rows.append(message_row(said, degrees_now, logged))
                 except (AttributeError, TypeError) as error:
                     raise InputError(
                         f"{self.path}: messages of {topic} are none of the kind that"
@@ -109,10 +109,10 @@ class McapLog(Recording):
                         " record them again with the definition of their type"
                     ) from error
                 if len(rows) == MANY:
-                    yield block_of(rows)
+                    yield samples_of_rows(rows)
                     rows = []
         if rows:
-            yield block_of(rows)
+            yield samples_of_rows(rows)
 
     def _indexed(
         self, path: Path, stream: str, degrees: set[str]
@@ -158,8 +158,8 @@ class McapLog(Recording):
                 yield one.channel.topic, one.message.log_time, said
 
 
-def _whole(path: Path) -> str:
-    """Say what is whole in a file without a summary, and how to take it."""
+def _describe_undamaged(path: Path) -> str:
+    """Message on the undamaged part of a file without a summary, and its recovery."""
 
     def pass_over(where: str, what: str) -> None:
         pass

@@ -13,12 +13,12 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing import columns
-from fieldcal.importing.files.gzip_stream import on_disk
+from fieldcal.importing.files.gzip_stream import unpacked_file
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ROWS
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.clock_text import ClockText, is_clock
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.session.arrow_columns import numbers
 from fieldcal.session.sample_files import READ_AT_ONCE
 
@@ -87,7 +87,7 @@ class ParquetFile(ColumnRecording):
         import pyarrow as pa
         import pyarrow.parquet
 
-        with on_disk(self.path, self.cut_off) as path, path.open("rb") as file:
+        with unpacked_file(self.path, self.cut_off) as path, path.open("rb") as file:
             magic = file.read(6)
             file.seek(0)
             try:
@@ -124,7 +124,7 @@ class ParquetFile(ColumnRecording):
                 f"{self.path}: has no column {missing[0]}; say which are the channels"
                 f" with --columns t=…,ax=…: there are {', '.join(schema.names[:30])}"
             )
-        columns.check(replace(self.wanted, columns=tuple(named)))
+        columns.check_columns(replace(self.wanted, columns=tuple(named)))
         return named
 
     def _numbers(self, batch: Any, name: str, clock: ClockText) -> Array:
@@ -168,13 +168,13 @@ def _column(field: Any) -> Column:
 
     if not (pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type)):
         return Column(field.name, field.name, _unit(field))
-    said = meaning(field.name)
+    said = heading_meaning(field.name)
     named = said is not None and said.kind == "t"
     return Column(field.name, field.name if named else "time", "s")
 
 
 def _unit(field: Any) -> str:
-    """What a column says of its unit."""
+    """Unit that a column states."""
     said = field.metadata or {}
     text: bytes = said.get(b"unit", said.get(b"units", b""))
     return text.decode(errors="replace")

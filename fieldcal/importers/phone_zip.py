@@ -45,11 +45,11 @@ class PhoneArchive(Recording):
         """Return the one IMU."""
         for text in self._opened():
             text.streams()
-        return [ImuStream("0", f"columns in {columns.units(self.wanted)}")]
+        return [ImuStream("0", f"columns in {columns.describe_units(self.wanted)}")]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
-        return columns.notes(self.wanted)
+        return columns.unit_notes(self.wanted)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of both sensors, those of the accelerometer with the nearest."""

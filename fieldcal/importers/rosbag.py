@@ -16,13 +16,13 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import head, on_disk
+from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.messages.ros_messages import (
     IMU,
     MANY,
     TEMPERATURE,
-    block_of,
-    row_of,
+    message_row,
+    samples_of_rows,
 )
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -32,7 +32,7 @@ BAG, SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
 
 
 class Message(NamedTuple):
-    """A message: its topic, time of logging, ns, and what it says."""
+    """A message: its topic, time of logging, ns, and contents."""
 
     topic: str
     logged: int
@@ -53,7 +53,7 @@ class RosBag(Recording):
 
     def streams(self) -> list[ImuStream]:
         """Topics with samples."""
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             topics = self._topics(path)
         found = [topic for topic, kind in topics.items() if kind == IMU]
         if not found:
@@ -68,7 +68,7 @@ class RosBag(Recording):
         """Samples of a topic, many at a time."""
         rows: list[tuple[float, ...]] = []
         warm = dict[str, float]()
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             kinds = self._topics(path)
             wanted = {t for t, kind in kinds.items() if kind == TEMPERATURE}
             wanted.add(stream)
@@ -77,12 +77,12 @@ class RosBag(Recording):
                     warm[said.header.frame_id] = said.temperature
                     continue
                 degrees = warm.get(said.header.frame_id, np.nan)
-                rows.append(row_of(said, degrees, logged))
+                rows.append(message_row(said, degrees, logged))
                 if len(rows) == MANY:
-                    yield block_of(rows)
+                    yield samples_of_rows(rows)
                     rows = []
         if rows:
-            yield block_of(rows)
+            yield samples_of_rows(rows)
 
     def _topics(self, path: Path) -> dict[str, str]:
         """Kind of the messages of each topic."""
@@ -96,7 +96,8 @@ class RosBag(Recording):
                 return dict(base.execute("SELECT name, type FROM topics"))
         except Exception as error:
             raise InputError(
-                f"{self.path}: its list of topics cannot be read: {_why(error)}; copy"
+                f"{self.path}: its list of topics cannot be read: {_reason(error)};"
+                " copy"
                 " the file again from where it came"
             ) from error
 
@@ -106,28 +107,30 @@ class RosBag(Recording):
         """Messages of some topics in order of time."""
         seen = 0
         try:
-            found = _of_first if _is_first(path) else _of_second
+            found = _ros1_messages if _is_first(path) else _ros2_messages
             for one in found(path, kinds, wanted):
                 yield one
                 seen += 1
         except Exception as error:
             # readers are made of what the file says, and raise what they like
-            self.cut_off(f"message {seen + 1}", f"cannot be read: {_why(error)}")
+            self.cut_off(f"message {seen + 1}", f"cannot be read: {_reason(error)}")
 
 
-def _why(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
 def _is_first(path: Path) -> bool:
-    return head(path).startswith(BAG)
+    return first_bytes(path).startswith(BAG)
 
 
 def _database(path: Path) -> sqlite3.Connection:
     return sqlite3.connect(f"file:{path}?mode=ro", uri=True)
 
 
-def _of_first(path: Path, kinds: dict[str, str], wanted: set[str]) -> Iterator[Message]:
+def _ros1_messages(
+    path: Path, kinds: dict[str, str], wanted: set[str]
+) -> Iterator[Message]:
     """Messages of a bag of ROS 1."""
     from rosbags.rosbag1 import Reader
     from rosbags.typesys import Stores, get_typestore
@@ -139,7 +142,7 @@ def _of_first(path: Path, kinds: dict[str, str], wanted: set[str]) -> Iterator[M
             yield Message(one.topic, logged, types.deserialize_ros1(data, one.msgtype))
 
 
-def _of_second(
+def _ros2_messages(
     path: Path, kinds: dict[str, str], wanted: set[str]
 ) -> Iterator[Message]:
     """Messages of a bag of ROS 2 in a database."""

@@ -197,7 +197,7 @@ def _number(data: bytes) -> int:
 
 
 def _sensor(data: bytes, name: str) -> int:
-    """Which sensor a message says it is of; zeros at its end are left out."""
+    """Sensor that a message states; trailing zeros are optional."""
     from fieldcal.drivers.mavlink_samples import KINDS
 
     head = HEADS[data[0]]

@@ -28,7 +28,7 @@ from fieldcal.drivers.mavlink_installed import PX4, Installed, names
 from fieldcal.importing.messages.ulog_messages import Table, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
-from fieldcal.importing.times.fifo_time import Fifo
+from fieldcal.importing.times.fifo_time import FifoTimes
 
 WHAT = "PX4 log, .ulg"
 
@@ -88,7 +88,7 @@ class UlogFile(Recording):
 
     def notes(self, stream: str) -> dict[str, Any]:
         """What the log says of the sensor, and the calibration behind its samples."""
-        topic, number = _parted(stream)
+        topic, number = _split_stream(stream)
         raw = self._raw(topic)
         identifier = self._identifier(topic, number)
         told = {
@@ -149,7 +149,7 @@ class UlogFile(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a sensor, a piece of the log at a time."""
-        topic, number = _parted(stream)
+        topic, number = _split_stream(stream)
         with self._sensible(topic):
             if topic in PARTNERS:
                 yield from self._pairs(topic, number)
@@ -211,17 +211,17 @@ class UlogFile(Recording):
         return self._read
 
 
-def _parted(stream: str) -> tuple[str, int]:
+def _split_stream(stream: str) -> tuple[str, int]:
     topic, _, number = stream.rpartition(".")
     return topic, int(number)
 
 
 def _combined(table: Table) -> Block:
-    acc = _three(table, "accelerometer_m_s2[{}]", "012")
+    acc = _axis_columns(table, "accelerometer_m_s2[{}]", "012")
     relative = table.get("accelerometer_timestamp_relative")
     if relative is not None:
         acc[np.asarray(relative) == NOT_UPDATED] = np.nan
-    gyr = _three(table, "gyro_rad[{}]", "012")
+    gyr = _axis_columns(table, "gyro_rad[{}]", "012")
     return Block.of(table["timestamp"] * 1e-6, acc, gyr)
 
 
@@ -231,26 +231,28 @@ def _integrals(table: Table) -> Block:
     for name in ("delta_velocity", "delta_angle"):
         seconds = 1e-6 * table[f"{name}_dt"].astype(float)
         usual = np.where(seconds > 0, seconds, np.nan)[:, None]
-        triads.append(_three(table, f"{name}[{{}}]", "012") / usual)
+        triads.append(_axis_columns(table, f"{name}[{{}}]", "012") / usual)
     middle = 0.5e-6 * table["delta_velocity_dt"]
     return Block.of(_stamps(table) - middle, *triads)
 
 
 def _reader(topic: str) -> Callable[[Table], Block]:
-    """What makes samples of the tables of a sensor."""
+    """Function that converts the tables of a sensor to samples."""
     if topic != "sensor_accel_fifo":
         return _sensor
-    fifo = Fifo()
+    fifo = FifoTimes()
     return lambda table: _unpacked(table, fifo)
 
 
 def _sensor(table: Table) -> Block:
     """Samples of one sensor, as if of an accelerometer."""
     temperature = table.get("temperature")
-    return Block.of(_stamps(table), _three(table, "{}", "xyz"), None, temperature)
+    return Block.of(
+        _stamps(table), _axis_columns(table, "{}", "xyz"), None, temperature
+    )
 
 
-def _unpacked(table: Table, fifo: Fifo) -> Block:
+def _unpacked(table: Table, fifo: FifoTimes) -> Block:
     """Samples of the FIFO of one sensor, as if of an accelerometer."""
     number = table["samples"].astype(int).clip(0, MOST)
     some = number > 0
@@ -261,11 +263,14 @@ def _unpacked(table: Table, fifo: Fifo) -> Block:
     t = fifo.times(_stamps(table)[some], number, period)
     valid = np.arange(MOST) < number[:, None]
     scale = np.repeat(table["scale"][some].astype(float), number)
-    axes = [_three(table, f"{axis}[{{}}]", range(MOST))[some][valid] for axis in "xyz"]
+    axes = [
+        _axis_columns(table, f"{axis}[{{}}]", range(MOST))[some][valid]
+        for axis in "xyz"
+    ]
     return Block.of(t, scale[:, None] * np.column_stack(axes))
 
 
-def _three(table: Table, pattern: str, parts: Iterable[object]) -> Array:
+def _axis_columns(table: Table, pattern: str, parts: Iterable[object]) -> Array:
     with np.errstate(invalid="ignore"):  # of a nan that signals
         some = [np.asarray(table[pattern.format(p)], dtype=float) for p in parts]
     return np.column_stack(some)

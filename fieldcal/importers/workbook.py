@@ -13,7 +13,7 @@ from typing import Any
 
 from fieldcal.core.errors import InputError
 from fieldcal.importers.csv_like import TextColumns
-from fieldcal.importing.files.gzip_stream import PIECE, on_disk
+from fieldcal.importing.files.gzip_stream import PIECE, unpacked_file
 
 WHAT = "workbooks of spreadsheets"
 
@@ -66,7 +66,7 @@ class WorkbookSheet(TextColumns):
         """
         from python_calamine import CalamineError, CalamineWorkbook
 
-        with on_disk(self.path, self.cut_off) as path:
+        with unpacked_file(self.path, self.cut_off) as path:
             try:
                 book = CalamineWorkbook.from_path(str(path))
                 sheets = {n: book.get_sheet_by_name(n) for n in book.sheet_names}
@@ -84,7 +84,7 @@ class WorkbookSheet(TextColumns):
 
 
 def _text(value: Any) -> str:
-    """A cell as text has it: points, times of a clock, and nothing that parts cells."""
+    """Text of a cell: decimal points, times of day, and no separators."""
     if isinstance(value, timedelta):
         return repr(value.total_seconds())
     if isinstance(value, (datetime, time)):

@@ -35,7 +35,7 @@ KNOWN = (*COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
 
 
 def are_unsigned(values: Array) -> bool:
-    """Whether numbers (n, k) are 16 bits of which nobody read the sign.
+    """Whether numbers (n, k) are signed 16-bit values that were read as unsigned.
 
     What is a little below zero reads a little below 65 536, and nothing lies between.
     """
@@ -48,10 +48,10 @@ def are_unsigned(values: Array) -> bool:
     return bool(min(low, high) > SOME and 1 - low - high < SOME / 2)
 
 
-def wrapped(column: Array) -> Array:
-    """Numbers of 16 bits with their sign.
+def to_signed_16_bit(column: Array) -> Array:
+    """Convert unsigned 16-bit numbers to signed ones.
 
-    >>> wrapped(np.array([1.0, 65535.0])).tolist()
+    >>> to_signed_16_bit(np.array([1.0, 65535.0])).tolist()
     [1.0, -1.0]
     """
     signed: Array = np.where(column >= HALF, column - 2 * HALF, column)
@@ -59,14 +59,14 @@ def wrapped(column: Array) -> Array:
 
 
 def has_time(names: Iterable[str]) -> bool:
-    """Whether columns, also ``t=name``, say when a row was taken, or how much later."""
+    """Whether columns, also ``t=name``, contain a time or a time step."""
     return any(name.partition("=")[0] in ("t", "dt") for name in names)
 
 
-def such_as(many: int) -> str:
-    """Columns as they may be, where a file has so many.
+def column_placeholders(many: int) -> str:
+    """Example of the columns option for a file with `many` columns.
 
-    >>> such_as(3), such_as(9), such_as(54)
+    >>> column_placeholders(3), column_placeholders(9), column_placeholders(54)
     ('ax,ay,az', 't,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
     """
     usual = ["t", *CHANNELS]
@@ -79,7 +79,7 @@ def such_as(many: int) -> str:
     return ",".join([*usual, *skipped])
 
 
-def check(wanted: ReadOptions) -> None:
+def check_columns(wanted: ReadOptions) -> None:
     """Refuse columns that cannot give samples.
 
     Raises
@@ -110,7 +110,7 @@ def check(wanted: ReadOptions) -> None:
 
 
 class ColumnReader:
-    """Makes samples of columns, piece by piece.
+    """Converts columns to samples, piece by piece.
 
     Parameters
     ----------
@@ -140,7 +140,9 @@ class ColumnReader:
             table = np.empty((3, n)) if whole else np.full((3, n), np.nan)
             for i, column in there:
                 if column is not None:
-                    signed = wrapped(column) if kind in wanted.unsigned else column
+                    signed = (
+                        to_signed_16_bit(column) if kind in wanted.unsigned else column
+                    )
                     sign = -1.0 if kind + "xyz"[i] in wanted.reversed else 1.0
                     with np.errstate(invalid="ignore"):  # of a nan that signals
                         np.multiply(signed, sign * scale, out=table[i])
@@ -153,19 +155,19 @@ class ColumnReader:
             self._times.of(columns, n),
             acc,
             triad("g", wanted.gyr_scale),
-            _warmth(columns.get("temperature"), *wanted.celsius),
+            _celsius_column(columns.get("temperature"), *wanted.celsius),
             columns.get("seq"),
             columns.get("t_host"),
         )
 
 
-def _warmth(column: Array | None, size: float, zero: float) -> Array | None:
-    """Deg C of a column; as it is where it says so."""
+def _celsius_column(column: Array | None, size: float, zero: float) -> Array | None:
+    """Convert a column to deg C, unless it is in deg C."""
     return column if column is None or (size, zero) == (1, 0) else zero + size * column
 
 
-def units(wanted: ReadOptions) -> str:
-    """Name the units of the columns that are wanted."""
+def describe_units(wanted: ReadOptions) -> str:
+    """Names of the units of the wanted columns, for messages."""
     known = {c.partition("=")[0] for c in wanted.columns}
     says = []
     for channel, unit, lsb in (
@@ -178,8 +180,8 @@ def units(wanted: ReadOptions) -> str:
     return ", ".join(says) or "deg C"
 
 
-def notes(wanted: ReadOptions) -> dict[str, object]:
-    """What a session keeps of the units."""
+def unit_notes(wanted: ReadOptions) -> dict[str, object]:
+    """Entries about units for the session."""
     return {
         "acc_unit": wanted.acc_unit or "m/s^2",
         "acc_lsb": wanted.acc_lsb,

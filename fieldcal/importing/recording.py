@@ -19,7 +19,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.files.gzip_stream import PIECE, pieces
+from fieldcal.importing.files.gzip_stream import PIECE, unpacked_pieces
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 ROWS = 1 << 15
@@ -65,7 +65,7 @@ CLOCK_NUMBER = "hhmmss"
 
 
 class MeanScatter(NamedTuple):
-    """How much the samples behind means scatter, as a table writes it.
+    """Scatter of the samples behind means, as a table states it.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class MeanScatter(NamedTuple):
 
 
 class RowBatch(NamedTuple):
-    """Rows that share a time: seconds from one batch to the next, and rows in each."""
+    """Batches of rows that share a time: interval in s, and rows per batch."""
 
     seconds: float
     rows: float
@@ -272,7 +272,7 @@ class Recording(ABC):
 
     def pieces(self, size: int = PIECE) -> Iterator[bytes]:
         """Bytes of the file, unpacked, up to where it was cut off."""
-        return pieces(self.path, size, self.cut_off)
+        return unpacked_pieces(self.path, size, self.cut_off)
 
     def cut_off(self, where: str, what: str) -> None:
         """Refuse a file that ends too early, or be content with what comes before.

@@ -12,9 +12,9 @@ from collections import deque
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.units.gravity_size import Gravity
-from fieldcal.importing.units.rate_size import rate_in
-from fieldcal.importing.units.scales import GYR_OUT, GYR_SCALES, fitting
+from fieldcal.importing.units.gravity_size import GravityReading
+from fieldcal.importing.units.rate_size import estimate_rate_unit
+from fieldcal.importing.units.scales import GYR_OUT, GYR_SCALES, fitting_scales
 
 PART = 0.05
 """Device time of which one mean is kept, s."""
@@ -52,7 +52,7 @@ class GyroUnitWatch:
     """
 
     def __init__(self, gravity: float) -> None:
-        self._gravity = Gravity(gravity, np.zeros(3), False)
+        self._gravity = GravityReading(gravity, np.zeros(3), False)
         self._means: deque[Array] = deque(maxlen=MEMORY)
         self._part: list[Block] = []
         self._looked = -np.inf
@@ -77,10 +77,12 @@ class GyroUnitWatch:
         if not self._means:
             return ""
         table = np.array(self._means)
-        reads = rate_in(table[:, 0], table[:, 1:4], table[:, 4:], self._gravity, TURNED)
+        reads = estimate_rate_unit(
+            table[:, 0], table[:, 1:4], table[:, 4:], self._gravity, TURNED
+        )
         if reads is None:
             return ""
-        fits = fitting(reads, GYR_SCALES, GYR_OUT[1])
+        fits = fitting_scales(reads, GYR_SCALES, GYR_OUT[1])
         self.unit = fits[0].unit if fits and fits[0].lsb == 1 else ""
         self._proved = bool(fits) and fits[0].unit == "rad/s"
         if not fits or self._proved:

@@ -9,7 +9,7 @@ import pytest
 from laid_about import turned
 
 from fieldcal.cli import main
-from fieldcal.importing.arrays.array_groups import imu_groups, within
+from fieldcal.importing.arrays.array_groups import arrays_in_group, imu_groups
 from fieldcal.importing.arrays.array_tables import tables_of
 from fieldcal.session.folder import Session
 
@@ -104,5 +104,5 @@ def test_which_groups_hold_an_imu(names: list[str], groups: dict[str, str]) -> N
 
 def test_what_lies_within_a_group() -> None:
     names = dict.fromkeys(["a/t", "ab/t", "a/b/t"], 0)
-    assert within("a", names).keys() == {"a/t", "a/b/t"}
-    assert within("", names) == names
+    assert arrays_in_group("a", names).keys() == {"a/t", "a/b/t"}
+    assert arrays_in_group("", names) == names

@@ -9,8 +9,8 @@ import pytest
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.calm_rates import DEG, RAD, calm_rates
-from fieldcal.importing.units.rate_size import TurnsShown
+from fieldcal.importing.units.calm_rates import DEG, RAD, guess_unit_of_calm_rates
+from fieldcal.importing.units.rate_size import TurnComparison
 from fieldcal.session.folder import Session
 
 G, RATE = 9.80665, 100.0
@@ -130,13 +130,16 @@ def test_gains_of_velocity_have_gains_of_angle_beside_them(
 
 def test_whole_degrees_are_among_the_answers() -> None:
     gyr = np.round(np.random.default_rng(7).normal(0, 60, (1000, 3)))
-    flown = TurnsShown(said=20.0, shown=0.1, bias=0.0)
-    asked = calm_rates(gyr, flown, None, "")
+    flown = TurnComparison(said=20.0, shown=0.1, bias=0.0)
+    asked = guess_unit_of_calm_rates(gyr, flown, None, "")
     assert asked.scale is None
     assert asked.answers[:2] == (
         "--gyr-unit deg/s", "--gyr-unit deg/s --gyr-lsb 131.072")  # fmt: skip
     # at full scale only counts
-    assert "--gyr-unit deg/s" not in calm_rates(gyr * 200, flown, None, "").answers
+    assert (
+        "--gyr-unit deg/s"
+        not in guess_unit_of_calm_rates(gyr * 200, flown, None, "").answers
+    )
 
 
 @pytest.mark.parametrize(
@@ -146,9 +149,13 @@ def test_what_flies_turns_more_than_its_thrust_shows(
     ratio: float, scale: object
 ) -> None:
     gyr = np.random.default_rng(8).normal(0, 0.3, (1000, 3))
-    found = calm_rates(gyr, TurnsShown(0.1 * ratio, 0.1, 0.0), None, "")
+    found = guess_unit_of_calm_rates(
+        gyr, TurnComparison(0.1 * ratio, 0.1, 0.0), None, ""
+    )
     assert found.scale == scale
-    named = calm_rates(gyr, TurnsShown(0.1 * ratio, 0.1, 0.0), None, "rad/s")
+    named = guess_unit_of_calm_rates(
+        gyr, TurnComparison(0.1 * ratio, 0.1, 0.0), None, "rad/s"
+    )
     assert named.scale == (RAD if ratio < 20 else scale)
 
 

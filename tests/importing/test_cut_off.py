@@ -16,7 +16,7 @@ from small_files import SMALL, Small, whole
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.importing.files.gzip_stream import pieces
+from fieldcal.importing.files.gzip_stream import unpacked_pieces
 from fieldcal.session.folder import Session
 
 NO_STREAM = ("arrays", "parquet", "phone_zip", "workbook")
@@ -158,8 +158,8 @@ def test_files_of_several_packed_parts_and_padding(tmp_path: Path) -> None:
     parts = [bytes([n]) * 70_000 for n in range(1, 4)]
     packed = bytes(200_000).join(map(gzip.compress, parts))
     path.write_bytes(packed + bytes(100))
-    assert b"".join(pieces(path)) == b"".join(parts)
+    assert b"".join(unpacked_pieces(path)) == b"".join(parts)
     for wrong, says in ((packed + b"more", "cannot be unpacked"), (packed[:-9], "cut")):
         path.write_bytes(wrong)
         with pytest.raises(InputError, match=says):
-            list(pieces(path))
+            list(unpacked_pieces(path))

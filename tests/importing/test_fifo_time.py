@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.times.fifo_time import Fifo
+from fieldcal.importing.times.fifo_time import FifoTimes
 from fieldcal.session.folder import Session
 
 FIFO = (
@@ -141,11 +141,11 @@ def test_times_of_a_fifo_go_forward_however_it_is_read(
     # none is read before its samples can have been taken
     read = np.maximum.accumulate(read) + period * np.cumsum(number)
     periods = np.full(len(read), period)
-    whole = Fifo().times(read, number, periods)
+    whole = FifoTimes().times(read, number, periods)
     assert len(whole) == number.sum()
     np.testing.assert_allclose(whole[np.cumsum(number) - 1], read, rtol=1e-12)
     assert (np.diff(whole) > 0).all()
-    parts = Fifo()
+    parts = FifoTimes()
     some = [slice(0, cut), slice(cut, None)]
     again = [parts.times(read[s], number[s], periods[s]) for s in some if len(read[s])]
     np.testing.assert_array_equal(np.concatenate(again), whole)

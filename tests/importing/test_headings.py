@@ -15,9 +15,9 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.headings.heading import Column
-from fieldcal.importing.headings.headings import read
+from fieldcal.importing.headings.headings import match_headings
 from fieldcal.importing.recording import ReadOptions, Recording
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])
 """Milliseconds, g, deg/s."""
@@ -138,7 +138,7 @@ def test_a_column_that_is_stored_as_times_is_one_whatever_its_name(
 def test_names_that_are_not_those_of_one_imu_say_nothing(
     names: tuple[str, ...],
 ) -> None:
-    assert read([Column("", name) for name in names], "_") == ()
+    assert match_headings([Column("", name) for name in names], "_") == ()
 
 
 def test_a_column_of_times_that_is_empty_is_none(tmp_path: Path) -> None:
@@ -156,14 +156,14 @@ def test_a_column_of_times_that_is_empty_is_none(tmp_path: Path) -> None:
 def test_units_that_differ_say_nothing(tmp_path: Path) -> None:
     for third in ("az [mg]", "az"):
         names = ("ax [g]", "ay [g]", third)
-        assert read([Column("", name) for name in names], "_") == ()
+        assert match_headings([Column("", name) for name in names], "_") == ()
         with pytest.raises(InputError, match="say what its columns are"):
             taken(text(tmp_path / "log", ("t", *names, *BARE[4:])))
 
 
 @given(st.lists(st.text(max_size=12), max_size=8))
 def test_any_names_are_understood_or_not(names: list[str]) -> None:
-    for found in read([Column(name, name) for name in names]):
+    for found in match_headings([Column(name, name) for name in names]):
         assert len(found.columns) >= 3
 
 
@@ -188,38 +188,42 @@ def test_any_names_are_understood_or_not(names: list[str]) -> None:
     ],
 )  # fmt: skip
 def test_what_a_name_says(name: str, says: tuple[str, str, str | None] | None) -> None:
-    found = meaning(name)
+    found = heading_meaning(name)
     assert (found and (found.kind, found.axis, found.unit)) == says
 
 
 def test_a_means_column_is_no_sample() -> None:
     names = [*BARE, "ax_std", "ay_std", "az_std"]
-    (found,) = read([Column("", name) for name in names], "_")
+    (found,) = match_headings([Column("", name) for name in names], "_")
     assert found.columns == (*BARE, "_", "_", "_")
 
 
 def test_several_imus_share_what_one_alone_has() -> None:
     names = ["t", *(f"imu{k}_{c}" for k in (0, 1) for c in BARE[1:4]), "gx", "gy", "gz"]
     names += ["imu1_temp", "baro_temp"]
-    found = read([Column("", name) for name in names])
+    found = match_headings([Column("", name) for name in names])
     assert [one.name for one in found] == ["0", "1"]
-    first, second = (read([Column(n, n) for n in names])[i].columns for i in (0, 1))
+    first, second = (
+        match_headings([Column(n, n) for n in names])[i].columns for i in (0, 1)
+    )
     assert {"t=t", "ax=imu0_ax", "gx=gx", "temperature=imu1_temp"} - {*first} == set()
     assert {"t=t", "ax=imu1_ax", "temperature=imu1_temp"} - {*second} == set()
 
 
 def test_each_of_several_imus_has_its_own_time() -> None:
     names = [f"imu{k}_{c}" for k in (0, 1) for c in BARE]
-    found = read([Column(name, name) for name in names])
+    found = match_headings([Column(name, name) for name in names])
     assert [[c.partition("=")[2] for c in one.columns] for one in found] == [
         names[: len(BARE)], names[len(BARE) :]
     ]  # fmt: skip
 
 
 def test_a_barometer_is_the_last_thermometer_that_is_taken() -> None:
-    (found,) = read([Column("", n) for n in (*BARE, "baro_temp")], "_")
+    (found,) = match_headings([Column("", n) for n in (*BARE, "baro_temp")], "_")
     assert found.columns[-1] == "temperature" and "that of the baro" in found.says[0]
-    (found,) = read([Column("", n) for n in (*BARE, "baro_temp", "temp")], "_")
+    (found,) = match_headings(
+        [Column("", n) for n in (*BARE, "baro_temp", "temp")], "_"
+    )
     assert found.columns[-2:] == ("_", "temperature") and not found.says
 
 
@@ -228,11 +232,11 @@ def test_a_covariance_is_no_axis_and_topics_are_no_imus_of_their_own() -> None:
              "/imu/data/angular_velocity_covariance[0]", "/imu/data/header/stamp",
              *(f"/imu/data/linear_acceleration/{x}" for x in "xyz"),
              "/odom/twist/angular_velocity/z"]  # fmt: skip
-    (found,) = read([Column("", name) for name in names], "_")
+    (found,) = match_headings([Column("", name) for name in names], "_")
     assert found.columns == ("_", "gx", "gy", "gz", "_", "t", "ax", "ay", "az", "_")
     assert found.usual == "rad/s"
 
 
 def test_two_columns_of_an_axis_leave_a_choice() -> None:
     names = ["t", "ax", "ay", "az", "az", "gx", "gy", "gz"]
-    assert read([Column("", name) for name in names], "_") == ()
+    assert match_headings([Column("", name) for name in names], "_") == ()

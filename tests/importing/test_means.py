@@ -13,8 +13,8 @@ from fieldcal.cli import main
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.headings.heading import Column
-from fieldcal.importing.headings.headings import read
-from fieldcal.importing.tables.means import spread
+from fieldcal.importing.headings.headings import match_headings
+from fieldcal.importing.tables.means import estimate_mean_uncertainty
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.session.folder import Session
 
@@ -98,7 +98,9 @@ def test_too_few_positions_are_asked_about(
 @pytest.mark.statistical
 def test_what_remains_of_gravity_is_the_error_of_the_means() -> None:
     found = [
-        spread(means(seed, 24, 0.01), np.full((24, 6), np.nan), None, G).sigma[0, 0]
+        estimate_mean_uncertainty(
+            means(seed, 24, 0.01), np.full((24, 6), np.nan), None, G
+        ).sigma[0, 0]
         for seed in range(40)
     ]
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.1)
@@ -111,12 +113,19 @@ def test_a_position_that_was_moved_is_no_part_of_the_scatter() -> None:
     for seed in range(30):
         table = means(100 + seed, 40, 0.01)
         table[seed, 2] += 0.8
-        found.append(spread(table, np.full((40, 6), np.nan), None, G).sigma[0, 0])
+        found.append(
+            estimate_mean_uncertainty(table, np.full((40, 6), np.nan), None, G).sigma[
+                0, 0
+            ]
+        )
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(SIGMA, rel=0.15)
     # where hardly more rows than parameters are there, none can be told from the others
     few = means(7, 12, 0.01)
     few[3, 2] += 0.8
-    assert spread(few, np.full((12, 6), np.nan), None, G).sigma[0, 0] > 9 * SIGMA
+    assert (
+        estimate_mean_uncertainty(few, np.full((12, 6), np.nan), None, G).sigma[0, 0]
+        > 9 * SIGMA
+    )
 
 
 def test_a_position_that_was_moved_is_named_and_costs_the_others_nothing(
@@ -179,7 +188,7 @@ def test_a_mean_its_scatter_and_what_it_ought_to_be_stand_beside_each_other(
 
 def test_what_outputs_ought_to_be_is_taken_where_it_stands_alone() -> None:
     def found(*names: str) -> list[tuple[str, ...]]:
-        return [h.columns for h in read([Column(n, n) for n in names])]
+        return [h.columns for h in match_headings([Column(n, n) for n in names])]
 
     true = [f"true_acc_{c} (m/s^2)" for c in "xyz"]
     sensed = [f"acc_{c} (m/s^2)" for c in "xyz"]
@@ -201,7 +210,7 @@ def test_samples_are_no_means() -> None:
 def test_a_scatter_that_is_only_rounding_is_none() -> None:
     means = np.array([[0.0, 0, 9.8, 1e-2, 2e-3, -3e-3]] * 9)
     scatter = np.array([[0.1, 0.1, 0.1, 1e-17, 9e-18, 5e-18]] * 9)
-    sigma = spread(means, scatter, np.full(9, 100.0), 9.8).sigma
+    sigma = estimate_mean_uncertainty(means, scatter, np.full(9, 100.0), 9.8).sigma
     np.testing.assert_allclose(sigma[:, :3], 0.01)
     assert np.isnan(sigma[:, 3:]).all()
 

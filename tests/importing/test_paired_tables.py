@@ -12,7 +12,7 @@ from laid_about import turned
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.arrays.array_tables import tables_of
-from fieldcal.importing.arrays.paired_tables import pairing
+from fieldcal.importing.arrays.paired_tables import pair_arrays
 from fieldcal.session.folder import Session
 
 Arrays = dict[str, Array]
@@ -97,7 +97,7 @@ def test_as_many_samples_at_other_times_are_paired_by_time(tmp_path: Path) -> No
 def test_a_slow_thermometer_goes_along_and_what_has_no_times_is_left() -> None:
     slow = np.arange(0.0, ROWS[-1, 0] + 5, 5.0)
     arrays = apart() | {"temp_t": slow, "temperature": 20 + slow, "odd": np.ones(7)}
-    paired = pairing(tables_of(arrays))
+    paired = pair_arrays(tables_of(arrays))
     assert paired is not None
     found = paired.of(tables_of(arrays))
     assert {table.shape[0] for table in found.values()} == {len(ROWS)}
@@ -110,10 +110,10 @@ def test_a_slow_thermometer_goes_along_and_what_has_no_times_is_left() -> None:
 def test_nothing_is_paired_by_guess(missing: str) -> None:
     arrays = apart()
     del arrays[missing]
-    assert pairing(tables_of(arrays)) is None
+    assert pair_arrays(tables_of(arrays)) is None
 
 
 def test_times_that_go_back_are_no_clock() -> None:
     arrays = apart()
     arrays["gyro_t"] = arrays["gyro_t"][::-1]
-    assert pairing(tables_of(arrays)) is None
+    assert pair_arrays(tables_of(arrays)) is None

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import ReadOptions, RowBatch
-from fieldcal.importing.times.row_times import BETWEEN, RowTimes, SpreadTimes
+from fieldcal.importing.times.row_times import BETWEEN, BatchTimes, RowTimes
 
 EACH, STEP = 10, 0.1
 """Rows of a batch, and s from one to the next."""
@@ -25,7 +25,7 @@ def stamped(
 
 
 def spread(stamps: Array, cuts: tuple[int, ...] = ()) -> Array:
-    clock, edges = SpreadTimes(RowBatch(STEP, EACH)), [0, *sorted(cuts), len(stamps)]
+    clock, edges = BatchTimes(RowBatch(STEP, EACH)), [0, *sorted(cuts), len(stamps)]
     pieces = [stamps[a:b] for a, b in zip(edges, edges[1:], strict=False)]
     return np.concatenate([clock.of(piece) for piece in pieces])
 

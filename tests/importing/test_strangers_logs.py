@@ -19,7 +19,7 @@ from small_files import write_workbook
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.columns import wrapped
+from fieldcal.importing.columns import to_signed_16_bit
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.tables.column_physics import is_direction
 from fieldcal.importing.text.cell_forms import HexCells, ListCells
@@ -434,7 +434,10 @@ def test_hexadecimal_counts_keep_their_sign(counts: list[int]) -> None:
     assert form is not None
     read = [[int(c) for c in line.split()] for line in form.reader()(text)]
     assert read == [counts, *[[0xABCD - 2**16, 0x0ABC, -1]] * 3]
-    assert wrapped(np.mod(np.array(counts, dtype=float), 2**16)).tolist() == counts
+    assert (
+        to_signed_16_bit(np.mod(np.array(counts, dtype=float), 2**16)).tolist()
+        == counts
+    )
 
 
 @given(

@@ -6,12 +6,12 @@ from laid_about import G, turned
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.gravity_size import Gravity
-from fieldcal.importing.units.rate_size import rate_in
+from fieldcal.importing.units.gravity_size import GravityReading
+from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.turn_closure import closing_scale
 
 RATE = 100.0
-KNOWN = Gravity(G, np.zeros(3), True)
+KNOWN = GravityReading(G, np.zeros(3), True)
 
 
 def jerked(seed: int, force: float) -> Array:
@@ -31,7 +31,7 @@ def test_the_scale_of_rates_is_found_however_the_hand_jerks(
     unit: float, force: float
 ) -> None:
     rows = jerked(3, force)
-    found = rate_in(rows[:, 0], rows[:, 1:4], rows[:, 4:] * unit, KNOWN)
+    found = estimate_rate_unit(rows[:, 0], rows[:, 1:4], rows[:, 4:] * unit, KNOWN)
     assert found == pytest.approx(unit, rel=0.03)
 
 
@@ -71,7 +71,7 @@ def test_turns_about_an_elbow_or_into_a_rail_show_no_other_scale(
 ) -> None:
     rows = swung(seed)
     rates = np.clip(rows[:, 4:], -rail, rail)
-    found = rate_in(rows[:, 0], rows[:, 1:4], rates, KNOWN)
+    found = estimate_rate_unit(rows[:, 0], rows[:, 1:4], rates, KNOWN)
     assert found == pytest.approx(1.0, rel=0.02)
 
 

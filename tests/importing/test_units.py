@@ -12,7 +12,7 @@ from laid_about import turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.gravity_size import gravity_in
+from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.session.folder import Session
 
 G = 9.80665
@@ -218,7 +218,7 @@ def test_the_sphere_is_found_wherever_it_lies(
     sides = rng.normal(size=(12, 3))
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     points = radius * (np.repeat(sides, 64, axis=0) + center)
-    found = gravity_in(points * (1 + 1e-6 * rng.normal(size=points.shape)))
+    found = estimate_gravity(points * (1 + 1e-6 * rng.normal(size=points.shape)))
     assert found is not None
     if found.round:
         assert found.size == pytest.approx(radius, rel=0.02)
@@ -228,7 +228,7 @@ def test_the_sphere_is_found_wherever_it_lies(
 @pytest.mark.parametrize("points", [np.ones((200, 3)), np.eye(3).repeat(70, axis=0)])
 def test_few_directions_make_no_sphere(points: Array) -> None:
     noise = 1e-3 * np.random.default_rng(7).normal(size=points.shape)
-    found = gravity_in(points + noise)
+    found = estimate_gravity(points + noise)
     assert found is not None and not found.round
     assert found.size == pytest.approx(np.median(np.linalg.norm(points, axis=1)), 0.01)
 

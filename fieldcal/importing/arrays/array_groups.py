@@ -27,9 +27,9 @@ def imu_groups(tables: Mapping[str, ArrayTable]) -> dict[str, str]:
 
     """
     folders = sorted({f for name in tables for f in _folders(name)})
-    if len(folders) < 2 or headings.read(columns_of(tables)):
+    if len(folders) < 2 or headings.match_headings(columns_of(tables)):
         return {}
-    kinds = {folder: _kinds(within(folder, tables)) for folder in folders}
+    kinds = {folder: _kinds(arrays_in_group(folder, tables)) for folder in folders}
     for wanted in BOTH:
         if found := [f for f in folders if wanted <= kinds[f]]:
             whole = [f for f in found if not any(o.startswith(f"{f}/") for o in found)]
@@ -37,8 +37,8 @@ def imu_groups(tables: Mapping[str, ArrayTable]) -> dict[str, str]:
     return {}
 
 
-def within(folder: str, named: Mapping[str, T]) -> dict[str, T]:
-    """What lies in a group and in the groups in it; all where none is named."""
+def arrays_in_group(folder: str, named: Mapping[str, T]) -> dict[str, T]:
+    """Arrays of a group and of the groups within it; all if no group is named."""
     begins = folder and f"{folder}/"
     return {name: one for name, one in named.items() if name.startswith(begins)}
 
@@ -54,12 +54,12 @@ def _folders(name: str) -> list[str]:
 
 
 def _kinds(tables: Mapping[str, ArrayTable]) -> set[str]:
-    """Sensors of the IMU that names of arrays tell; none where they tell several."""
-    found = headings.read(columns_of(tables))
+    """Sensors that the names of arrays state; none if they state several IMUs."""
+    found = headings.match_headings(columns_of(tables))
     return {*found[0].units} if len(found) == 1 else set()
 
 
 def _names(folders: list[str]) -> list[str]:
-    """What tells groups apart: their last part, or all where two share that."""
+    """Names of the groups: the last part, or the whole where two share that."""
     last = [folder.rpartition("/")[2] for folder in folders]
     return last if len({*last}) == len(last) else folders

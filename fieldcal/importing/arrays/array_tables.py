@@ -17,7 +17,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.arrays.matlab_objects import DECODE
 from fieldcal.importing.headings.heading import Column
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 
 WIDEST = 64
 """Columns of a table that are read together: they lie side by side in the file."""
@@ -55,7 +55,7 @@ def columns_of(tables: Mapping[str, ArrayTable]) -> list[Column]:
     """Columns of the arrays; those of a table of three are axes."""
     found = []
     for name, table in tables.items():
-        bare, many = _called(name), table.shape[1]
+        bare, many = _table_label(name), table.shape[1]
         if many == 1:
             found.append(Column(name, bare, table.unit))
         elif many <= WIDEST:
@@ -67,12 +67,15 @@ def columns_of(tables: Mapping[str, ArrayTable]) -> list[Column]:
     return found
 
 
-def _called(name: str) -> str:
-    """What an array is called, with what it lies in where that says more: acc/data."""
+def _table_label(name: str) -> str:
+    """Label of an array, with the name of its group if that adds a sensor: acc/data."""
     within, _, bare = name.rpartition("/")
     group = within.rpartition("/")[2]
     with_group = f"{group}_{bare}"
-    known = [meaning(one) or meaning(f"{one}_x") for one in (bare, with_group)]
+    known = [
+        heading_meaning(one) or heading_meaning(f"{one}_x")
+        for one in (bare, with_group)
+    ]
     return with_group if group and known[0] is None and known[1] else bare
 
 
@@ -87,8 +90,8 @@ def _names(bare: str, many: int, table: ArrayTable) -> list[str]:
     return three if many == len(three) else [f"{bare}_{i}" for i in range(many)]
 
 
-def listed(tables: Mapping[str, ArrayTable]) -> str:
-    """Names and shapes of tables, for people."""
+def describe_tables(tables: Mapping[str, ArrayTable]) -> str:
+    """Names and shapes of tables, for messages."""
     shapes = [f"{n} {t.shape[0]}x{t.shape[1]}" for n, t in list(tables.items())[:20]]
     return ", ".join(shapes) or "no arrays of numbers"
 
@@ -131,16 +134,16 @@ def tables_of(arrays: Mapping[str, Any]) -> dict[str, ArrayTable]:
     """Arrays of numbers as tables, also those within structures."""
     return {
         name: table_of(array)
-        for name, array in _leaves(arrays)
+        for name, array in _flat_arrays(arrays)
         if array.dtype.kind in "iuf" and array.ndim in DIMENSIONS
     }
 
 
-def _leaves(arrays: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _flat_arrays(arrays: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Arrays and their names, also those within structures and arrays of records."""
     for name, value in arrays.items():
         if isinstance(value, Mapping):
-            yield from ((f"{name}/{inner}", one) for inner, one in _leaves(value))
+            yield from ((f"{name}/{inner}", one) for inner, one in _flat_arrays(value))
         elif isinstance(value, np.ndarray):
             for field in _fields(value.dtype):
                 yield name + field, value[field[1:]] if field else value
@@ -179,7 +182,7 @@ def hdf5_units(file: Any) -> dict[str, str]:
 
 
 def _fields(kind: np.dtype[Any]) -> dict[str, np.dtype[Any]]:
-    """Kinds of what an array of records holds, by "/" and its name; "" of others."""
+    """Types of the fields of an array of records, by "/" and name; "" of others."""
     if kind.names is None:
         return {"": kind}
     return {f"/{name}": kind[name] for name in kind.names}

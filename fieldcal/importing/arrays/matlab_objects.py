@@ -25,7 +25,7 @@ TIME = "t"
 
 
 def holds_objects(loaded: Mapping[str, Any]) -> bool:
-    """Whether what scipy has read of a file are objects, some of it."""
+    """Whether a file that scipy has read contains objects."""
     return any(type(value).__name__ == OPAQUE for value in loaded.values())
 
 

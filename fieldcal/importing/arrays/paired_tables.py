@@ -15,8 +15,8 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.importing.arrays.array_tables import ArrayTable, columns_of
-from fieldcal.importing.times.alignment import nearest
-from fieldcal.importing.words.heading_words import Meaning, meaning
+from fieldcal.importing.times.alignment import nearest_in_time
+from fieldcal.importing.words.heading_words import HeadingMeaning, heading_meaning
 
 KINDS = {"a": "accelerometer", "g": "gyroscope", "temperature": "thermometer"}
 """What is put beside each other, the one whose samples are kept first."""
@@ -25,8 +25,8 @@ NOTHING = -1
 """In place of a row where none is near."""
 
 
-class Clocked(NamedTuple):
-    """Arrays of one sensor, and when its rows were taken.
+class ClockedArrays(NamedTuple):
+    """Arrays of one sensor, with the times of its rows.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Clocked(NamedTuple):
 
 
 class ArrayPairing(NamedTuple):
-    """How the arrays of a file go together.
+    """Pairing of the arrays of a file by time.
 
     Attributes
     ----------
@@ -86,21 +86,21 @@ class ArrayPairing(NamedTuple):
         return ArrayTable((len(rows), len(kept)), read, table.unit)
 
 
-def pairing(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
-    """How arrays of sensors go together that have times of their own.
+def pair_arrays(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
+    """Pair the arrays of sensors that have separate times.
 
     None where they have the same, or where no names and no times tell.
     """
     named = _by_kind(tables)
-    own = {kind: _clocked(kind, tables, named) for kind in KINDS}
+    own = {kind: _with_clock(kind, tables, named) for kind in KINDS}
     acc, others = own["a"], {k: one for k, one in own.items() if one and k != "a"}
-    if acc is None or "g" not in others or not _apart(acc, others["g"]):
+    if acc is None or "g" not in others or not _have_own_times(acc, others["g"]):
         return None
     rows, inside, says = dict[str, Index](), dict[str, int](), list[str]()
     for kind, one in others.items():
-        if not _apart(acc, one):
+        if not _have_own_times(acc, one):
             continue
-        found, apart = nearest(acc.t, one.t)
+        found, apart = nearest_in_time(acc.t, one.t)
         if kind == "g":
             near = apart <= np.median(np.diff(acc.t)) / 2
             found = np.where(near, found, NOTHING)
@@ -118,8 +118,8 @@ def pairing(tables: Mapping[str, ArrayTable]) -> ArrayPairing | None:
     return ArrayPairing(rows, inside, dropped, tuple(says))
 
 
-def _apart(one: Clocked, other: Clocked) -> bool:
-    """Whether two sensors were sampled at times of their own."""
+def _have_own_times(one: ClockedArrays, other: ClockedArrays) -> bool:
+    """Whether two sensors were sampled at different times."""
     return one.clock != other.clock and not np.array_equal(one.t, other.t)
 
 
@@ -127,21 +127,21 @@ def _by_kind(tables: Mapping[str, ArrayTable]) -> dict[str, list[str]]:
     """Names of the arrays of each sensor."""
     found: dict[str, list[str]] = {kind: [] for kind in KINDS}
     for name, table in tables.items():
-        said = {one.kind for one in _said(name, table) if one is not None}
+        said = {one.kind for one in _column_meanings(name, table) if one is not None}
         for kind in KINDS.keys() & said:
             found[kind].append(name)
     return found
 
 
-def _said(name: str, table: ArrayTable) -> list[Meaning | None]:
-    """What each column of an array is by its name."""
-    return [meaning(c.name, c.unit) for c in columns_of({name: table})]
+def _column_meanings(name: str, table: ArrayTable) -> list[HeadingMeaning | None]:
+    """Meaning of each column of an array, by its name."""
+    return [heading_meaning(c.name, c.unit) for c in columns_of({name: table})]
 
 
-def _clocked(
+def _with_clock(
     kind: str, tables: Mapping[str, ArrayTable], named: Mapping[str, list[str]]
-) -> Clocked | None:
-    """A sensor with its clock; None where nothing tells which that is."""
+) -> ClockedArrays | None:
+    """A sensor with its clock; None if the clock cannot be identified."""
     names = named[kind]
     lengths = {tables[name].shape[0] for name in names}
     if len(lengths) != 1:
@@ -151,7 +151,7 @@ def _clocked(
         (name, at)
         for name, table in tables.items()
         if table.shape[0] == length
-        for at, said in enumerate(_said(name, table))
+        for at, said in enumerate(_column_meanings(name, table))
         if said is not None and said.kind == "t" and _of_the_same(name, names)
     ]
     own = [one for one in clocks if one[0] in names] or clocks
@@ -161,11 +161,14 @@ def _clocked(
     (t,) = tables[clock].read(slice(0, length), [at])
     if not np.isfinite(t).all() or (np.diff(t) < 0).any():
         return None
-    return Clocked(tuple(names), clock, at, t)
+    return ClockedArrays(tuple(names), clock, at, t)
 
 
 def _of_the_same(clock: str, names: Sequence[str]) -> bool:
-    """Whether a clock's name does not say that it is another sensor's."""
-    said = [meaning(f"{clock}_x"), *(meaning(f"{name}_x") for name in names)]
+    """Whether a clock may belong to a sensor, by its name."""
+    said = [
+        heading_meaning(f"{clock}_x"),
+        *(heading_meaning(f"{name}_x") for name in names),
+    ]
     kinds = [one.kind for one in said if one is not None and one.kind in KINDS]
     return len(set(kinds)) < len("ag")

@@ -31,11 +31,11 @@ MAGIC = b"\x1f\x8b"
 _AT_ONCE = 1 << 16
 """Packed bytes read together."""
 
-Cut = Callable[[str, str], None]
+OnTruncation = Callable[[str, str], None]
 """Called with the place where a file ends too early; may raise."""
 
 
-def refuse_truncated(path: Path) -> Cut:
+def refuse_truncated(path: Path) -> OnTruncation:
     """Refuse a file that ends too early."""
 
     def cut(where: str, what: str) -> None:
@@ -44,7 +44,7 @@ def refuse_truncated(path: Path) -> Cut:
     return cut
 
 
-def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
+def open_unpacked(path: Path, cut: OnTruncation | None = None) -> IO[bytes]:
     """Open a file for reading, unpacked.
 
     Parameters
@@ -77,7 +77,7 @@ def open_unpacked(path: Path, cut: Cut | None = None) -> IO[bytes]:
 
 
 def _name_unpacked(path: Path) -> str | None:
-    """Name of what a file is, unpacked; None if it is not packed."""
+    """Name of the unpacked file; None if a file is not packed."""
     with path.open("rb") as file:
         magic = file.read(len(zip_member.MAGIC))
     if magic == zip_member.MAGIC:
@@ -87,9 +87,11 @@ def _name_unpacked(path: Path) -> str | None:
 
 
 class _Gunzip(io.RawIOBase):
-    """What can be unpacked of a gzip file, which may have several parts."""
+    """Reader of a gzip file, which may have several parts or be truncated."""
 
-    def __init__(self, file: io.BufferedReader, nothing: Cut, cut: Cut) -> None:
+    def __init__(
+        self, file: io.BufferedReader, nothing: OnTruncation, cut: OnTruncation
+    ) -> None:
         self._file, self._nothing, self._cut = file, nothing, cut
         self._part = zlib.decompressobj(16 + zlib.MAX_WBITS)
         self._packed, self._many, self._over = b"", 0, False
@@ -137,7 +139,9 @@ class _Gunzip(io.RawIOBase):
         super().close()
 
 
-def pieces(path: Path, size: int = PIECE, cut: Cut | None = None) -> Iterator[bytes]:
+def unpacked_pieces(
+    path: Path, size: int = PIECE, cut: OnTruncation | None = None
+) -> Iterator[bytes]:
     """Bytes of a file, unpacked, piece by piece.
 
     Raises
@@ -161,14 +165,14 @@ def pieces(path: Path, size: int = PIECE, cut: Cut | None = None) -> Iterator[by
             yield data
 
 
-def head(path: Path, many: int = HEAD) -> bytes:
-    """First bytes of a file, unpacked, as far as they are there."""
-    return next(pieces(path, many, lambda where, what: None), b"")
+def first_bytes(path: Path, many: int = HEAD) -> bytes:
+    """First bytes of a file, unpacked; fewer if the file is shorter."""
+    return next(unpacked_pieces(path, many, lambda where, what: None), b"")
 
 
 @contextmanager
-def on_disk(path: Path, cut: Cut | None = None) -> Iterator[Path]:
-    """Give a file that can be searched, unpacked where it was not."""
+def unpacked_file(path: Path, cut: OnTruncation | None = None) -> Iterator[Path]:
+    """Return an unpacked file that supports seeking."""
     name = _name_unpacked(path)
     if name is None:
         yield path
@@ -178,7 +182,7 @@ def on_disk(path: Path, cut: Cut | None = None) -> Iterator[Path]:
         whole = folder / name
         try:
             with whole.open("wb") as out:
-                for data in pieces(path, cut=cut):
+                for data in unpacked_pieces(path, cut=cut):
                     out.write(data)
         except OSError as error:
             raise InputError(

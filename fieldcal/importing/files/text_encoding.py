@@ -34,11 +34,13 @@ LOOKED = 4096
 """First bytes by which the encoding is told."""
 
 
-def is_plain(head: bytes) -> bool:
-    """Whether most bytes are characters of a text.
+def is_mostly_text(head: bytes) -> bool:
+    """Whether most bytes are printable characters.
 
-    >>> is_plain("Gx=0.6 °/s 🌐 角速度".encode()), is_plain(bytes(range(256)))
-    (True, False)
+    >>> is_mostly_text("Gx=0.6 °/s 🌐 角速度".encode())
+    True
+    >>> is_mostly_text(bytes(range(256)))
+    False
     """
     others = (1 - TEXT) * len(head)
     if len(head.translate(None, delete=PLAIN)) <= others:
@@ -51,10 +53,10 @@ def is_plain(head: bytes) -> bool:
     return len(head.translate(None, delete=LETTERS)) <= others
 
 
-def wide(head: bytes) -> str | None:
+def utf16_encoding(head: bytes) -> str | None:
     """Return the UTF-16 in which a text begins, as Python calls it; None of another.
 
-    >>> wide("t,ax".encode("utf-16-be")), wide(b"t,ax")
+    >>> utf16_encoding("t,ax".encode("utf-16-be")), utf16_encoding(b"t,ax")
     ('utf-16-be', None)
     """
     marked = WIDE.get(head[:2])
@@ -64,17 +66,17 @@ def wide(head: bytes) -> str | None:
         ("utf-16-be", head[::2], head[1::2]),
     ):
         empty = zeros.count(0) >= 2 * HALF * len(zeros)
-        if empty and is_plain(letters) and marked in (None, name):
+        if empty and is_mostly_text(letters) and marked in (None, name):
             return name if head else None
     return None
 
 
 def as_utf8(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Bytes of a text in UTF-8, whatever it is in."""
+    """Convert the bytes of a text to UTF-8."""
     decoder: codecs.IncrementalDecoder | None = None
     for number, data in enumerate(pieces):
         if not number:
-            name = wide(data[:LOOKED])
+            name = utf16_encoding(data[:LOOKED])
             decoder = codecs.getincrementaldecoder(name)("replace") if name else None
             data = data if decoder else data.removeprefix(MARK)
         yield decoder.decode(data).lstrip("\ufeff").encode() if decoder else data

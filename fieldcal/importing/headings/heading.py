@@ -42,7 +42,7 @@ class Heading(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class HeadingMatch:
-    """What the names of some columns say of one IMU.
+    """Columns of one IMU, identified by their names.
 
     Attributes
     ----------

@@ -18,10 +18,10 @@ from fieldcal.importing.words.heading_words import (
     MEAN,
     REFERENCE,
     SCATTER,
-    Meaning,
+    HeadingMeaning,
     bare_label,
-    meaning,
-    words_of,
+    heading_meaning,
+    words_in_name,
 )
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
@@ -50,17 +50,17 @@ ANGLES = ("roll", "pitch", "yaw", "heading", "azimuth", "euler", "quat", "quater
 """Words of what a filter computes of an attitude."""
 
 
-class Named(NamedTuple):
-    """A column by its number, and what its name says."""
+class NamedColumn(NamedTuple):
+    """Number of a column, and the meaning of its name."""
 
     number: int
-    says: Meaning
+    says: HeadingMeaning
 
 
-def read(
+def match_headings(
     columns: Sequence[Column], skip: str = "", weak: bool = False
 ) -> tuple[HeadingMatch, ...]:
-    """Channels and units from headings, by IMU; none if they are not those of IMUs.
+    """Match headings to channels and units, by IMU; empty if there is no IMU.
 
     Parameters
     ----------
@@ -70,19 +70,21 @@ def read(
 
     """
     named = [
-        Named(i, said)
+        NamedColumn(i, said)
         for i, column in enumerate(columns)
         if "," not in column.place
-        and (said := meaning(column.name, column.unit)) is not None
+        and (said := heading_meaning(column.name, column.unit)) is not None
         and (said.kind == "t" or not set(said.label) & set(NOT_SAMPLES))
     ]
-    named = _in_units(_with_rates(_with_temperature(columns, _measured(named))))
-    named = _with_gravity(named)
+    named = _without_counts(
+        _without_angle_gains(_with_temperature(columns, _without_references(named)))
+    )
+    named = _without_linear_acceleration(named)
     acc, gyr = _triads(named, "a"), _triads(named, "g")
     if acc is None or gyr is None:
         return ()
     if not (acc or gyr):
-        return _of_a_thermometer(columns, named, skip)
+        return _match_thermometer_file(columns, named, skip)
     # without gyroscopes beside it, a "linear acceleration" may lack gravity
     lacking = all(one.says.weak for three in acc.values() for one in three)
     if not gyr and lacking and not weak:
@@ -92,11 +94,11 @@ def read(
     apart = [n for n in named if n.says.kind == "l"]
     found = []
     for label in acc or gyr:
-        both = [*acc.get(label, ()), *_beside(label, gyr)]
+        both = [*acc.get(label, ()), *_gyroscopes_of(label, gyr)]
         warm, says = _thermometer(named, label)
-        rest = _one([n for n in named if n.says.kind == "seq"], ())
+        rest = _plainest([n for n in named if n.says.kind == "seq"], ())
         rest += [n for n in named if n.says.kind == "t_host"][:1]
-        clock = _one(_own(times, label) or times, OTHER_CLOCK) or steps
+        clock = _plainest(_columns_of_imu(times, label) or times, OTHER_CLOCK) or steps
         chosen = [*clock, *both, *apart, *warm, *rest]
         found.append(_match(columns, chosen, skip, "_".join(label) or "0", says))
     if len(found) == 1:
@@ -104,53 +106,58 @@ def read(
     return tuple(found)
 
 
-def no_axes(columns: Sequence[Column]) -> list[int]:
-    """Columns whose names say that they are no axes of an IMU, whatever they hold."""
+def columns_without_axes(columns: Sequence[Column]) -> list[int]:
+    """Columns whose names exclude that they are axes of an IMU."""
     found = []
     for i, column in enumerate(columns):
-        said, words = meaning(column.name, column.unit), {*words_of(column.name)}
+        said, words = (
+            heading_meaning(column.name, column.unit),
+            {*words_in_name(column.name)},
+        )
         kind = said.kind if said is not None else ""
         if words & {*SCATTER} or kind == "m" or (words & {*ANGLES} and kind != "g"):
             found.append(i)
     return found
 
 
-def _of_a_thermometer(
-    columns: Sequence[Column], named: Sequence[Named], skip: str
+def _match_thermometer_file(
+    columns: Sequence[Column], named: Sequence[NamedColumn], skip: str
 ) -> tuple[HeadingMatch, ...]:
-    """Columns of times and temperatures alone: a file beside those of the IMU."""
+    """Match a file that contains only times and temperatures."""
     kinds = [n.says.kind for n in named]
     if sorted(kinds) != ["t", "temperature"] or len(columns) != len(kinds):
         return ()
     return (_match(columns, named, skip, "0", ()),)
 
 
-def _with_temperature(columns: Sequence[Column], named: Sequence[Named]) -> list[Named]:
-    """Columns of which a "T" is the temperature, where another is the time."""
+def _with_temperature(
+    columns: Sequence[Column], named: Sequence[NamedColumn]
+) -> list[NamedColumn]:
+    """Columns with "T" taken as temperature if another column is the time."""
     times = [n for n in named if n.says.kind == "t"]
     warm = [n for n in times if columns[n.number].name.strip() == "T"]
     if not warm or len(times) == len(warm):
         return [*named]
-    as_warm = [n._replace(says=Meaning("temperature", "", None)) for n in warm]
+    as_warm = [n._replace(says=HeadingMeaning("temperature", "", None)) for n in warm]
     return [n for n in named if n not in warm] + as_warm
 
 
-def _measured(named: Sequence[Named]) -> list[Named]:
-    """Columns without those of what outputs ought to be, where outputs are there."""
+def _without_references(named: Sequence[NamedColumn]) -> list[NamedColumn]:
+    """Columns without reference values, if there are measured ones."""
     ought = [n for n in named if set(n.says.label) & set(REFERENCE)]
     outputs = {n.says.kind for n in named if n not in ought}
     return [n for n in named if n not in ought or n.says.kind not in outputs]
 
 
-def _with_rates(named: Sequence[Named]) -> list[Named]:
-    """Columns without those of gains of angle, where rates are there."""
+def _without_angle_gains(named: Sequence[NamedColumn]) -> list[NamedColumn]:
+    """Columns without increments of angle, if there are rates."""
     rates = [n for n in named if n.says.kind == "g"]
     gains = [n for n in rates if n.says.weak]
     return [n for n in named if n not in gains or len(gains) == len(rates)]
 
 
-def _in_units(named: Sequence[Named]) -> list[Named]:
-    """Columns without the counts of axes of which the same stands there in units."""
+def _without_counts(named: Sequence[NamedColumn]) -> list[NamedColumn]:
+    """Columns without counts of axes that are also given in units."""
     axes = [n for n in named if n.says.axis and n.says.kind in "ag"]
     in_units = {_axis_of(n) for n in axes if n.says.unit}
     return [
@@ -160,13 +167,13 @@ def _in_units(named: Sequence[Named]) -> list[Named]:
     ]  # fmt: skip
 
 
-def _axis_of(one: Named) -> tuple[str, str, tuple[str, ...]]:
+def _axis_of(one: NamedColumn) -> tuple[str, str, tuple[str, ...]]:
     """Kind, axis and IMU of a column."""
     return one.says.kind, one.says.axis, bare_label(one.says.label)
 
 
-def _with_gravity(named: Sequence[Named]) -> list[Named]:
-    """Columns without those of accelerations that lack gravity, where others have it.
+def _without_linear_acceleration(named: Sequence[NamedColumn]) -> list[NamedColumn]:
+    """Columns without accelerations less gravity, if there are specific forces.
 
     Where gravity stands in columns of its own, both together are what was measured.
     """
@@ -183,19 +190,19 @@ def _with_gravity(named: Sequence[Named]) -> list[Named]:
     if axes != [[*AXES]] * 2 or weak[0].says.unit != gravity[0].says.unit:
         return others + weak
     both = ((gravity, "a"), (weak, "l"))
-    parts = [Named(n.number, n.says._replace(kind=kind, label=(), weak=False))
+    parts = [NamedColumn(n.number, n.says._replace(kind=kind, label=(), weak=False))
              for three, kind in both for n in three]  # fmt: skip
     return others + parts
 
 
 def _triads(
-    named: Iterable[Named], kind: str
-) -> dict[tuple[str, ...], list[Named]] | None:
-    """Axes of a kind by what their names do not share; None where that leaves a choice.
+    named: Iterable[NamedColumn], kind: str
+) -> dict[tuple[str, ...], list[NamedColumn]] | None:
+    """Axes of a kind, by the words in which their names differ; None if ambiguous.
 
     Axes that are not whole are none where others are; nor are those in several units.
     """
-    groups: dict[tuple[str, ...], list[Named]] = {}
+    groups: dict[tuple[str, ...], list[NamedColumn]] = {}
     for one in named:
         if one.says.kind == kind:
             label = tuple(w for w in bare_label(one.says.label) if w not in MEAN)
@@ -213,42 +220,44 @@ def _triads(
     return groups
 
 
-def _beside(
-    label: tuple[str, ...], gyr: Mapping[tuple[str, ...], list[Named]]
-) -> list[Named]:
-    """Gyroscopes of an IMU: those with its label, or the only ones there are."""
+def _gyroscopes_of(
+    label: tuple[str, ...], gyr: Mapping[tuple[str, ...], list[NamedColumn]]
+) -> list[NamedColumn]:
+    """Gyroscopes of an IMU: those with its label, or the only ones."""
     return gyr.get(label) or (next(iter(gyr.values())) if len(gyr) == 1 else [])
 
 
-def _own(named: Iterable[Named], label: tuple[str, ...]) -> list[Named]:
-    """Columns whose names say that they are those of one of several IMUs."""
+def _columns_of_imu(
+    named: Iterable[NamedColumn], label: tuple[str, ...]
+) -> list[NamedColumn]:
+    """Columns whose names have the label of one of several IMUs."""
     return [n for n in named if label and set(label) <= set(n.says.label)]
 
 
-def _one(named: Sequence[Named], but: Sequence[str]) -> list[Named]:
-    """One of several of a kind: the plainest name, with no word of `but` if can be."""
+def _plainest(named: Sequence[NamedColumn], but: Sequence[str]) -> list[NamedColumn]:
+    """One of several columns: the shortest name, without `but` if possible."""
     return sorted(
         named, key=lambda n: (bool(set(n.says.label) & set(but)), len(n.says.label))
     )[:1]
 
 
-def _stamps(times: Sequence[Named]) -> list[Named]:
-    """Times at which messages were measured, where those of their arrival are there."""
+def _stamps(times: Sequence[NamedColumn]) -> list[NamedColumn]:
+    """Times of measurement, without times of arrival if there are both."""
     whole = [n for n in times if n.says.unit is None and "header" in n.says.label]
     return whole or [*times]
 
 
 def _thermometer(
-    named: Iterable[Named], label: tuple[str, ...]
-) -> tuple[list[Named], tuple[str, ...]]:
-    """Return the thermometer nearest to an IMU, and what must be said of it."""
+    named: Iterable[NamedColumn], label: tuple[str, ...]
+) -> tuple[list[NamedColumn], tuple[str, ...]]:
+    """Return the thermometer nearest to an IMU, and a message about it."""
     warm = [n for n in named if n.says.kind == "temperature"]
-    near = _own(warm, label) or [
+    near = _columns_of_imu(warm, label) or [
         n for n in warm if not set(n.says.label) & set(FOREIGN)
     ]
     if near or not warm:
-        return _one(near, ()), ()
-    chosen = _one(warm, ())
+        return _plainest(near, ()), ()
+    chosen = _plainest(warm, ())
     other = " ".join(chosen[0].says.label)
     return chosen, (
         f"its only thermometer is that of the {other}: it is taken, but lies apart from"
@@ -258,12 +267,12 @@ def _thermometer(
 
 def _match(
     columns: Sequence[Column],
-    chosen: Sequence[Named],
+    chosen: Sequence[NamedColumn],
     skip: str,
     name: str,
     says: tuple[str, ...],
 ) -> HeadingMatch:
-    """What is taken of the columns for one IMU."""
+    """Match of the chosen columns for one IMU."""
     kinds = {n.number: n.says for n in chosen}
     found: list[str] = []
     units: dict[str, str | None] = {}
@@ -276,6 +285,6 @@ def _match(
         found.append(f"{channel}={column.place}" if column.place else channel)
         if UNITS[said.kind]:
             units["t" if said.kind == "dt" else said.kind] = said.unit
-    axes = [words_of(columns[n.number].name) for n in chosen if n.says.axis]
+    axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
     ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
     return HeadingMatch(tuple(found), units, name, says, "rad/s" if ros else "")

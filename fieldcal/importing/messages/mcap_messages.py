@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fieldcal.core.errors import InputError
-from fieldcal.importing.files.gzip_stream import Cut
+from fieldcal.importing.files.gzip_stream import OnTruncation
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Message, Schema
@@ -53,7 +53,9 @@ class _Dictionary:
         return None
 
 
-def messages(path: Path, damaged: Cut, cut: Cut) -> Iterator[DecodedMessage]:
+def messages(
+    path: Path, damaged: OnTruncation, cut: OnTruncation
+) -> Iterator[DecodedMessage]:
     """Messages in the order of the file.
 
     Parameters
@@ -77,7 +79,7 @@ def messages(path: Path, damaged: Cut, cut: Cut) -> Iterator[DecodedMessage]:
         cut(f"behind message {seen}", f"is cut off ({error or type(error).__name__})")
 
 
-def _records(path: Path, damaged: Cut) -> Iterator[Any]:
+def _records(path: Path, damaged: OnTruncation) -> Iterator[Any]:
     from mcap.records import Chunk, DataEnd
     from mcap.stream_reader import StreamReader, breakup_chunk
 

@@ -17,7 +17,7 @@ MANY = 4096
 """Messages made into samples at once."""
 
 
-def row_of(said: Any, degrees: float, logged: int) -> tuple[float, ...]:
+def message_row(said: Any, degrees: float, logged: int) -> tuple[float, ...]:
     """Return a row t, acc, gyr, deg C and time of logging, s, of a message.
 
     Parameters
@@ -37,8 +37,8 @@ def row_of(said: Any, degrees: float, logged: int) -> tuple[float, ...]:
     return (stamp.sec + 1e-9 * stamp.nanosec, *acc, *gyr, degrees, 1e-9 * logged)
 
 
-def block_of(rows: list[tuple[float, ...]]) -> Block:
-    """Samples of such rows."""
+def samples_of_rows(rows: list[tuple[float, ...]]) -> Block:
+    """Convert rows of `message_row` to samples."""
     table = np.array(rows)
     t, acc, gyr = table[:, 0], table[:, 1:4], table[:, 4:7]
     return Block.of(t, acc, gyr, table[:, 7], None, table[:, 8])

@@ -21,12 +21,12 @@ from fieldcal.importing.records.json_record import (
     JsonRecord,
     floats,
     is_number,
-    record,
-    side_by_side,
+    join_devices,
+    read_record,
 )
-from fieldcal.importing.records.record_pairs import paired
+from fieldcal.importing.records.record_pairs import pair_records
 from fieldcal.importing.times.clock_text import ClockText
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 
 
 def json_lists(
@@ -57,7 +57,7 @@ def json_lists(
             if len(rows) == len(document):
                 yield name or "list", np.array(rows)
     else:
-        records = [record(one) for one in document if isinstance(one, Mapping)]
+        records = [read_record(one) for one in document if isinstance(one, Mapping)]
         for bare, values in _fields(records, [] if says is None else says):
             yield (f"{name}/{bare}" if name else bare), values
 
@@ -67,7 +67,7 @@ def _fields(
 ) -> Iterator[tuple[str, Array]]:
     """Values of each field, (n,), with the kind of its records before its name."""
     kinds = {kind: _lists(alike) for kind, alike in _kinds(records).items()}
-    if len(kinds) > 1 and (pair := paired(kinds)) is not None:
+    if len(kinds) > 1 and (pair := pair_records(kinds)) is not None:
         says.append(
             f"of its records, those of {pair.acc} are taken, each with the nearest of"
             f" {pair.gyr}"
@@ -80,7 +80,7 @@ def _fields(
 
 
 def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
-    """Records that are alike, by the texts in which they differ from others."""
+    """Records of the same kind, by the texts in which they differ from others."""
     names = {name for one in records for name in one.texts}
     differ = [
         name
@@ -96,9 +96,9 @@ def _kinds(records: Sequence[JsonRecord]) -> dict[str, list[JsonRecord]]:
 
 def _lists(records: Sequence[JsonRecord]) -> dict[str, Array]:
     """Values of each field, (n,), in the order of the records."""
-    records = side_by_side(records)
+    records = join_devices(records)
     if any(one.samples for one in records):
-        return _of_samples([one for one in records if one.samples])
+        return _sample_fields([one for one in records if one.samples])
     found = {
         name: np.array([one.numbers.get(name, np.nan) for one in records])
         for name in dict.fromkeys(name for one in records for name in one.numbers)
@@ -115,26 +115,28 @@ def _seconds(texts: Sequence[str]) -> Array:
     return np.array([np.nan if since is None else since for since in read])
 
 
-def _of_samples(records: Sequence[JsonRecord]) -> dict[str, Array]:
-    """Values of each field of samples, several of which a record holds."""
+def _sample_fields(records: Sequence[JsonRecord]) -> dict[str, Array]:
+    """Values of each field of samples, if a record contains several samples."""
     many = [min(len(inner) for inner in one.samples.values()) for one in records]
     bare = [one._replace(samples={}) for one in records]
     whole = [
-        record({name: inner[i] for name, inner in one.samples.items()})
+        read_record({name: inner[i] for name, inner in one.samples.items()})
         for one, m in zip(records, many, strict=True)
         for i in range(m)
     ]
     found = _lists(whole) if not any(one.samples for one in whole) else {}
     for name, values in _lists(bare).items():
-        said = meaning(name)
+        said = heading_meaning(name)
         is_time = said is not None and said.kind == "t"
-        spread = _evenly(values, many) if is_time else np.repeat(values, many)
+        spread = (
+            _evenly_spaced_times(values, many) if is_time else np.repeat(values, many)
+        )
         found[name] = spread
     return found
 
 
-def _evenly(begins: Array, many: Sequence[int]) -> Array:
-    """Times of samples that lie evenly from the beginning of a record to the next."""
+def _evenly_spaced_times(begins: Array, many: Sequence[int]) -> Array:
+    """Times of samples at equal intervals from one record to the next."""
     steps = [b - a for a, b in pairwise(begins)] or [0.0]
     last = steps[-1] * many[-1] / max(many[-2] if len(many) > 1 else 1, 1)
     parts = zip(begins, [*steps[: len(begins) - 1], last], many, strict=True)

@@ -14,7 +14,11 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.text.instances import tells_devices
 from fieldcal.importing.times.clock_text import is_clock
-from fieldcal.importing.words.heading_words import axis_alone, meaning, words_of
+from fieldcal.importing.words.heading_words import (
+    bare_axis,
+    heading_meaning,
+    words_in_name,
+)
 
 AXES = "xyz"
 
@@ -59,34 +63,40 @@ def _float(value: Any) -> float:
         return float("inf")
 
 
-def _written(name: str, text: str) -> float | None:
-    """A number that is written as a text; None of another, or of a number of a device.
+def _number_in_text(name: str, text: str) -> float | None:
+    """A number that is written as text; None if it is none or a device's number.
 
-    >>> _written("z", "9.81"), _written("time", "17"), _written("device", "2")
+    >>> written = (("z", "9.81"), ("time", "17"), ("device", "2"))
+    >>> tuple(_number_in_text(name, text) for name, text in written)
     (9.81, 17.0, None)
     """
     try:
         number = float(text)
     except ValueError:
         return None
-    channel = meaning(name) is not None or axis_alone(words_of(name)) is not None
+    channel = (
+        heading_meaning(name) is not None or bare_axis(words_in_name(name)) is not None
+    )
     return number if channel or "." in text else None
 
 
-def record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
+def read_record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonRecord:
     """A record, with the names of what lies within it joined."""
     found = JsonRecord({}, {}, {}, {})
     for key, inner in value.items():
         full = f"{name}_{key}".strip("_") or "value"
         if isinstance(inner, Mapping) and depth < DEEPEST:
-            within = record(inner, full, depth + 1)
+            within = read_record(inner, full, depth + 1)
             found.numbers.update(within.numbers)
             found.clocks.update(within.clocks)
             found.texts.update(within.texts)
             found.samples.update(within.samples)
         elif is_number(inner):
             found.numbers[full] = _float(inner)
-        elif isinstance(inner, str) and (number := _written(full, inner)) is not None:
+        elif (
+            isinstance(inner, str)
+            and (number := _number_in_text(full, inner)) is not None
+        ):
             found.numbers[full] = number
         elif isinstance(inner, str) and is_clock(inner):
             found.clocks[full] = inner
@@ -101,20 +111,20 @@ def record(value: Mapping[str, Any], name: str = "", depth: int = 0) -> JsonReco
     return found
 
 
-def side_by_side(records: Sequence[JsonRecord]) -> Sequence[JsonRecord]:
-    """Records in which each IMU of a list has fields of its own name."""
+def join_devices(records: Sequence[JsonRecord]) -> Sequence[JsonRecord]:
+    """Records in which the fields of a list of IMUs have the IMUs' names."""
     names = [name for name in records[0].samples if _devices(records, name)]
     return [_with_devices(one, names) for one in records] if names else records
 
 
 def _devices(records: Sequence[JsonRecord], name: str) -> bool:
-    """Whether a list holds one record of each of several devices, all the time."""
+    """Whether a list always contains one record of each of several devices."""
     said = [_names(one.samples.get(name, [])) for one in records]
     return 1 < len(said[0]) == len({*said[0]}) and said.count(said[0]) == len(said)
 
 
 def _names(inner: Sequence[Any]) -> list[str]:
-    """What tells the records of a list apart, if it is said; else nothing."""
+    """Names of the records of a list, if they are stated."""
     if not all(isinstance(one, Mapping) for one in inner):
         return []
     keys = [key for key in inner[0] if tells_devices(key)] if inner else []
@@ -128,7 +138,7 @@ def _with_devices(one: JsonRecord, names: Sequence[str]) -> JsonRecord:
         inner = one.samples[name]
         for device, fields in zip(_names(inner), inner, strict=True):
             bare = {k: v for k, v in fields.items() if not tells_devices(k)}
-            within = record(bare, f"{name}{device}")
+            within = read_record(bare, f"{name}{device}")
             found.numbers.update(within.numbers)
             found.samples.update(within.samples)
     return found

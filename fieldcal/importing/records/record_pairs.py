@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.times.alignment import nearest
-from fieldcal.importing.words.file_names import best_of
-from fieldcal.importing.words.heading_words import meaning, words_of
+from fieldcal.importing.times.alignment import nearest_in_time
+from fieldcal.importing.words.file_names import best_name
+from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
 
 AXES = ("x", "y", "z")
 
@@ -33,9 +33,9 @@ class MatchedRecords(NamedTuple):
     gyr: str
 
 
-def paired(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
-    """Both sensors of one IMU, (n,) each; None where records are of no such kinds."""
-    acc, gyr = (best_of(sensor, kinds) for sensor in ("acc", "gyr"))
+def pair_records(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
+    """Pair the records of both sensors of one IMU; None if there are no such kinds."""
+    acc, gyr = (best_name(sensor, kinds) for sensor in ("acc", "gyr"))
     if acc is None or gyr is None:
         return None
     force, rate = kinds[acc], kinds[gyr]
@@ -48,7 +48,7 @@ def paired(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
     known = known[np.argsort(late[known], kind="stable")]
     if len(t) < len(AXES) or not len(known):
         return None
-    partner, apart = nearest(t, late[known])
+    partner, apart = nearest_in_time(t, late[known])
     far = ~(apart <= np.nanmedian(np.abs(np.diff(t))) / 2)
     found = {name: force[name] for name in _times(force)}
     found |= {f"acc_{axis}": force[name] for axis, name in axes[0].items()}
@@ -59,7 +59,7 @@ def paired(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
 
 def _axes(fields: Fields) -> dict[str, str]:
     """Name of the field of each axis; empty if they are not three."""
-    ends = {name: (words_of(name) or [""])[-1] for name in fields}
+    ends = {name: (words_in_name(name) or [""])[-1] for name in fields}
     found = {axis: [n for n, end in ends.items() if end == axis] for axis in AXES}
     if any(len(names) != 1 for names in found.values()):
         return {}
@@ -67,5 +67,5 @@ def _axes(fields: Fields) -> dict[str, str]:
 
 
 def _times(fields: Fields) -> list[str]:
-    said = {name: meaning(name) for name in fields}
+    said = {name: heading_meaning(name) for name in fields}
     return [name for name, one in said.items() if one is not None and one.kind == "t"]

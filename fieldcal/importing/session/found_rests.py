@@ -29,8 +29,8 @@ NAMED = 3
 """Bumps whose instants are said; session.toml has all of them."""
 
 
-class FoundRests(NamedTuple):
-    """Where the device rested.
+class RestSearch(NamedTuple):
+    """Rests that were found in a recording.
 
     Attributes
     ----------
@@ -88,17 +88,17 @@ class FoundRests(NamedTuple):
         )
 
 
-def rests_of(
+def find_rests(
     jumps: JumpFinder,
     rows: SpooledRows,
     rest: CellTable,
     between: SamplesBetween,
     still: float,
-) -> FoundRests:
+) -> RestSearch:
     """Where the device rested for so long, s; `rest` are the cells not in rows yet."""
     rows.add(cell_rows(rest))
     if still == np.inf:  # of means
-        return FoundRests([], [], np.empty((0, 3)), "", "")
+        return RestSearch([], [], np.empty((0, 3)), "", "")
     if held := jumps.positions:
         how = f"{ONLY_RESTS}: it jumps {len(held) - 1} times"
         found = [RestPeriod(*span) for span in held]
@@ -107,7 +107,7 @@ def rests_of(
         found = join_rests(rows, rest.origin, between, spans)
     why = "" if found else explain_no_stretch(rows, rest.origin)
     forces = [_mean_of(chain(*(between(*p) for p in one.pieces))) for one in found]
-    return FoundRests(
+    return RestSearch(
         found,
         [stretch_end_reasons(rows, rest.origin, one.pieces) for one in found],
         np.array(forces).reshape(-1, 3),
@@ -117,7 +117,7 @@ def rests_of(
 
 
 def _mean_of(blocks: Iterable[Block]) -> Array:
-    """Mean of the accelerometers over some blocks, (3,) m/s^2; nan of those without."""
+    """Mean of the accelerometers over some blocks, (3,) m/s^2; nan without values."""
     total, many = np.zeros(3), np.zeros(3)
     for block in blocks:
         total += np.nansum(block.acc, axis=0)

@@ -16,9 +16,13 @@ from fieldcal.core.errors import InputError, SessionError, disk_says
 from fieldcal.core.samples import Array, Block, too_quick
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
-from fieldcal.importing.session.found_rests import rests_of
+from fieldcal.importing.session.found_rests import find_rests
 from fieldcal.importing.session.stream_facts import StreamFacts
-from fieldcal.importing.session.validation import RowValidator, SampleWriter, digest
+from fieldcal.importing.session.validation import (
+    RowValidator,
+    SampleWriter,
+    file_record,
+)
 from fieldcal.session.clock import ClockStep, SteadyClock
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
@@ -83,12 +87,12 @@ def import_stream(
         part = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
         held = SessionLock(part)
         try:
-            made = _fill(part, recording, stream, about, still)
+            made = _write_session(part, recording, stream, about, still)
             held.release()
             part.chmod(0o755)
-            _settle(*part.iterdir(), part)
+            _flush_to_disk(*part.iterdir(), part)
             part.replace(folder)
-            _settle(folder.parent)
+            _flush_to_disk(folder.parent)
         except BaseException:
             held.release()
             shutil.rmtree(part, ignore_errors=True)
@@ -101,7 +105,7 @@ def import_stream(
 
 
 def remove_broken_off(folder: Path) -> list[str]:
-    """Remove what imports into this folder left that were killed, a sentence each.
+    """Remove files of killed imports into this folder; return a sentence about each.
 
     An import that still runs holds a lock of its own.
     """
@@ -116,8 +120,8 @@ def remove_broken_off(folder: Path) -> list[str]:
     return said
 
 
-def _settle(*paths: Path) -> None:
-    """See files and folders onto the disk: a power cut must leave no empty ones."""
+def _flush_to_disk(*paths: Path) -> None:
+    """Flush files and folders to disk, so that a power cut leaves no empty ones."""
     for path in paths if os.name == "posix" else ():
         there = os.open(path, os.O_RDONLY)
         try:
@@ -126,7 +130,7 @@ def _settle(*paths: Path) -> None:
             os.close(there)
 
 
-def _fill(
+def _write_session(
     part: Path,
     recording: Recording,
     stream: str,
@@ -143,7 +147,7 @@ def _fill(
         JumpFinder(),
     )
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
-        for block in _steadied(clock, recording.blocks(stream)):
+        for block in _without_clock_steps(clock, recording.blocks(stream)):
             good = judge.good(block)
             if len(good):
                 facts.add(good)
@@ -155,7 +159,7 @@ def _fill(
         _refuse_useless(recording, facts)
         facts.left_out = judge.left_out
         written.close()
-        found = rests_of(jumps, rows, cells.table, written.between, still)
+        found = find_rests(jumps, rows, cells.table, written.between, still)
     # an empty list would be in the way of the tables that the user adds
     given = not found.rests or "position" in about
     tables = {} if given else {"position": found.positions}
@@ -185,8 +189,10 @@ def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
         raise InputError(f"{recording.path}: {said}")
 
 
-def _steadied(clock: SteadyClock, blocks: Iterable[Block]) -> Iterator[Block]:
-    """Blocks without the steps of the device's clock."""
+def _without_clock_steps(
+    clock: SteadyClock, blocks: Iterable[Block]
+) -> Iterator[Block]:
+    """Blocks with the steps of the device's clock removed."""
     for block in blocks:
         yield clock.add(block)
     yield clock.rest()
@@ -199,11 +205,11 @@ def _marks(
     repairs: list[str],
     steps: list[ClockStep],
 ) -> str:
-    """What is kept of where the samples come from."""
+    """Marks that record the origin of the samples."""
     now = round(time(), 3)
     imported = {
         "event": "imported",
-        "files": [digest(path) for path in recording.files()],
+        "files": [file_record(path) for path in recording.files()],
         "format": type(recording.parts[0]).__module__.rpartition(".")[2],
         "stream": stream,
         **facts.table(),

@@ -163,7 +163,7 @@ class MergedFiles(SeveralFiles):
         """Accelerometers and gyroscopes of different times; None of others."""
         if len(self.parts) != 2:
             return None
-        heads = [_by_the_clock(p).first_rows(_name(p), PEEKED) for p in self.parts]
+        heads = [_with_clock_times(p).first_rows(_name(p), PEEKED) for p in self.parts]
         n = min(map(len, heads))
         if np.array_equal(heads[0].t[:n], heads[1].t[:n], equal_nan=True):
             return None
@@ -177,7 +177,7 @@ class MergedFiles(SeveralFiles):
 
     def _aligned(self, acc: Recording, gyr: Recording) -> Iterator[Block]:
         pair, begin = AlignedPair(), np.nan
-        flows = [_by_the_clock(p).blocks(_name(p)) for p in (acc, gyr)]
+        flows = [_with_clock_times(p).blocks(_name(p)) for p in (acc, gyr)]
         together = False
         for block in pair.through(*flows):
             begin = float(block.t[0]) if np.isnan(begin) and len(block) else begin
@@ -244,8 +244,8 @@ def _name(part: Recording) -> str:
     return part.streams()[0].name
 
 
-def _by_the_clock(part: Recording) -> Recording:
-    """A file whose times count from its clock's zero, not from its own first row."""
+def _with_clock_times(part: Recording) -> Recording:
+    """A file with times from the zero of its clock instead of its first row."""
     one = part.alone(_name(part))
     one.from_first = False
     return one

@@ -17,7 +17,7 @@ PAUSE = 1.0
 
 
 def mean_period(t: Array) -> float:
-    """Mean interval between times (n,), pauses left out, s; nan of one.
+    """Mean interval between times (n,) without pauses, s; nan for a single time.
 
     What a pause is depends on the period, so the longest are left out until none is.
 
@@ -35,7 +35,7 @@ def mean_period(t: Array) -> float:
 
 @dataclass(slots=True)
 class StreamFacts:
-    """What was found in a stream.
+    """Statistics of a stream.
 
     Attributes
     ----------

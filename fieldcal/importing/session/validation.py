@@ -159,7 +159,7 @@ class RowValidator:
 
 
 def _all_zero(block: Block) -> Rows:
-    """Rows of zeros alone; a missing rate is no number that would speak for one."""
+    """Whether rows consist of zeros only; missing rates are ignored."""
     empty: Rows = block.acc[:, 0] == 0
     some = np.flatnonzero(empty)
     zeros = (block.acc[some] == 0).all(axis=1)
@@ -170,7 +170,7 @@ def _all_zero(block: Block) -> Rows:
 
 
 def _without_numbers(block: Block) -> Rows:
-    """Rows that have no value of any sensor."""
+    """Whether rows have no value of any sensor."""
     none: Rows = np.isnan(block.acc[:, 0])
     if none.any():
         none &= np.isnan(block.six).all(axis=1) & np.isnan(block.temperature)
@@ -259,7 +259,7 @@ class SampleWriter:
             self._file.close()
 
 
-def digest(path: Path) -> dict[str, Any]:
+def file_record(path: Path) -> dict[str, Any]:
     """Name, size and SHA-256 of a file."""
     import hashlib
 

@@ -18,12 +18,12 @@ from fieldcal.importing import columns
 from fieldcal.importing.headings.heading import Heading
 from fieldcal.importing.recording import CLOCK_NUMBER, ReadOptions
 from fieldcal.importing.tables.column_times import (
-    batches,
-    counted_question,
-    counts_rows,
+    ask_rate_of_counter,
+    ask_rate_of_shared_times,
+    batch_options,
     is_clock_number,
+    is_row_counter,
     rate_hint,
-    shared_question,
     split_seconds,
 )
 from fieldcal.importing.times.row_times import FRACTIONS
@@ -33,11 +33,11 @@ from fieldcal.importing.units.time_units import (
     TICKED,
     counts_from_long_ago,
     shared_times,
-    unit_by_rate,
-    unit_nearest,
-    unit_of_ticks,
+    time_unit_near_rate,
+    time_unit_of_rate,
+    time_unit_of_ticks,
 )
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 
 TICK = "fine"
 """Part of the name of times that count ticks: ``SampleTimeFine``."""
@@ -48,7 +48,7 @@ BOSCH = ("sensortime", "39.0625us")
 
 
 class ColumnSource(Protocol):
-    """A file of columns, as far as it tells its times.
+    """Members of a file of columns that `ColumnClock` uses.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class ColumnSource(Protocol):
 
 
 class ColumnClock:
-    """Finds what the times of one IMU are.
+    """Finds the times of one IMU.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class ColumnClock:
 
     def _clocked(self, wanted: ReadOptions) -> ReadOptions:
         """Options with both columns of a clock that has its seconds in one of them."""
-        table, at = self._of.beginning(), numbers_of(self._of, wanted)
+        table, at = self._of.beginning(), column_numbers(self._of, wanted)
         own = [at[name] for name in ("t", "dt") if name in at]
         wholes = own or [i for i in range(table.shape[1]) if i not in at.values()]
         split = split_seconds(table, wholes)
@@ -126,7 +126,7 @@ class ColumnClock:
             return wanted
         said = self._of.rate_said()
         if said is None:
-            at = numbers_of(self._of, wanted)
+            at = column_numbers(self._of, wanted)
             three = [at[c] for c in ("ax", "ay", "az") if c in at]
             table = (
                 self._of.beginning() if len(three) == len("xyz") else np.empty((0, 0))
@@ -148,17 +148,17 @@ class ColumnClock:
             If its times are too coarse to say when a row was taken.
 
         """
-        table, at = self._of.beginning(), numbers_of(self._of, wanted).get("t", -1)
+        table, at = self._of.beginning(), column_numbers(self._of, wanted).get("t", -1)
         if not 0 <= at < table.shape[1]:
             return wanted
         t = table[:, at]
-        both = any(name in numbers_of(self._of, wanted) for name in FRACTIONS)
+        both = any(name in column_numbers(self._of, wanted) for name in FRACTIONS)
         if not both and (shared := shared_times(t)) is not None:
-            spread = batches(wanted, shared, t)
+            spread = batch_options(wanted, shared, t)
             if spread is not None:
                 return self._said(spread)
             if shared.equal:
-                asks = shared_question(wanted, shared, t)
+                asks = ask_rate_of_shared_times(wanted, shared, t)
                 raise InputError(f"{self._of.path}: {asks}")
         if wanted.time_unit:
             return wanted
@@ -171,16 +171,16 @@ class ColumnClock:
             self._of.guessed["time"] = f"{TICKED}, as Windows and .NET count them"
             return replace(wanted, time_unit=TICKED)
         said = self._of.rate_said()
-        if self._own and said is None and counts_rows(t):
-            raise InputError(f"{self._of.path}: {counted_question(wanted, table)}")
+        if self._own and said is None and is_row_counter(t):
+            raise InputError(f"{self._of.path}: {ask_rate_of_counter(wanted, table)}")
         if wanted.rate_hz:
             return self._beside_rate(wanted, wanted.rate_hz, t)
         names = [c.name for way in self._of.heading() for c in way.columns[at : at + 1]]
         unit, why = "", "its name says ticks"
         if said is not None:
-            unit, why = unit_by_rate(t, said[0]), f"it says the rate: {said[1]!r}"
+            unit, why = time_unit_of_rate(t, said[0]), f"it says the rate: {said[1]!r}"
         elif any(TICK in name.lower() for name in names):
-            unit = unit_of_ticks(t)
+            unit = time_unit_of_ticks(t)
         elif any(BOSCH[0] in name.lower() for name in names):
             unit, why = BOSCH[1], "its name is that of Bosch's counter"
         if unit in ("", "s"):
@@ -190,7 +190,7 @@ class ColumnClock:
 
     def _beside_rate(self, wanted: ReadOptions, rate: float, t: Array) -> ReadOptions:
         """Options with the unit of times (n,) that a rate beside them tells."""
-        unit, makes = unit_nearest(t, rate)
+        unit, makes = time_unit_near_rate(t, rate)
         if not unit:
             raise InputError(
                 f"{self._of.path}: its times make {rate:g} Hz in no unit: leave --rate"
@@ -217,7 +217,7 @@ class ColumnClock:
 
     def _signed(self, wanted: ReadOptions) -> ReadOptions:
         """Options with the kinds of channel whose sign was not read."""
-        table, at = self._of.beginning(), numbers_of(self._of, wanted)
+        table, at = self._of.beginning(), column_numbers(self._of, wanted)
         threes = {k: [at[k + x] for x in "xyz" if k + x in at] for k in "ag"}
         found = {kind for kind, three in threes.items()
                  if three and max(three) < table.shape[1]
@@ -227,7 +227,7 @@ class ColumnClock:
         return replace(wanted, unsigned=frozenset(found))
 
 
-def numbers_of(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
+def column_numbers(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
     """Number of each channel's column among those of `beginning`."""
     names = [c.partition("=") for c in wanted.columns]
     if not any(place for _, _, place in names):
@@ -250,8 +250,9 @@ def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
     table = source.beginning()
     names = [c.name for way in source.heading() for c in way.columns][: table.shape[1]]
     said = {name: i for i, name in enumerate(names)
-            if (one := meaning(name)) is not None and one.kind == "t"}  # fmt: skip
-    rows = next((name for name, i in said.items() if counts_rows(table[:, i])), "")
+            if (one := heading_meaning(name)) is not None
+            and one.kind == "t"}  # fmt: skip
+    rows = next((name for name, i in said.items() if is_row_counter(table[:, i])), "")
     why = f"its {rows} only counts rows" if rows else "no column is t, the time"
     hint = rate_hint(wanted, table)
     raise InputError(f"{source.path}: {why}: give the rate, e.g. --rate {hint}")

@@ -19,13 +19,19 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.importing.units.gravity_size import (
     FEWEST_MEANS,
-    Gravity,
+    GravityReading,
     are_means,
-    gravity_in,
+    estimate_gravity,
 )
-from fieldcal.importing.units.rate_size import rate_in
-from fieldcal.importing.units.scales import ACC_OUT, ACC_SCALES, FEWEST, fitting, gains
-from fieldcal.importing.units.time_units import step_of
+from fieldcal.importing.units.rate_size import estimate_rate_unit
+from fieldcal.importing.units.scales import (
+    ACC_OUT,
+    ACC_SCALES,
+    FEWEST,
+    fitting_scales,
+    gain_scales,
+)
+from fieldcal.importing.units.time_units import usual_step
 from fieldcal.importing.words.heading_words import is_counter
 
 GROWS = 0.999
@@ -45,8 +51,8 @@ LEAST_COUNTS = 1000.0
 Three = tuple[int, int, int]
 
 
-class Told(NamedTuple):
-    """What numbers tell of columns.
+class IdentifiedColumns(NamedTuple):
+    """Channels that were identified from the numbers of columns.
 
     Attributes
     ----------
@@ -59,8 +65,10 @@ class Told(NamedTuple):
     why: str
 
 
-def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told | None:
-    """Say which columns are time, specific force and rate; None where none is found.
+def identify_columns(
+    table: Array, names: Sequence[str], known: Mapping[int, str]
+) -> IdentifiedColumns | None:
+    """Identify time, specific force and rate among columns; None if none is found.
 
     Parameters
     ----------
@@ -85,8 +93,10 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     free = [i for i in range(table.shape[1]) if i not in {*known, *times}]
     acc = _named(known, "a")
     gyr = _named(known, "g")
-    threes = _threes([i for i in free if _moves(table[:, i])], names)
-    found = _pair(table, clock, [acc] if acc else threes, [gyr] if gyr else threes)
+    threes = _axis_triples([i for i in free if _moves(table[:, i])], names)
+    found = _force_and_rate_triples(
+        table, clock, [acc] if acc else threes, [gyr] if gyr else threes
+    )
     if found is None:
         return None
     (acc, gyr), why = found
@@ -96,20 +106,22 @@ def tell(table: Array, names: Sequence[str], known: Mapping[int, str]) -> Told |
     new = {name for i, name in channels.items() if known.get(i) != name}
     if not new:
         return None
-    return Told(
+    return IdentifiedColumns(
         channels, "the time is the first that only grows" if new == {"t"} else why
     )
 
 
-def directions(table: Array) -> list[Three]:
-    """Columns side by side that are a direction: calculated, such as of gravity."""
+def direction_columns(table: Array) -> list[Three]:
+    """Adjacent columns that are a calculated direction, such as that of gravity."""
     free = [i for i in range(table.shape[1]) if _moves(table[:, i])]
     beside = [(a, a + 1, a + 2) for a in free if {a + 1, a + 2} <= set(free)]
     return [three for three in beside if is_direction(table[:, list(three)])]
 
 
-def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[Three]:
-    """Columns that move and may be three axes, beside those that are known.
+def unnamed_axes(
+    table: Array, names: Sequence[str], known: Collection[int]
+) -> list[Three]:
+    """Columns without known meaning that vary and may be three axes.
 
     An axis may rest within one step of its output, if its name says that it is one.
     """
@@ -119,7 +131,7 @@ def unnamed(table: Array, names: Sequence[str], known: Collection[int]) -> list[
     free = [i for i in range(table.shape[1]) if i not in without]
     moving = [i for i in free if _moves(table[:, i])]
     named = [three for three in _by_name(free, names) if {*three} & {*moving}]
-    return _threes(moving, names) or named
+    return _axis_triples(moving, names) or named
 
 
 def _growing(table: Array) -> list[int]:
@@ -152,8 +164,8 @@ def _named(known: Mapping[int, str], kind: str) -> Three | None:
     return x, y, z
 
 
-def _threes(free: Sequence[int], names: Sequence[str]) -> list[Three]:
-    """Columns that may be three axes: by what their names share, or side by side."""
+def _axis_triples(free: Sequence[int], names: Sequence[str]) -> list[Three]:
+    """Columns that may be three axes, by their names or their order."""
     whole = _by_name(free, names)
     if whole and len({names[i] for i in free}) == len(free):
         return whole
@@ -164,7 +176,7 @@ def _threes(free: Sequence[int], names: Sequence[str]) -> list[Three]:
 
 
 def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
-    """Columns that are three axes by what their names share."""
+    """Columns that are three axes, by the words that their names share."""
     stems: dict[str, dict[str, int]] = {}
     for i in free:
         if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
@@ -173,13 +185,13 @@ def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
     return [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
 
 
-def _pair(
+def _force_and_rate_triples(
     table: Array, clock: Array, forces: Sequence[Three], rates: Sequence[Three]
 ) -> tuple[tuple[Three, Three | None], str] | None:
     """Specific force and rate among sets of axes, and why."""
     sizes = {three: _gravity(table, three) for three in forces}
     usual = [three for three in forces if sizes[three] is not None]
-    if not usual and (step := step_of(clock)):
+    if not usual and (step := usual_step(clock)):
         # no force, but what velocity and angle gained since the row before
         sizes = {three: _gravity(table, three, step) for three in forces}
         usual = [three for three in forces if sizes[three] is not None]
@@ -192,20 +204,23 @@ def _pair(
             if set(force) & set(rate) or gravity is None:
                 continue
             acc, gyr = table[:, list(force)], table[:, list(rate)]
-            if rate_in(_even(clock), acc, gyr, gravity) is not None:
+            if (
+                estimate_rate_unit(_scaled_to_10_ms_steps(clock), acc, gyr, gravity)
+                is not None
+            ):
                 turning.append((force, rate))
     if len(turning) == 1:
         return turning[0], "gravity turns in the first three as the other three say"
     if turning:
         return None
-    if step_of(clock) and not any(_gravity(table, three) for three in usual):
+    if usual_step(clock) and not any(_gravity(table, three) for three in usual):
         others = {*forces, *rates} - {*usual}
         why = "the length of the first three at rest is what gravity gains in a step"
         # the other one of two is what angle gained
         alone = len(usual) == len(others) == 1
         return ((usual[0], others.pop()), why) if alone else None
     # of counts, any length is one: without a turn they are asked about
-    usual = [three for three in usual if _plain(sizes[three])]
+    usual = [three for three in usual if _is_usual_gravity(sizes[three])]
     if len(usual) == 1:
         pairs = [p for p in permutations({*forces, *rates}, 2) if p[0] == usual[0]]
         apart = [rate for _, rate in pairs if not set(rate) & set(usual[0])]
@@ -216,7 +231,7 @@ def _pair(
 
 
 def _scattered(values: Array, size: float) -> bool:
-    """Whether values (n, 3) differ from row to row by much of a length: noise alone."""
+    """Whether values (n, 3) are noise: their changes from row to row are large."""
     if are_means(values):
         return False
     differ = np.abs(np.diff(values, axis=0))
@@ -224,7 +239,7 @@ def _scattered(values: Array, size: float) -> bool:
 
 
 def is_direction(values: Array) -> bool:
-    """Whether rows (n, 3) are as long as each other: calculated, not measured."""
+    """Whether rows (n, 3) have the same length: calculated, not measured."""
     if are_means(values):
         return False
     whole = values[np.isfinite(values).all(axis=1)]
@@ -233,27 +248,27 @@ def is_direction(values: Array) -> bool:
     return bool(moves and np.ptp(length) < EXACT * np.median(length))
 
 
-def _is_round(gravity: Gravity | None) -> bool:
+def _is_round(gravity: GravityReading | None) -> bool:
     return gravity is not None and gravity.round
 
 
-def _plain(gravity: Gravity | None) -> bool:
+def _is_usual_gravity(gravity: GravityReading | None) -> bool:
     """Whether a length is gravity in a unit, or in counts of an 16-bit sensor."""
     within = ACC_OUT[0]
-    fits = fitting(gravity.size, ACC_SCALES, within) if gravity else []
+    fits = fitting_scales(gravity.size, ACC_SCALES, within) if gravity else []
     return any(fit.lsb == 1 or fit.lsb >= LEAST_COUNTS for fit in fits)
 
 
-def _even(clock: Array) -> Array:
-    """A clock in steps of about 10 ms, whatever its unit."""
+def _scaled_to_10_ms_steps(clock: Array) -> Array:
+    """A clock (n,) scaled to a median step of 10 ms, whatever its unit."""
     steps = np.diff(clock[np.isfinite(clock)])
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     scaled: Array = clock * (0.01 / step)
     return scaled
 
 
-def _gravity(table: Array, three: Three, step: float = 0.0) -> Gravity | None:
-    """What three columns read at rest, if it is gravity in a usual unit.
+def _gravity(table: Array, three: Three, step: float = 0.0) -> GravityReading | None:
+    """Length of three columns at rest, if it is gravity in a usual unit.
 
     Parameters
     ----------
@@ -262,9 +277,9 @@ def _gravity(table: Array, three: Three, step: float = 0.0) -> Gravity | None:
 
     """
     values = table[:, list(three)]
-    found = gravity_in(values)
+    found = estimate_gravity(values)
     if found is None or _scattered(values, found.size) or is_direction(values):
         return None
     within = ACC_OUT[not found.round]
-    scales = gains(step, "m/s^2", G0) if step else ACC_SCALES
-    return found if fitting(found.size, scales, within) else None
+    scales = gain_scales(step, "m/s^2", G0) if step else ACC_SCALES
+    return found if fitting_scales(found.size, scales, within) else None

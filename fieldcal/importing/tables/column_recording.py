@@ -22,12 +22,12 @@ from fieldcal.importing.recording import (
     Recording,
 )
 from fieldcal.importing.tables import column_physics
-from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, numbers_of
-from fieldcal.importing.tables.heading_times import with_times
+from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.heading_times import with_checked_times
 from fieldcal.importing.tables.means import scatter_columns
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
 from fieldcal.importing.units.gravity_size import are_means
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_words import heading_meaning
 
 
 class ColumnRecording(Recording):
@@ -61,15 +61,15 @@ class ColumnRecording(Recording):
         found = self.imus()
         for wanted in found.values():
             ask_rate(self, wanted)
-            columns.check(wanted)
+            columns.check_columns(wanted)
         return [
-            ImuStream(name, f"columns in {columns.units(wanted)}")
+            ImuStream(name, f"columns in {columns.describe_units(wanted)}")
             for name, wanted in found.items()
         ]
 
     def notes(self, stream: str) -> dict[str, Any]:
         """Return the units."""
-        return columns.notes(self.wanted)
+        return columns.unit_notes(self.wanted)
 
     def alone(self, stream: str) -> Recording:
         """The recording with the columns of one IMU."""
@@ -106,7 +106,7 @@ class ColumnRecording(Recording):
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
         table, wanted = self.beginning(), self.wanted
-        at = numbers_of(self, wanted)
+        at = column_numbers(self, wanted)
         if not {"ax", "ay", "az"} <= set(at) or not len(table):
             return None
         if not are_means(table[:, [at["a" + axis] for axis in "xyz"]]):
@@ -124,17 +124,22 @@ class ColumnRecording(Recording):
         if self.wanted.columns:
             return {"0": self.wanted}
         table = self.beginning()
-        ways = [(headings.read(*with_times(way, table)), way) for way in self.heading()]
-        named = max((found for found, _ in ways), key=_worth, default=())
+        ways = [
+            (headings.match_headings(*with_checked_times(way, table)), way)
+            for way in self.heading()
+        ]
+        named = max((found for found, _ in ways), key=_match_quality, default=())
         way = next((w for found, w in ways if found and found is named), None)
-        if len(named) < 2 and not _whole(named):
+        if len(named) < 2 and not _is_complete(named):
             told = self._told(named, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
             self._say_unnamed(named, way)
         for way in self.heading() if not named else ():
             # the question of their size comes before that of their columns
-            named = named or headings.read(*with_times(way, table), weak=True)
+            named = named or headings.match_headings(
+                *with_checked_times(way, table), weak=True
+            )
         if not named:
             raise InputError(self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}
@@ -154,8 +159,8 @@ class ColumnRecording(Recording):
         known = _known(named, way)
         if way is not None and len(way.columns) == k and len(table):
             table = table.copy()
-            table[:, headings.no_axes(way.columns)] = np.nan
-        told = column_physics.tell(table, names, known)
+            table[:, headings.columns_without_axes(way.columns)] = np.nan
+        told = column_physics.identify_columns(table, names, known)
         if told is None:
             return None
         places = [c.place for c in way.columns] if way and not way.skip else [""] * k
@@ -181,9 +186,11 @@ class ColumnRecording(Recording):
         if not named or way is None:
             return
         known = _known(named, way)
-        others = {i for i, c in enumerate(way.columns) if meaning(c.name, c.unit)}
+        others = {
+            i for i, c in enumerate(way.columns) if heading_meaning(c.name, c.unit)
+        }
         names = [c.name for c in way.columns]
-        threes = column_physics.unnamed(self.beginning(), names, {*known, *others})
+        threes = column_physics.unnamed_axes(self.beginning(), names, {*known, *others})
         if not threes:
             return
         which = " ".join(names[i] or f"column {i + 1}" for i in threes[0])
@@ -192,16 +199,16 @@ class ColumnRecording(Recording):
             return
         axes = zip(threes[0], ("ax", "ay", "az"), strict=True)
         places = [c.place for c in way.columns]
-        with_them = ",".join(_as_option(known | dict(axes), places, way.skip))
+        with_them = ",".join(_columns_option(known | dict(axes), places, way.skip))
         raise InputError(
             f"{self.path}: the names of its columns say where the gyroscopes are, and"
             f" nothing tells whether {which} are the accelerometers: add --columns"
             f" {quote(with_them)} if they are, or --columns"
-            f" {quote(','.join(_as_option(known, places, way.skip)))}"
+            f" {quote(','.join(_columns_option(known, places, way.skip)))}"
         )
 
 
-def _as_option(
+def _columns_option(
     channels: Mapping[int, str], places: Sequence[str], skip: str
 ) -> list[str]:
     """Columns as ``--columns`` names them."""
@@ -210,14 +217,14 @@ def _as_option(
     return [f"{channels[i]}={places[i]}" for i in sorted(channels)]
 
 
-def _worth(found: Sequence[HeadingMatch]) -> tuple[int, int]:
-    """How many channels are named, and of how many kinds the unit is."""
+def _match_quality(found: Sequence[HeadingMatch]) -> tuple[int, int]:
+    """Number of channels that are named, and of kinds whose unit is known."""
     named = sum(len([c for c in one.columns if c != columns.SKIP]) for one in found)
     return named, sum(bool(unit) for one in found for unit in one.units.values())
 
 
-def _whole(named: Sequence[HeadingMatch]) -> bool:
-    """Whether names say where specific force, rate and time are."""
+def _is_complete(named: Sequence[HeadingMatch]) -> bool:
+    """Whether names identify specific force, rate and time."""
     if not named:
         return False
     known = {c.partition("=")[0] for c in named[0].columns}
@@ -225,7 +232,7 @@ def _whole(named: Sequence[HeadingMatch]) -> bool:
 
 
 def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:
-    """Channels that names say, by the number of the column."""
+    """Channels that names identify, by number of column."""
     if not named or way is None:
         return {}
     if way.skip:

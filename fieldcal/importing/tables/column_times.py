@@ -13,10 +13,14 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
 from fieldcal.importing.times.row_times import FRACTIONS, NEAR
-from fieldcal.importing.units.gravity_size import gravity_in
-from fieldcal.importing.units.rate_size import rate_in
-from fieldcal.importing.units.scales import FEWEST, USUAL_COUNTS, about
-from fieldcal.importing.units.time_units import SharedTimes, burst_units, time_units
+from fieldcal.importing.units.gravity_size import estimate_gravity
+from fieldcal.importing.units.rate_size import estimate_rate_unit
+from fieldcal.importing.units.scales import FEWEST, USUAL_COUNTS, rounded_text
+from fieldcal.importing.units.time_units import (
+    SharedTimes,
+    possible_time_units,
+    time_units_of_bursts,
+)
 
 SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
@@ -109,38 +113,40 @@ def is_clock_number(t: Array) -> bool:
                 and (ends[1] < NEAR * usual).all())  # fmt: skip
 
 
-def batches(wanted: ReadOptions, shared: SharedTimes, t: Array) -> ReadOptions | None:
-    """Options by which rows that share times (n,) are spread; None if nobody can tell.
+def batch_options(
+    wanted: ReadOptions, shared: SharedTimes, t: Array
+) -> ReadOptions | None:
+    """Options that spread rows with shared times (n,); None if ambiguous.
 
     A second is the coarsest clock, and beyond it rows are bursts with pauses between,
     also in a unit in which the rows of one have the rate of a log.
     """
     t = t[np.isfinite(t)]
-    own = [] if shared.equal else burst_units(t)
+    own = [] if shared.equal else time_units_of_bursts(t)
     if any(shared.step * TIME_UNITS[unit] > COARSEST for unit in own):
         return None
     each = np.linspace(t[0], t[-1], len(t))  # as if every row had its own
-    unit = wanted.time_unit or next(iter(time_units(each)), "s")
+    unit = wanted.time_unit or next(iter(possible_time_units(each)), "s")
     seconds = shared.step * TIME_UNITS[unit]
     if not shared.even or seconds > COARSEST or shared.rows < len("12"):
         return None
     return replace(wanted, time_unit=unit, batch=RowBatch(seconds, shared.rows))
 
 
-def shared_question(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
+def ask_rate_of_shared_times(wanted: ReadOptions, shared: SharedTimes, t: Array) -> str:
     """Ask for the rate where rows share times (n,), now more, now fewer."""
-    unit = wanted.time_unit or next(iter(time_units(t)), "s")
+    unit = wanted.time_unit or next(iter(possible_time_units(t)), "s")
     rate = shared.rows / (shared.step * TIME_UNITS[unit])
     named = [c for c in wanted.columns if not c.startswith("t=")]
     names = [SKIP if name == "t" else name for name in named]
     return (
         f"its times step by {shared.step:g} {unit}, with about {shared.rows:.0f} rows"
         " in each, so they do not say when a row was taken: add --columns"
-        f" {quote(','.join(names))} --rate {about(rate)}"
+        f" {quote(','.join(names))} --rate {rounded_text(rate)}"
     )
 
 
-def counted_question(wanted: ReadOptions, table: Array) -> str:
+def ask_rate_of_counter(wanted: ReadOptions, table: Array) -> str:
     """Ask for the rate where the times only count the rows."""
     names = [SKIP if name == "t" else name for name in wanted.columns
              if not name.startswith("t=")]  # fmt: skip
@@ -151,42 +157,44 @@ def counted_question(wanted: ReadOptions, table: Array) -> str:
 
 
 def rate_hint(wanted: ReadOptions, table: Array) -> str:
-    """A rate, and what the turns say of it: of counts, one for each full scale."""
-    turns = rates_of_turns(wanted, table)
+    """Rates that the turns imply, for messages: for counts, one for each full scale."""
+    turns = rates_by_turns(wanted, table)
     if not turns:
         return f"{USUAL:.3g}"
     (unit, rate), *others = turns.items()
-    hint = f"{about(rate)}, which its turns say about, if rates are in {unit}"
+    hint = f"{rounded_text(rate)}, which its turns say about, if rates are in {unit}"
     if unit.startswith("counts"):
-        hint += "".join(f", or {about(hz)} if {what.split()[1]}" for what, hz in others)
+        hint += "".join(
+            f", or {rounded_text(hz)} if {what.split()[1]}" for what, hz in others
+        )
     return hint
 
 
-def counts_rows(t: Array) -> bool:
-    """Whether times (n,) are the numbers of the rows."""
+def is_row_counter(t: Array) -> bool:
+    """Whether times (n,) are only row numbers."""
     steps = np.diff(t[np.isfinite(t)])
     return len(steps) > FEWEST and float((steps == 1).mean()) > LATER
 
 
-def goes_on(t: Array) -> bool:
-    """Whether times (n,) are numbers that grow, and seldom are set back."""
+def keeps_growing(t: Array) -> bool:
+    """Whether times (n,) increase, with few resets."""
     steps = np.diff(t[np.isfinite(t)])
     back = len(steps) < len(t) / 2 or float((steps < 0).mean()) > SET_BACK
     return not back and bool((steps > 0).any())
 
 
-def rates_of_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
-    """Rates, Hz, at which the turns are those that gravity shows, by unit."""
+def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
+    """Rates, Hz, at which turns by gyroscopes agree with those by gravity, by unit."""
     at = {c.partition("=")[0]: i for i, c in enumerate(wanted.columns)}
     if not {"ax", "ay", "az", "gx", "gy", "gz"} <= set(at) or (
         table.shape[1] != len(wanted.columns)
     ):
         return {}
     acc, gyr = (table[:, [at[kind + axis] for axis in "xyz"]] for kind in "ag")
-    gravity = gravity_in(acc)
+    gravity = estimate_gravity(acc)
     if gravity is None:
         return {}
-    reads = rate_in(np.arange(len(table)) / 100.0, acc, gyr, gravity)
+    reads = estimate_rate_unit(np.arange(len(table)) / 100.0, acc, gyr, gravity)
     counts = np.isfinite(gyr).all() and (gyr == np.round(gyr)).all()
     if reads is None:
         return {}

@@ -25,9 +25,9 @@ from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.recording import MeanScatter, Recording
 from fieldcal.importing.words.heading_words import (
     SCATTER,
-    axis_alone,
-    meaning,
-    words_of,
+    bare_axis,
+    heading_meaning,
+    words_in_name,
 )
 
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
@@ -50,8 +50,8 @@ ROUNDED = 1e-9
 """Part of a mean below which a scatter is no noise of a sensor."""
 
 
-class Spread(NamedTuple):
-    """How well means are known.
+class MeanUncertainty(NamedTuple):
+    """Standard uncertainty of means.
 
     Attributes
     ----------
@@ -70,21 +70,28 @@ def scatter_columns(columns: Sequence[Column]) -> Mapping[str, int]:
     A scatter that names no sensor, ``x_std``, is of the only one that there is.
     """
     found: dict[str, int] = {}
-    kinds = {said.kind for c in columns if (said := meaning(c.name, c.unit))} & {*"ag"}
+    kinds = {
+        said.kind for c in columns if (said := heading_meaning(c.name, c.unit))
+    } & {*"ag"}
     for i, column in enumerate(columns):
         if column.name.strip().lower() in COUNTS:
             found["n"] = i
-        elif (said := meaning(column.name, column.unit)) and said.kind in ("a", "g"):
+        elif (said := heading_meaning(column.name, column.unit)) and said.kind in (
+            "a",
+            "g",
+        ):
             if set(said.label) & set(SCATTER):
                 found[said.kind + said.axis] = i
-        elif (alone := axis_alone(words_of(column.name))) and len(kinds) == 1:
+        elif (alone := bare_axis(words_in_name(column.name))) and len(kinds) == 1:
             if set(alone[1]) & set(SCATTER):
                 found[min(kinds) + alone[0]] = i
     return found
 
 
-def spread(means: Array, scatter: Array, count: Array | None, gravity: float) -> Spread:
-    """Say how well means are known.
+def estimate_mean_uncertainty(
+    means: Array, scatter: Array, count: Array | None, gravity: float
+) -> MeanUncertainty:
+    """Estimate the standard uncertainty of means.
 
     Parameters
     ----------
@@ -98,9 +105,9 @@ def spread(means: Array, scatter: Array, count: Array | None, gravity: float) ->
     scatter = np.where(scatter > ROUNDED * np.abs(means), scatter, np.nan)
     told = np.isfinite(scatter)
     if count is not None and told.any():
-        return Spread(scatter / np.sqrt(np.maximum(count, 1.0))[:, None], "")
+        return MeanUncertainty(scatter / np.sqrt(np.maximum(count, 1.0))[:, None], "")
     shown = np.concatenate(
-        [[_off_the_sphere(means[:, :3], gravity)] * 3, _from_row_to_row(means[:, 3:])]
+        [[_sphere_residual(means[:, :3], gravity)] * 3, _from_row_to_row(means[:, 3:])]
     )
     sigma = np.broadcast_to(shown, means.shape)
     why = "what remains of |a| = g and of steady rates"
@@ -109,11 +116,13 @@ def spread(means: Array, scatter: Array, count: Array | None, gravity: float) ->
         why = "their scatter at most, and " + why
     sigma = np.where(np.isfinite(means), sigma, np.nan)
     size = np.median(sigma[:, 0])
-    return Spread(sigma, f"{size:.2g} m/s^2: {why}" if np.isfinite(size) else "")
+    return MeanUncertainty(
+        sigma, f"{size:.2g} m/s^2: {why}" if np.isfinite(size) else ""
+    )
 
 
-def _given(said: str, means: Array) -> Array:
-    """What the user says of how well means (n, 6) are known."""
+def _stated_uncertainty(said: str, means: Array) -> Array:
+    """Standard uncertainty of means (n, 6) that the user states."""
     try:
         two = [float(one) for one in said.split(",")]
     except ValueError:
@@ -135,13 +144,13 @@ def _from_row_to_row(gyr: Array) -> Array:
     return np.where(shown > 0, shown, np.nan)
 
 
-def _off_the_sphere(acc: Array, gravity: float) -> float:
-    """What remains of (1), m/s^2; nan where too few rows tell."""
+def _sphere_residual(acc: Array, gravity: float) -> float:
+    """Residual of (1), m/s^2; nan if there are too few rows."""
     acc = acc[np.isfinite(acc).all(axis=1)]
     for free in (COUPLED, PLAIN):
         if len(acc) < free + SPARE:
             continue
-        return _fit(acc[_agreeing(acc, free, gravity)], free, gravity)[1]
+        return _fit(acc[_consistent_rows(acc, free, gravity)], free, gravity)[1]
     return float("nan")
 
 
@@ -153,8 +162,8 @@ def _fit(acc: Array, free: int, gravity: float) -> tuple[Array, float]:
     return found.x, float(np.sqrt(2 * found.cost / (len(acc) - free)))
 
 
-def _agreeing(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
-    """Rows but those that no scatter of the others brings: one that was moved.
+def _consistent_rows(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
+    """Rows without outliers, such as a position in which the device was moved.
 
     Rows bear witness against one only where more of them are to spare than the
     parameters use up.
@@ -211,9 +220,11 @@ def tables_of_means(
     """
     block = concat(recording.alone(stream).blocks(stream))
     scale = np.repeat([recording.wanted.acc_scale, recording.wanted.gyr_scale], 3)
-    found = spread(block.six, scatter.values * scale, scatter.many, gravity)
+    found = estimate_mean_uncertainty(
+        block.six, scatter.values * scale, scatter.many, gravity
+    )
     if said:
-        found = Spread(_given(said, block.six), "")
+        found = MeanUncertainty(_stated_uncertainty(said, block.six), "")
     if not np.isfinite(found.sigma[:, :3]).all():
         raise InputError(
             f"{recording.path}: nothing says how well its {len(block)} means are known:"

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import Self
 
-from fieldcal.importing.text.text_form import Reader, TextForm, most
-from fieldcal.importing.text.text_top import cells, is_number, separator_of
+from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 
 AXES = ("x", "y", "z")
 
@@ -28,9 +28,9 @@ class BarTable(TextForm):
         """The form, if most lines have it."""
 
         def is_so(line: str) -> bool:
-            return line.count("|") > 1 and separator_of(line) in (None, ",")
+            return line.count("|") > 1 and find_separator(line) in (None, ",")
 
-        return None if separator or not most(lines, is_so) else cls()
+        return None if separator or not is_true_of_most(lines, is_so) else cls()
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -51,15 +51,17 @@ class ListCells(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines have such cells and each as many numbers."""
-        if not lines or not most(lines, lambda line: bool(_LIST.search(line))):
+        if not lines or not is_true_of_most(
+            lines, lambda line: bool(_LIST.search(line))
+        ):
             return None
         bare = _LIST.sub("0", lines[-1])
-        parted = separator or separator_of(bare) or ("\t" if " " not in bare else " ")
+        parted = separator or find_separator(bare) or ("\t" if " " not in bare else " ")
         if parted == " " and not all(is_number(cell, False) for cell in bare.split()):
             return None
         many = [len(re.split(r"[\s,;]+", said)) if (said := _list_in(cell)) else 1
                 for cell in _cells(lines[-1], parted)]  # fmt: skip
-        above = [cells(line, parted) for line in lines if not _LIST.search(line)]
+        above = [split_cells(line, parted) for line in lines if not _LIST.search(line)]
         fits = [row for row in above if len(row) == len(many)]
         return cls(parted, _names(fits[-1], many) if fits else ())
 
@@ -113,8 +115,8 @@ class HexCells(TextForm):
         """The form, if some columns hold such digits in most lines, as many in each."""
         if not lines:
             return None
-        parted = separator or separator_of(lines[-1])
-        rows = [cells(line, parted) for line in lines]
+        parted = separator or find_separator(lines[-1])
+        rows = [split_cells(line, parted) for line in lines]
         width = len(rows[-1])
         rows = [row for row in rows if len(row) == width]
         columns = [i for i in range(width) if _are_digits([row[i] for row in rows])]

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import Reader, TextForm
-from fieldcal.importing.text.text_top import cells, is_number
+from fieldcal.importing.text.text_top import is_number, split_cells
 
 BEGINS = 20
 """Lines before the first definition: numbers of the log, or nothing."""
@@ -56,7 +56,7 @@ class DataflashText(TextForm):
         if not any(line.startswith("FMT,") for line in lines[:BEGINS]):
             return None
         said = [found for line in lines if (found := _DEFINED.match(line))]
-        defined = {one[1]: [one[1], *cells(one[2], ",")] for one in said}
+        defined = {one[1]: [one[1], *split_cells(one[2], ",")] for one in said}
         whole = {*defined} >= {"IMU"} or {*defined} >= {"ACC", "GYR"}
         timed = all({*TIMES} & {*fields} for fields in defined.values())
         return cls(defined) if whole and timed else None
@@ -72,7 +72,7 @@ class DataflashText(TextForm):
             found = []
             for line in lines:
                 fields = self._defined.get(line.partition(",")[0].strip(), ())
-                row = cells(line, ",")
+                row = split_cells(line, ",")
                 if not fields or len(row) != len(fields):
                     continue
                 said = dict(zip(fields, row, strict=True))

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from fieldcal.importing.text.text_top import cells, is_number, separator_of
+from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 
 NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "addr",
          "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
@@ -31,8 +31,8 @@ TURNS = 0.05
 """Least share of rows that are of another than the row before."""
 
 
-class Instances(NamedTuple):
-    """Which column tells the IMUs apart, and their names.
+class ImuInstances(NamedTuple):
+    """Column that distinguishes several IMUs, and their names.
 
     Attributes
     ----------
@@ -56,12 +56,12 @@ class Instances(NamedTuple):
         return cell if cell in self.names else None
 
 
-def instances_in(lines: Sequence[str], separator: str | None) -> Instances | None:
-    """The column that tells several IMUs apart; None if there is one IMU."""
+def find_instances(lines: Sequence[str], separator: str | None) -> ImuInstances | None:
+    """Find the column that distinguishes several IMUs; None for a single IMU."""
     if not lines:
         return None
-    parted = separator or separator_of(lines[-1])
-    rows = [cells(line, parted) for line in lines]
+    parted = separator or find_separator(lines[-1])
+    rows = [split_cells(line, parted) for line in lines]
     width = len(rows[-1])
     whole = [row for row in rows if len(row) == width]
     numbers: list[list[str]] = []
@@ -74,12 +74,12 @@ def instances_in(lines: Sequence[str], separator: str | None) -> Instances | Non
         named = any(tells_devices(row[i]) for row in above)
         words = not any(is_number(cell, False) for cell in column)
         if (named or words) and _in_turn(column):
-            return Instances(i, parted, tuple(dict.fromkeys(column)))
+            return ImuInstances(i, parted, tuple(dict.fromkeys(column)))
     return None
 
 
 def tells_devices(name: str) -> bool:
-    """Whether a name is that of a column or field that tells devices apart."""
+    """Whether a name is that of a column or field that identifies devices."""
     bare = re.sub(r"[\s_.-]+", "", name.lower().lstrip("#%/ "))
     return bare in NAMES or (bare.endswith("id") and bare[:-2] in NAMES)
 

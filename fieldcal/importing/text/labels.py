@@ -19,8 +19,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from fieldcal.importing.words.heading_units import unit_in
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.words.heading_units import parse_unit
+from fieldcal.importing.words.heading_words import heading_meaning
 
 TIME = "utc time [s]"
 """Name of the time that a monitor writes before a line."""
@@ -114,21 +114,21 @@ def labelled_values(line: str) -> list[Labelled]:
     rest = rest[ticks.end() :] if ticks else rest
     rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
     read: list[tuple[str, str, str]] = []
-    for label, text in _parted(rest):
+    for label, text in _split_labels(rest):
         said = _VALUES.fullmatch(text)
         values = re.findall(_NUMBER, said[1]) if said else []
         if said is None or len(values) not in (1, len(AXES)):
             return []
-        label, moved = _apart(label)
+        label, moved = _split_unit(label)
         if moved and read:
             read = _with_unit(read, moved)
-        label, unit = _whole(label, read)
+        label, unit = _complete_label(label, read)
         names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
         read += [(n, v, unit) for n, v in zip(names, values, strict=True)]
         behind = said[2].strip(" \t,;|")
         if len(behind) > LONGEST:
             return []
-        if unit_in(behind):
+        if parse_unit(behind):
             read = _with_unit(read, behind)
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
@@ -142,14 +142,14 @@ def _of_temperature(line: str) -> str:
     ('Temperature: 23.40 deg C', 'Sample 12')
     """
     alone = _ALONE.fullmatch(line)
-    said = meaning(alone[1]) if alone else None
+    said = heading_meaning(alone[1]) if alone else None
     if alone is None or said is None or said.kind != "temperature":
         return line
     return f"{alone[1]}: {alone[2]}"
 
 
 class TitledValues:
-    """Labels and values of lines, of which some say what the axes behind them are of.
+    """Labels and values of lines in which a title names the sensor of the next axes.
 
     Attributes
     ----------
@@ -169,8 +169,8 @@ class TitledValues:
         read = labelled_values(line)
         title = None if read else _TITLE.fullmatch(line)
         if title is not None:
-            bare, unit = _whole(" ".join(title[1].split()), [])
-            said = meaning(f"{bare} x")
+            bare, unit = _complete_label(" ".join(title[1].split()), [])
+            said = heading_meaning(f"{bare} x")
             if said is not None and said.kind:
                 self._title, self._unit = bare, f" [{unit}]" if unit else ""
                 self.titles += 1
@@ -180,10 +180,10 @@ class TitledValues:
                 for n, v in read]  # fmt: skip
 
 
-def _parted(line: str) -> list[tuple[str, str]]:
+def _split_labels(line: str) -> list[tuple[str, str]]:
     """Labels, and what stands behind each; none if anything stands before the first.
 
-    >>> _parted("Accel: x= 1 | y= 2 Gyro: x= 3")
+    >>> _split_labels("Accel: x= 1 | y= 2 Gyro: x= 3")
     [('Accel x', '1 | '), ('y', '2'), ('Gyro x', '3')]
     """
     parts = _LABEL.split(line)
@@ -199,20 +199,22 @@ def _parted(line: str) -> list[tuple[str, str]]:
     return [*zip(labels, texts[1:], strict=True)]
 
 
-def _apart(label: str) -> tuple[str, str]:
+def _split_unit(label: str) -> tuple[str, str]:
     """A label, and the unit of the value before it that stands before it."""
     first, _, rest = label.partition(" ")
-    return (rest.strip(), first) if rest.strip() and unit_in(first) else (label, "")
+    return (rest.strip(), first) if rest.strip() and parse_unit(first) else (label, "")
 
 
-def _whole(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
+def _complete_label(
+    label: str, read: Sequence[tuple[str, str, str]]
+) -> tuple[str, str]:
     """A label and its unit; of an axis alone with what the one before it says."""
     before, _, unit = read[-1] if read else ("", "", "")
     bare, _, axis = before.rpartition(" ")
     if bare and label.lower() in AXES and axis.lower() in AXES:
         return f"{bare} {label}", unit
     said = _IN_UNIT.fullmatch(label)
-    if said and unit_in(said[2] or said[3]):
+    if said and parse_unit(said[2] or said[3]):
         return said[1] + (said[4] or ""), said[2] or said[3]
     return label, ""
 
@@ -220,7 +222,7 @@ def _whole(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
 def _with_unit(
     read: Sequence[tuple[str, str, str]], unit: str
 ) -> list[tuple[str, str, str]]:
-    """What was read, with a unit behind the last of it: of all its axes."""
+    """Values with the unit behind the last one, which applies to all axes."""
     last = read[-1][0]
     stem = _STEM.fullmatch(last)
 
@@ -231,30 +233,32 @@ def _with_unit(
     return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
 
 
-def shape(line: str) -> str:
-    """A line without its numbers: what a program prints again and again.
+def line_shape(line: str) -> str:
+    """A line without its numbers: the constant text of a program's output.
 
-    >>> shape("Temperature 25.31 deg C") == shape("Temperature -1 deg C")
+    >>> line_shape("Temperature 25.31 deg C") == line_shape("Temperature -1 deg C")
     True
     """
     return re.sub(_NUMBER, "", line).strip()
 
 
-def repeated(lines: Iterable[str], names: Iterable[str]) -> set[str]:
+def repeated_shapes(lines: Iterable[str], names: Iterable[str]) -> set[str]:
     """Shapes that come more than once, of lines that say none of these names.
 
     What has such a name and no value is a damaged row.
 
-    >>> repeated(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
+    >>> repeated_shapes(["--", "ax: nan", "--", "ax: nan", "ready"], ["ax", "ay", "az"])
     {'--'}
     """
     words = {w for name in names for w in _WORD.findall(name.partition(" [")[0])}
-    seen = Counter(shape(line) for line in lines if not words & {*_NAMED.findall(line)})
+    seen = Counter(
+        line_shape(line) for line in lines if not words & {*_NAMED.findall(line)}
+    )
     return {one for one, times in seen.items() if times > 1 and one}
 
 
-def names_of(rows: Iterable[Sequence[Labelled]]) -> list[str]:
-    """Labels that come again and again, in their order."""
+def repeated_labels(rows: Iterable[Sequence[Labelled]]) -> list[str]:
+    """Labels that repeat, in their order."""
     seen = Counter(name for row in rows for name, _ in row)
     usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
     return [name for name, many in seen.items() if many >= OFTEN * usual]

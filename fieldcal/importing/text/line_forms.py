@@ -9,7 +9,7 @@ from functools import reduce
 from operator import xor
 from typing import Self
 
-from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, most
+from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
 
 _CHECKED = re.compile(r"\s*[$!]?([^*]*)\*([0-9A-Fa-f]{2})\s*")
 _ENTRY = re.compile(r"(\s*)(?:- )?([A-Za-z_]\w*):\s*(\S*)\s*")
@@ -28,7 +28,11 @@ class CheckedLines(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines have it."""
-        return cls() if most(lines, lambda line: _bare(line) is not None) else None
+        return (
+            cls()
+            if is_true_of_most(lines, lambda line: _bare(line) is not None)
+            else None
+        )
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -55,7 +59,13 @@ class EndedLines(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines have it."""
-        return None if separator == END_MARK else cls() if most(lines, _ends) else None
+        return (
+            None
+            if separator == END_MARK
+            else cls()
+            if is_true_of_most(lines, _ends)
+            else None
+        )
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -85,7 +95,7 @@ class EchoedMessages(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if its first lines are messages with an end."""
-        if lines.count(END) < 2 or not most(lines, _is_entry):
+        if lines.count(END) < 2 or not is_true_of_most(lines, _is_entry):
             return None
         messages = _Messages()
         read = [m for line in lines if (m := messages.take(line)) is not None]

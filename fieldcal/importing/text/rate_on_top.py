@@ -21,7 +21,7 @@ from fieldcal.importing.units.time_units import RATES_HZ, UNIX
 _NUMBER = re.compile(r"\d+(?:\.\d*)?")
 
 
-class Beginning(NamedTuple):
+class StartAndRate(NamedTuple):
     """Time of the first row, s since 1970, and the rate of all, Hz."""
 
     time: float
@@ -59,11 +59,11 @@ class RateOnTop(TextForm):
         return read
 
 
-def _beginning(lines: Sequence[str]) -> Beginning | None:
+def _beginning(lines: Sequence[str]) -> StartAndRate | None:
     """What two lines say; None if they are other lines.
 
     >>> _beginning(["1700000000.0, 1700000000.0, 1700000000.0", "32.0, 32.0, 32.0"])
-    Beginning(time=1700000000.0, rate=32.0)
+    StartAndRate(time=1700000000.0, rate=32.0)
     """
     cells = [[cell.strip() for cell in line.split(",")] for line in lines]
     if len(cells) != 2 or any(len(row) != 3 or len({*row}) != 1 for row in cells):
@@ -72,4 +72,4 @@ def _beginning(lines: Sequence[str]) -> Beginning | None:
         return None
     began, rate = (float(row[0]) for row in cells)
     usual = UNIX[0] <= began < UNIX[1] and RATES_HZ[0] <= rate <= RATES_HZ[1]
-    return Beginning(began, rate) if usual else None
+    return StartAndRate(began, rate) if usual else None

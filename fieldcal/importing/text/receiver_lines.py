@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from typing import Self
 from zlib import crc32
 
-from fieldcal.importing.text.text_form import Reader, TextForm, most
+from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
 
 _LINE = re.compile(r"\s*[#%](RAWIMUS?X?A,[^;]*;([^*]*))\*([0-9A-Fa-f]{8})\s*")
 
@@ -36,7 +36,11 @@ class ReceiverLines(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines have it."""
-        return cls() if most(lines, lambda line: _row(line) is not None) else None
+        return (
+            cls()
+            if is_true_of_most(lines, lambda line: _row(line) is not None)
+            else None
+        )
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""

@@ -18,8 +18,8 @@ from typing import NamedTuple, Self
 
 from fieldcal.importing.text.nearest_lines import NearestLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm
-from fieldcal.importing.text.text_top import cells, is_number, separator_of
-from fieldcal.importing.words.heading_words import meaning
+from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
+from fieldcal.importing.words.heading_words import heading_meaning
 
 SENSORS = {
     "a": re.compile(r"acc", re.IGNORECASE),
@@ -40,7 +40,7 @@ FEWEST = 2
 _WORD = re.compile(r"[^\W\d][^,;\t]*")
 
 
-class Kind(NamedTuple):
+class LineKind(NamedTuple):
     """Lines of one kind.
 
     Attributes
@@ -62,7 +62,12 @@ class TaggedLines(TextForm):
     gathers = True
 
     def __init__(
-        self, separator: str | None, place: int, acc: Kind, gyr: Kind | None, time: int
+        self,
+        separator: str | None,
+        place: int,
+        acc: LineKind,
+        gyr: LineKind | None,
+        time: int,
     ) -> None:
         self._separator, self._place = separator, place
         self._acc, self._gyr, self._time = acc, gyr, time
@@ -78,9 +83,9 @@ class TaggedLines(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if most lines begin with one of several words."""
-        seen = Counter(separator_of(line) for line in lines)
+        seen = Counter(find_separator(line) for line in lines)
         parted = separator or (seen.most_common(1)[0][0] if seen else None)
-        rows = [cells(line, parted) for line in lines]
+        rows = [split_cells(line, parted) for line in lines]
         place = next((i for i in range(PLACES) if _is_word(rows, i)), None)
         if place is None:
             return None
@@ -101,7 +106,7 @@ class TaggedLines(TextForm):
         def read(lines: Sequence[str]) -> list[str]:
             found = []
             for line in lines:
-                row = cells(line, self._separator)
+                row = split_cells(line, self._separator)
                 word = row[self._place] if len(row) > self._place else ""
                 if word == self._acc.word and is_number(row[self._time], False):
                     if self._gyr is None:
@@ -131,7 +136,7 @@ def _is_word(rows: Sequence[Sequence[str]], i: int) -> bool:
     return len(beside) > MOSTLY * len(rows)
 
 
-def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[Kind]:
+def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[LineKind]:
     """Kinds of lines by their word and width, the commonest first."""
     whole = [row for row in rows if len(row) > place]
     words = [row for row in whole if not any(is_number(c, False) for c in row)]
@@ -145,11 +150,11 @@ def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[Kind]:
                 for row in words if len(row) == width]  # fmt: skip
         own = [row for first, row in said if first == word]
         own += [row for first, row in said if first not in dict(usual)]
-        found.append(Kind(word, width, tuple(own[0]) if own else ()))
+        found.append(LineKind(word, width, tuple(own[0]) if own else ()))
     return found
 
 
-def _chosen(kinds: Sequence[Kind]) -> tuple[Kind | None, Kind | None]:
+def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None]:
     """Kinds of which the lines are taken: of the forces or of all, and of the rates."""
     if len({kind.word for kind in kinds}) < len("ab"):
         return None, None
@@ -168,10 +173,10 @@ def _chosen(kinds: Sequence[Kind]) -> tuple[Kind | None, Kind | None]:
     )
 
 
-def _named(kind: Kind, sensor: str) -> tuple[str, ...]:
+def _named(kind: LineKind, sensor: str) -> tuple[str, ...]:
     """Names of the columns of a kind, bare axes with their sensor."""
     bare = [name.lower() in ("x", "y", "z") for name in kind.names]
-    said = [meaning(name) for name in kind.names]
+    said = [heading_meaning(name) for name in kind.names]
     if not any(bare) and not any(s and s.kind in "ag" for s in said):
         return ()
     return tuple(f"{sensor} {name}" if axis and sensor else name

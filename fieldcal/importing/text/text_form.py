@@ -47,6 +47,6 @@ class TextForm(ABC):
         """Return what reads a text of this form from its beginning."""
 
 
-def most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
-    """Whether something is so of most lines."""
+def is_true_of_most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
+    """Whether a condition is true of most lines."""
     return sum(map(is_so, lines)) > MOSTLY * len(lines)

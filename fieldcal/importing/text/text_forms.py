@@ -26,16 +26,16 @@ from fieldcal.importing.text.dataflash_text import DataflashText
 from fieldcal.importing.text.labels import (
     CLOCKS,
     TitledValues,
-    names_of,
-    repeated,
-    shape,
+    line_shape,
+    repeated_labels,
+    repeated_shapes,
 )
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.tagged_lines import TaggedLines
-from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, most
-from fieldcal.importing.text.text_top import cells, separator_of
+from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.times.clock_text import IN_LINE, ClockText, is_clock, is_date
 
 CLOCK = "utc time [s]"
@@ -71,10 +71,10 @@ class QuotedCells(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> QuotedCells | None:
         """The form, if most lines have it."""
-        if not most(lines, lambda line: line.count('"') > 1):
+        if not is_true_of_most(lines, lambda line: line.count('"') > 1):
             return None
         bare = re.sub('"[^"]*"', '""', lines[-1])
-        return cls(separator or separator_of(bare) or " ", separator or "\t")
+        return cls(separator or find_separator(bare) or " ", separator or "\t")
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -108,13 +108,13 @@ class LabelledValues(TextForm):
         titled = TitledValues()
         read = [titled.of(line) for line in lines]
         many = [row for row in read if row]
-        names = names_of(many)
+        names = repeated_labels(many)
         told = len(many) + titled.titles
         if told <= MOSTLY * len(lines) or len(names) < len("xyz"):
             return None
         gathers = max(len(row) for row in many) < len(names)
         others = [one for one, row in zip(lines, read, strict=True) if not row]
-        return cls(names, separator or "\t", gathers, repeated(others, names))
+        return cls(names, separator or "\t", gathers, repeated_shapes(others, names))
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -128,7 +128,7 @@ class LabelledValues(TextForm):
                 said = titled.of(line)
                 bare = not said and titles == titled.titles
                 values = {k: v for k, v in said if k in self.names}
-                if bare and shape(line) not in self._others:
+                if bare and line_shape(line) not in self._others:
                     # no row: whoever reads rows says so
                     found.append(line)
                 if (row.keys() & values.keys()) - CLOCKS:
@@ -156,9 +156,9 @@ class ArrivalPrefix(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> ArrivalPrefix | None:
         """The form, if most lines have it."""
-        if not most(lines, lambda line: _ARRIVAL.match(line) is not None):
+        if not is_true_of_most(lines, lambda line: _ARRIVAL.match(line) is not None):
             return None
-        return cls(separator or separator_of(_ARRIVAL.sub("", lines[-1])) or "\t")
+        return cls(separator or find_separator(_ARRIVAL.sub("", lines[-1])) or "\t")
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -168,7 +168,7 @@ class ArrivalPrefix(TextForm):
             if arrival is None:
                 return line
             rest = line[arrival.end() :]
-            bare = separator_of(rest) is None
+            bare = find_separator(rest) is None
             rest = self._separator.join(rest.split()) if bare else rest
             return f"{arrival[1]}{self._separator}{rest}"
 
@@ -189,10 +189,10 @@ class ClockColumn(TextForm):
         """The form, if most lines have it."""
         if not lines:
             return None
-        parted = separator or separator_of(lines[-1])
+        parted = separator or find_separator(lines[-1])
         if parted is None and (place := _of_two_words(lines)) is not None:
             return cls(place, None, None, True)
-        rows = [cells(line, parted) for line in lines]
+        rows = [split_cells(line, parted) for line in lines]
         clock = next((i for i, cell in enumerate(rows[-1]) if is_clock(cell)), None)
         if clock is None:
             return None

@@ -27,8 +27,8 @@ def top_lines(data: bytes, many: int = TOP) -> list[str]:
     return split_lines(b"\n".join(data.split(b"\n", many)[:many]))
 
 
-def behind(data: bytes, many: int) -> bytes:
-    """What stands behind so many lines that are not empty."""
+def skip_lines(data: bytes, many: int) -> bytes:
+    """Bytes behind the first `many` lines that are not empty."""
     at = 0
     while many and at < len(data):
         end = data.find(b"\n", at)
@@ -38,8 +38,8 @@ def behind(data: bytes, many: int) -> bytes:
     return data[at:]
 
 
-def width_of(line: str, separator: str | None) -> int:
-    """How many cells a line has."""
+def cell_count(line: str, separator: str | None) -> int:
+    """Number of cells of a line."""
     return len(line.split(separator))
 
 

@@ -17,7 +17,7 @@ from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.headings.heading import Column, Heading
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.words.heading_units import unit_in
+from fieldcal.importing.words.heading_units import parse_unit
 
 SEPARATORS = (";", "\t", ",")
 """Between columns; a comma in a line with one of the others is a decimal comma."""
@@ -57,8 +57,8 @@ _RATE = re.compile(
 )
 
 
-def separator_of(line: str) -> str | None:
-    """Return what parts the columns of a line; None for spaces."""
+def find_separator(line: str) -> str | None:
+    """Return the separator of the columns of a line; None for spaces."""
     return next((s for s in SEPARATORS if s in line), None)
 
 
@@ -71,7 +71,7 @@ def is_number(cell: str, comma: bool) -> bool:
     return True
 
 
-def cells(line: str, separator: str | None) -> list[str]:
+def split_cells(line: str, separator: str | None) -> list[str]:
     """Cells of a line, without spaces and quotes about them."""
     if separator is None and '"' not in line:
         return line.split()
@@ -80,8 +80,8 @@ def cells(line: str, separator: str | None) -> list[str]:
 
 def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     """Which of the lines is the first of numbers; how many there are if none is."""
-    parted = [separator or separator_of(line) for line in lines]
-    rows = [cells(line, s) for line, s in zip(lines, parted, strict=True)]
+    parted = [separator or find_separator(line) for line in lines]
+    rows = [split_cells(line, s) for line, s in zip(lines, parted, strict=True)]
     many = Counter(len(row) for row in rows if len(row) >= AXES)
     # a line into which another broke is wider than all others
     width = (
@@ -100,7 +100,9 @@ def first_numbers(lines: Sequence[str], separator: str | None) -> int:
     return len(lines)
 
 
-def rows_begin(lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]) -> int:
+def count_top_lines(
+    lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]
+) -> int:
     """How many lines at the top hold something else than numbers; -1 if all do.
 
     Parameters
@@ -112,7 +114,7 @@ def rows_begin(lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]) ->
     """
     if wanted.skip is not None:
         return wanted.skip
-    parted = [wanted.separator or separator_of(line) for line in lines]
+    parted = [wanted.separator or find_separator(line) for line in lines]
     rows = [line.split(s) for line, s in zip(lines, parted, strict=True)]
     width, full = len(wanted.columns), max(map(len, rows[:FULL]), default=0)
     for i, (row, separator) in enumerate(zip(rows, parted, strict=True)):
@@ -125,13 +127,13 @@ def rows_begin(lines: Sequence[str], wanted: ReadOptions, use: Sequence[int]) ->
 
 
 def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]:
-    """What stands above the numbers, read as names in each of several ways."""
+    """Lines above the numbers, read as headings in several ways."""
     first = first_numbers(lines, separator)
     tops = [line.lstrip("#%/ ") for line in lines[max(0, first - ABOVE) : first]]
     # who listens before the device starts has rows above the names
     tops += [line for line in lines[first : first + LATEST] if _all_words(line)]
     rows = [
-        _DESCRIBED.findall(line) or cells(line, separator or separator_of(line))
+        _DESCRIBED.findall(line) or split_cells(line, separator or find_separator(line))
         for line in tops
     ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
@@ -140,19 +142,19 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
 
 def _all_words(line: str) -> bool:
     """Whether all cells of a line are words."""
-    row = cells(line, separator_of(line))
+    row = split_cells(line, find_separator(line))
     return len(row) > 2 and all(cell[:1].isalpha() for cell in row)
 
 
 def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
     for i, row in enumerate(rows):
         yield [Column("", name) for name in row]
-        if (filled := _filled(row)) != [*row]:
+        if (filled := _fill_sensor_names(row)) != [*row]:
             yield [Column("", name) for name in filled]
         if i + 1 == len(rows) or len(rows[i + 1]) != len(row):
             continue
         below = rows[i + 1]
-        units = [unit_in(cell) for cell in below]
+        units = [parse_unit(cell) for cell in below]
         if any(units):
             pairs = zip(row, below, strict=True)
             yield [Column("", name, unit) for name, unit in pairs]
@@ -164,10 +166,10 @@ def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
         yield joined
 
 
-def _filled(row: Sequence[str]) -> list[str]:
+def _fill_sensor_names(row: Sequence[str]) -> list[str]:
     """Names of which an axis alone belongs to the one before: ``acc_x,y,z``.
 
-    >>> _filled(["t", "Accel (z) [g]", "(x)", "(y)", "gx", "y", "z"])
+    >>> _fill_sensor_names(["t", "Accel (z) [g]", "(x)", "(y)", "gx", "y", "z"])
     ['t', 'Accel (z) [g]', 'Accel (x) [g]', 'Accel (y) [g]', 'gx', 'gy', 'gz']
     """
     found: list[str] = []
@@ -180,8 +182,10 @@ def _filled(row: Sequence[str]) -> list[str]:
     return found
 
 
-def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str] | None:
-    """Rate in Hz that a line above the numbers says, and that line."""
+def find_stated_rate(
+    lines: Sequence[str], separator: str | None
+) -> tuple[float, str] | None:
+    """Rate in Hz that a line above the numbers states, and that line."""
     for line in lines[: first_numbers(lines, separator)]:
         within = _RATE_WITHIN.findall(line)
         matched = _RATE.fullmatch(line.strip())
@@ -191,13 +195,13 @@ def rate_above(lines: Sequence[str], separator: str | None) -> tuple[float, str]
     return None
 
 
-def numbers_of(lines: Sequence[str], separator: str | None) -> Array:
+def parse_numbers(lines: Sequence[str], separator: str | None) -> Array:
     """Numbers of lines, (n, k) as wide as the first; nan where a cell is none."""
     first = first_numbers(lines[:1000], separator)
     if first >= len(lines):
         return np.empty((0, 0))
-    parted = separator or separator_of(lines[first])
-    width = len(cells(lines[first], parted))
+    parted = separator or find_separator(lines[first])
+    width = len(split_cells(lines[first], parted))
     rows = []
     for line in lines[first:]:
         row = line.split(parted)

@@ -69,7 +69,7 @@ class AlignedPair:
             self._period = float(np.median(np.diff(acc.t)))
         out = np.full((len(acc), 3), np.nan)
         if len(gyr):
-            partner, apart = nearest(acc.t, gyr.t)
+            partner, apart = nearest_in_time(acc.t, gyr.t)
             close = ~(apart > self._period / 2)
             out[close] = gyr.gyr[partner[close]]
             if close.any():
@@ -77,7 +77,7 @@ class AlignedPair:
         return Block.of(acc.t, acc.acc, out, acc.temperature)
 
 
-def nearest(t: Array, others: Array) -> tuple[Index, Array]:
+def nearest_in_time(t: Array, others: Array) -> tuple[Index, Array]:
     """Which of other times (m,), in order, is nearest to each (n,), and how far."""
     right = np.searchsorted(others, t).clip(0, len(others) - 1)
     left = (right - 1).clip(0)

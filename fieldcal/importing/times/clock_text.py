@@ -42,7 +42,7 @@ def is_clock(cell: str) -> bool:
     >>> [is_clock(c) for c in ("23:59:50.123", "05/03/2024 11:59 PM", "1.5", "59:50.1")]
     [True, False, False, True]
     """
-    cell = _usual(cell)
+    cell = _date_first(cell)
     return bool(_CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell))
 
 
@@ -51,7 +51,7 @@ def is_date(cell: str) -> bool:
     return _DAY.fullmatch(cell.strip()) is not None
 
 
-def _usual(text: str) -> str:
+def _date_first(text: str) -> str:
     """A time with its date before it, where the year stands behind."""
     said = _LATE_YEAR.fullmatch(text.strip())
     if said is None:
@@ -81,7 +81,7 @@ class ClockText:
         day : the date, where it has a column of its own
 
         """
-        said = _CLOCK.fullmatch(_usual(text))
+        said = _CLOCK.fullmatch(_date_first(text))
         if said is None:
             return self._of_minutes(text)
         h, half = int(said["h"]), (said["half"] or "").lower()
@@ -112,7 +112,7 @@ class ClockText:
     def _number(self, written: str) -> int:
         """Days since the first date."""
         if written not in self._days:
-            read = _readings(written)
+            read = _possible_dates(written)
             if self._first is None:
                 # the reading that stands, should the date change
                 self._days[written], self._first = 0, (read or [0])[0]
@@ -124,8 +124,8 @@ class ClockText:
         return self._days[written]
 
 
-def _readings(written: str) -> list[int]:
-    """Days of all that a date may be."""
+def _possible_dates(written: str) -> list[int]:
+    """Days of all possible readings of a date."""
     parts = re.split(r"[-/. ]", written)
     if not parts[1].isdecimal():
         month = parts[1].lower()

@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.times.alignment import nearest
+from fieldcal.importing.times.alignment import nearest_in_time
 
 GAP = 1.5
 """Times the length of a batch that lie between two, if something is missing."""
 
 
-class Fifo:
+class FifoTimes:
     """Gives every sample of a FIFO its time, reading by reading."""
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ WAITING = 8
 
 
 @dataclass(slots=True)
-class Batch:
+class FifoBatch:
     """A batch that comes part by part.
 
     Attributes
@@ -104,11 +104,11 @@ class FifoBatches:
     """
 
     def __init__(self) -> None:
-        self._open: dict[int, Batch] = {}
+        self._open: dict[int, FifoBatch] = {}
         self._done: tuple[bool, Block] | None = None
         self.lost = 0
 
-    def begin(self, number: int, batch: Batch) -> None:
+    def begin(self, number: int, batch: FifoBatch) -> None:
         """Take in what a batch will be."""
         self.lost += self._open.pop(number, None) is not None
         self._open[number] = batch
@@ -154,7 +154,7 @@ def in_time_order(acc: Block, gyr: Block) -> Block:
     Each of the accelerometer goes with the gyroscope's nearest within half a period of
     either; all others stay alone, with the other sensor's values unknown.
     """
-    partner, apart = nearest(acc.t, gyr.t)
+    partner, apart = nearest_in_time(acc.t, gyr.t)
     period = min(_period(acc.t), _period(gyr.t))
     first = np.concatenate([[True], np.diff(partner) != 0])
     paired = first & ~(apart > period / 2)

@@ -54,7 +54,7 @@ def clock_numbers(values: Array) -> Array:
     return since
 
 
-class SpreadTimes:
+class BatchTimes:
     """Times of rows that share those of their batch, spread evenly over it.
 
     Each row is later than the one before by what it is on average; a batch that comes
@@ -111,7 +111,7 @@ class RowTimes:
         self._seen, self._sum, self._offset = 0, 0.0, 0.0
         self._last = self._usual = np.nan
         self._anew: list[float] = []
-        self._spread = SpreadTimes(wanted.batch) if wanted.batch else None
+        self._spread = BatchTimes(wanted.batch) if wanted.batch else None
 
     def of(self, columns: Mapping[str, Array], n: int) -> Array:
         """Times (n,) of the next rows."""

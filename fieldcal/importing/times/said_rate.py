@@ -20,25 +20,27 @@ DEEPEST = 20
 """Records within records that are looked at."""
 
 
-def scalars(
+def named_scalars(
     document: Any, name: str = "", depth: int = 0
 ) -> Iterator[tuple[str, float]]:
     """Numbers that stand alone in a document, with their names.
 
-    >>> list(scalars({"imu": {"fs": 100, "acc": [1, 2]}}))
+    >>> list(named_scalars({"imu": {"fs": 100, "acc": [1, 2]}}))
     [('imu/fs', 100.0)]
     """
     if isinstance(document, Mapping) and depth < DEEPEST:
         for key, value in document.items():
-            yield from scalars(value, f"{name}/{key}" if name else str(key), depth + 1)
+            yield from named_scalars(
+                value, f"{name}/{key}" if name else str(key), depth + 1
+            )
     elif isinstance(document, (int, float)) and not isinstance(document, bool):
         yield name, float(document)
 
 
-def rate_of(named: Mapping[str, float]) -> tuple[float, str] | None:
-    """Rate in Hz that one of these numbers is, and what says so; None if none is.
+def stated_rate(named: Mapping[str, float]) -> tuple[float, str] | None:
+    """Rate in Hz that one of these numbers states, with its name; None if none does.
 
-    >>> rate_of({"payload/interval_ms": 10.0})
+    >>> stated_rate({"payload/interval_ms": 10.0})
     (100.0, 'payload/interval_ms = 10')
     """
     for name, value in named.items():

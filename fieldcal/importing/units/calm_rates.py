@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnsShown
-from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, gains
-from fieldcal.importing.units.unit_answers import answers
+from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnComparison
+from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, gain_scales
+from fieldcal.importing.units.unit_answers import unit_options
 
 FAST = 0.5
 """Rate, rad/s, that nothing at rest shows: 30 deg/s."""
@@ -32,8 +32,8 @@ deg/s would say some ten times as much."""
 RAD, DEG = GYR_SCALES[:2]
 
 
-class CalmRates(NamedTuple):
-    """What the unit of rates is thought to be, or what is asked.
+class CalmRateUnit(NamedTuple):
+    """Assumed unit of rates, or a question about it.
 
     Attributes
     ----------
@@ -48,10 +48,10 @@ class CalmRates(NamedTuple):
     answers: tuple[str, ...] = ()
 
 
-def calm_rates(
-    gyr: Array, turns: TurnsShown | None, step: float | None, usual: str
-) -> CalmRates:
-    """Say what unit rates are in of which no turn tells.
+def guess_unit_of_calm_rates(
+    gyr: Array, turns: TurnComparison | None, step: float | None, usual: str
+) -> CalmRateUnit:
+    """Guess the unit of rates in a recording without turns.
 
     Parameters
     ----------
@@ -64,36 +64,36 @@ def calm_rates(
     plain = [s for s in (RAD, DEG) if not usual or s.unit == usual] + [RAD, DEG]
     if step is not None:
         # who writes gains of velocity, writes gains of angle beside them
-        plain = [*gains(step, "rad/s"), *gains(step, "deg/s", DEG.size)]
+        plain = [*gain_scales(step, "rad/s"), *gain_scales(step, "deg/s", DEG.size)]
     allowed = [s for s in plain if turns is None or turns.allow(s.size)]
     whole = bool((gyr == np.round(gyr)).all())
     first = plain[0]
     if step is not None and allowed:
-        return CalmRates(allowed[0], "so are the accelerations, and no turn tells")
+        return CalmRateUnit(allowed[0], "so are the accelerations, and no turn tells")
     if usual and first in allowed:
-        return CalmRates(first, "so rates of such names are, and no turn tells")
+        return CalmRateUnit(first, "so rates of such names are, and no turn tells")
     if not whole and turns is not None and _in_degrees(turns):
-        return CalmRates(DEG, f"as rad/s, {turns.odd()}")
+        return CalmRateUnit(DEG, f"as rad/s, {turns.odd()}")
     fast = float(np.median(np.abs(gyr).max(axis=1)))
     noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
     if RAD in allowed and fast <= FAST and noise <= ROUGH:
-        return CalmRates(RAD, "it is the usual one, and no turn tells")
+        return CalmRateUnit(RAD, "it is the usual one, and no turn tells")
     shown = f"{fast:.4g}" if fast > FAST else f"a scatter of {noise:.2g}"
     asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
-    return CalmRates(None, "", asks, tuple(_answers(gyr, turns, whole)))
+    return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole)))
 
 
-def _in_degrees(turns: TurnsShown) -> bool:
+def _in_degrees(turns: TurnComparison) -> bool:
     """Whether rad/s cannot be by how gravity turns, and deg/s are as it turns."""
     least = max(STIRS, TIMES * turns.shown)
     return turns.said >= least and turns.allow(DEG.size, AS_SHOWN)
 
 
-def _answers(gyr: Array, turns: TurnsShown | None, whole: bool) -> list[str]:
+def _answers(gyr: Array, turns: TurnComparison | None, whole: bool) -> list[str]:
     """Options: those that can be; of whole numbers counts as well."""
     scales = [DEG, *(USUAL_COUNTS if whole else [RAD])]
     fits = [s for s in scales if turns is None or turns.allow(s.size)]
     if whole and np.abs(gyr).max() > FASTEST:
         fits = [s for s in fits if s != DEG]
-    said = answers("gyr", fits or scales, "deg/s", DEG.size)
+    said = unit_options("gyr", fits or scales, "deg/s", DEG.size)
     return [f"{a}, if it is so" if a == "--gyr-unit rad/s" else a for a in said]

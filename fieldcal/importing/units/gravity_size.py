@@ -44,8 +44,8 @@ _WIDE = 0.05
 """Least share of the directions' variance along any axis, for a sphere."""
 
 
-class Gravity(NamedTuple):
-    """What the accelerometers read at rest, in numbers of the file.
+class GravityReading(NamedTuple):
+    """Gravity as the accelerometers read it, in numbers of the file.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ class Gravity(NamedTuple):
 
 
 def _readings(acc: Array) -> Array:
-    """Rows (m, 3) that a sensor may have said."""
+    """Rows (m, 3) that a sensor may have measured."""
     rows: Array = acc[(np.abs(acc) < LARGEST).all(axis=1)]
     return rows
 
 
 def are_means(acc: Array) -> bool:
-    """Whether successive rows (n, 3) point so differently that they are no samples.
+    """Whether rows (n, 3) are means of positions: successive directions differ.
 
     Samples that follow each other point nearly the same way; means of positions do not.
     """
@@ -75,7 +75,7 @@ def are_means(acc: Array) -> bool:
     if not FEWEST_MEANS <= len(acc) <= MOST_MEANS:
         return False
     # a large offset hides how much the directions differ
-    center, radius = _sphere(acc, FEWEST_FACES)
+    center, radius = _fit_sphere(acc, FEWEST_FACES)
     acc = acc - center if radius else acc
     length = np.linalg.norm(acc, axis=1)
     if not length.all():
@@ -88,7 +88,7 @@ def are_means(acc: Array) -> bool:
     return bool(np.median(turned) > APART)
 
 
-def gravity_in(acc: Array) -> Gravity | None:
+def estimate_gravity(acc: Array) -> GravityReading | None:
     """Size of gravity in numbers (n, 3) of a file, by (1); None of too few."""
     acc = _readings(acc)
     if are_means(acc):
@@ -107,16 +107,16 @@ def _quiet_means(acc: Array) -> Array:
     return quiet
 
 
-def _gravity_of(quiet: Array) -> Gravity | None:
+def _gravity_of(quiet: Array) -> GravityReading | None:
     """Size of gravity by means (m, 3) of rests."""
-    center, radius = _sphere(quiet)
+    center, radius = _fit_sphere(quiet)
     if radius:
-        return Gravity(radius, center, True)
+        return GravityReading(radius, center, True)
     size = float(np.median(np.linalg.norm(quiet, axis=1)))
-    return Gravity(size, np.zeros(3), False) if size else None
+    return GravityReading(size, np.zeros(3), False) if size else None
 
 
-def with_length(acc: Array, size: float) -> Gravity | None:
+def gravity_of_length(acc: Array, size: float) -> GravityReading | None:
     """Gravity of a known length, with the offset that rests show; None if they do not.
 
     Rests in few directions lie on many spheres, but on one of a known radius.
@@ -135,10 +135,10 @@ def with_length(acc: Array, size: float) -> Gravity | None:
     spread = float(np.linalg.norm(x.std(axis=0)))
     if spread < size / 2 or np.quantile(np.abs(length / size - 1), 0.9) > _ROUND:
         return None
-    return Gravity(size, center, True)
+    return GravityReading(size, center, True)
 
 
-def _sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, float]:
+def _fit_sphere(points: Array, fewest: int = FEWEST_ON_SPHERE) -> tuple[Array, float]:
     """Center and radius of a sphere through points; radius 0 if they lie on none.
 
     Nor do fewer than `fewest` tell one.

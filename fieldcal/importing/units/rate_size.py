@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.units.gravity_size import Gravity
+from fieldcal.importing.units.gravity_size import GravityReading
 from fieldcal.importing.units.scales import FEWEST
 from fieldcal.importing.units.turn_closure import closing_scale
 
@@ -52,10 +52,10 @@ _LAG = 0.5
 """Time over which (1) is integrated, s: jerks of a hand are shorter."""
 
 
-def rate_in(
-    t: Array, acc: Array, gyr: Array, gravity: Gravity, turned: float = TURNED
+def estimate_rate_unit(
+    t: Array, acc: Array, gyr: Array, gravity: GravityReading, turned: float = TURNED
 ) -> float | None:
-    """What 1 rad/s reads in numbers (n, 3) of a file, by (1); None if nothing turns.
+    """Estimate the reading of 1 rad/s in numbers (n, 3), by (1); None without turns.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def rate_in(
     return rough if closes is None and agrees >= _AGREES else closes
 
 
-class TurnsShown(NamedTuple):
-    """By how much gravity turns within half a second, rad, root of the mean square.
+class TurnComparison(NamedTuple):
+    """Rms turn of gravity within half a second, rad, by rates and by accelerometers.
 
     What the accelerometers show is more than it turned, by their noise and by the
     forces of whoever moves the device; so in the right unit rates cannot say much more.
@@ -119,12 +119,14 @@ class TurnsShown(NamedTuple):
         )
 
 
-def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> TurnsShown | None:
-    """By how much gravity turns as rates say, and as it does; None if nothing tells.
+def compare_turns(
+    t: Array, acc: Array, gyr: Array, gravity: GravityReading
+) -> TurnComparison | None:
+    """Compare turns by rates with turns of gravity; None if there are none.
 
     Parameters
     ----------
-    t, acc, gyr, gravity : as of `rate_in`
+    t, acc, gyr, gravity : as of `estimate_rate_unit`
 
     """
     sides = _Sides.of(t, acc, gyr, gravity)
@@ -134,19 +136,19 @@ def turns_said(t: Array, acc: Array, gyr: Array, gravity: Gravity) -> TurnsShown
     mean = up.mean(axis=0)
     stays = float(np.linalg.norm(mean)) > STAYS
     about = np.cross(mean, sides.usual) if stays else np.zeros(3)
-    said, shown, angle = (_size(x, sides.lag // 2)
+    said, shown, angle = (_rms_turn(x, sides.lag // 2)
                           for x in (sides.right, sides.left, sides.angles))  # fmt: skip
     upright = said < _UPRIGHT * angle
     level = float(np.linalg.norm(about))
     steady = level < _UPRIGHT * np.linalg.norm(sides.usual)
-    return TurnsShown(
+    return TurnComparison(
         said=0.0 if upright else said,
         shown=shown,
         bias=0.0 if steady else level,
     )
 
 
-def _size(turns: Array, many: int) -> float:
+def _rms_turn(turns: Array, many: int) -> float:
     """Root of the mean square of turns (n, 3), averaged over so many of them."""
     many = min(max(many, 1), len(turns))
     total = np.cumsum(np.vstack([np.zeros((1, 3)), turns]), axis=0)
@@ -180,7 +182,9 @@ class _Sides(NamedTuple):
     usual: Array
 
     @classmethod
-    def of(cls, t: Array, acc: Array, gyr: Array, gravity: Gravity) -> Self | None:
+    def of(
+        cls, t: Array, acc: Array, gyr: Array, gravity: GravityReading
+    ) -> Self | None:
         """Both sides; None of too few rows, or where no rate changes."""
         known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
         t, acc, gyr = t[known], acc[known], gyr[known]
@@ -200,7 +204,7 @@ class _Sides(NamedTuple):
         turning = np.cross(up, gyr)
         swung = (np.abs(length - 1) > _SWUNG) | clipped
         steps[swung[1:] | swung[:-1]] = np.nan
-        right, angles = (_over((x[1:] + x[:-1]) / 2 * steps[:, None], lag)
+        right, angles = (_lagged_sums((x[1:] + x[:-1]) / 2 * steps[:, None], lag)
                          for x in (turning, gyr))  # fmt: skip
         left = up[lag:] - up[:-lag]
         told = np.isfinite(right).all(axis=1)
@@ -225,7 +229,7 @@ def _at_rails(gyr: Array) -> NDArray[np.bool_]:
     return rails
 
 
-def _over(steps: Array, lag: int) -> Array:
+def _lagged_sums(steps: Array, lag: int) -> Array:
     """Sums of `lag` successive steps (n, 3); nan over a pause."""
     paused = np.isnan(steps)
     total = np.cumsum(np.where(paused, 0.0, steps), axis=0)

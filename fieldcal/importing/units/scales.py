@@ -44,15 +44,15 @@ class Scale(NamedTuple):
         return f"counts, {self.lsb:.6g} in a {self.unit}"
 
 
-def _counts(per_unit: float, bits: int = 16) -> float:
+def _counts_per_unit(per_unit: float, bits: int = 16) -> float:
     """Counts of so many bits in a unit, by the full scale."""
     return 2.0 ** (bits - 1) / per_unit
 
 
 _G_COUNTS = (
-    *(_counts(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
+    *(_counts_per_unit(full) for full in (2, 3, 4, 6, 8, 12, 16, 24, 32)),
     *(512.0, 256.0, 128.0, 64.0),
-    _counts(16, 20),
+    _counts_per_unit(16, 20),
     *(800.0, 800.0 * 2**16),
 )
 """Full scales in 16 bits, of 10 to 13 bits, of high resolution in 20 bits, and of the
@@ -60,15 +60,15 @@ sensors of Analog Devices in 16 and 32 bits. Not 65536: about so reads the lengt
 three words of 16 bits whose zero lies in the middle."""
 
 _DEG_COUNTS = (
-    *(_counts(full) for full in (125, 250, 500, 1000, 2000)),
+    *(_counts_per_unit(full) for full in (125, 250, 500, 1000, 2000)),
     *(1 / milli for milli in (8.75e-3, 17.5e-3, 35e-3, 70e-3)),
-    _counts(1000, 20),
+    _counts_per_unit(1000, 20),
     *(10.0, 10.0 * 2**16),
 )
 """Full scales in 16 bits, ST's sensitivities, and others as of accelerations."""
 
 USUAL_COUNTS = tuple(
-    Scale(_counts(full) * 180 / np.pi, "deg/s", _counts(full))
+    Scale(_counts_per_unit(full) * 180 / np.pi, "deg/s", _counts_per_unit(full))
     for full in (250, 500, 1000, 2000)
 )
 """Counts of rates as most sensors have them, of the full scale that they begin with."""
@@ -93,8 +93,8 @@ GYR_SCALES = (
 )
 
 
-def gains(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
-    """How a quantity reads that is the gain over a step, such as of velocity.
+def gain_scales(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
+    """Scales of increments over a step, such as those of velocity.
 
     Parameters
     ----------
@@ -106,18 +106,20 @@ def gains(step: float, unit: str, size: float = 1.0) -> tuple[Scale, ...]:
     return (Scale(size * step, unit, step),)
 
 
-def about(number: float, digits: int = 3) -> str:
-    """A number as one would say it roughly, without an exponent.
+def rounded_text(number: float, digits: int = 3) -> str:
+    """A number rounded to few digits, without an exponent.
 
-    >>> about(32731.0), about(0.01849), about(1224.6)
+    >>> rounded_text(32731.0), rounded_text(0.01849), rounded_text(1224.6)
     ('32700', '0.0185', '1220')
     """
     rounded = float(f"{number:.{digits}g}")
     return f"{rounded:.12g}"
 
 
-def fitting(size: float, scales: tuple[Scale, ...], within: float) -> list[Scale]:
-    """Ways to read a quantity that shows as `size`, within a factor, nearest first.
+def fitting_scales(
+    size: float, scales: tuple[Scale, ...], within: float
+) -> list[Scale]:
+    """Scales in which a quantity reads `size`, within a factor, nearest first.
 
     Parameters
     ----------

@@ -41,8 +41,8 @@ UNIX = (1e9, 4e9)
 """Times of day since 1970, s: 2001 to 2096."""
 
 
-def time_units(t: Array) -> list[str]:
-    """Units that times (n,) of a file may be in."""
+def possible_time_units(t: Array) -> list[str]:
+    """Possible units of the times (n,) of a file."""
     t = t[np.isfinite(t)]
     steps = np.diff(t)
     steps = steps[steps > 0]
@@ -58,7 +58,7 @@ def time_units(t: Array) -> list[str]:
     return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
 
 
-def unit_taken(name: str, t: Array) -> tuple[str, str]:
+def assumed_time_unit(name: str, t: Array) -> tuple[str, str]:
     """Unit taken for the times (n,) of a recording, and why; "" where it is s.
 
     Raises
@@ -67,7 +67,7 @@ def unit_taken(name: str, t: Array) -> tuple[str, str]:
         With a question and its answers, where several would do.
 
     """
-    fits, step = time_units(t), _step(t)
+    fits, step = possible_time_units(t), _step(t)
     if len(fits) > 1:
         rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
         raise InputError(
@@ -91,9 +91,9 @@ def counts_from_long_ago(t: Array) -> bool:
     return any(UNIX[0] <= since - epoch < UNIX[1] for epoch in EPOCHS)
 
 
-def step_of(t: Array) -> float:
+def usual_step(t: Array) -> float:
     """Usual distance of times (n,), s, if one unit alone fits them; else 0."""
-    fits = time_units(t)
+    fits = possible_time_units(t)
     return _step(t) * TIME_UNITS[fits[0]] if len(fits) == 1 else 0.0
 
 
@@ -110,10 +110,10 @@ NEAR = 0.1
 """Part by which a rate that is said and that of the times differ."""
 
 
-def unit_by_rate(t: Array, rate_hz: float) -> str:
+def time_unit_of_rate(t: Array, rate_hz: float) -> str:
     """Unit in which times (n,) come at a rate; nothing if in none.
 
-    >>> unit_by_rate(np.arange(100) * 100.0, 100.0)
+    >>> time_unit_of_rate(np.arange(100) * 100.0, 100.0)
     '0.1ms'
     """
     step = _step(t)
@@ -122,23 +122,23 @@ def unit_by_rate(t: Array, rate_hz: float) -> str:
     return near[0] if near else ""
 
 
-def unit_nearest(t: Array, rate_hz: float) -> tuple[str, float]:
+def time_unit_near_rate(t: Array, rate_hz: float) -> tuple[str, float]:
     """Unit in which times (n,) come about at a rate, and the rate they make.
 
     "" if in none within a factor of three, or of unusual ones within a tenth.
 
-    >>> unit_nearest(np.arange(100) * 13.0, 100.0)[0]
+    >>> time_unit_near_rate(np.arange(100) * 13.0, 100.0)[0]
     'ms'
     """
     step = _step(t)
-    units = {*TIME_SIZES, unit_by_rate(t, rate_hz)} - {""}
+    units = {*TIME_SIZES, time_unit_of_rate(t, rate_hz)} - {""}
     rates = {u: 1 / (step * TIME_UNITS[u]) for u in units if step}
     away = {u: abs(np.log(rate / rate_hz)) for u, rate in rates.items()}
     unit = min(away, key=away.__getitem__, default="")
     return (unit, rates[unit]) if unit and away[unit] < ABOUT else ("", np.nan)
 
 
-def unit_of_ticks(t: Array) -> str:
+def time_unit_of_ticks(t: Array) -> str:
     """Unit of ticks (n,) that make a rate that loggers have; nothing if none does."""
     low, high = TICKED_HZ
     step = _step(t)
@@ -147,7 +147,7 @@ def unit_of_ticks(t: Array) -> str:
 
 
 class SharedTimes(NamedTuple):
-    """Times of rows that came together.
+    """Sharing of times among rows.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def shared_times(t: Array) -> SharedTimes | None:
     return SharedTimes(float(np.median(np.diff(t[begins + 1]))), usual, even, equal)
 
 
-def burst_units(t: Array) -> list[str]:
+def time_units_of_bursts(t: Array) -> list[str]:
     """Units in which rows of times (n,) between pauses were taken when these say.
 
     They are even then, and make the rate of a log. Of rows that a port hands over at

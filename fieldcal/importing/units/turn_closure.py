@@ -44,7 +44,7 @@ STEP_S = 0.02
 """Time over which a rate is taken as one, s."""
 
 
-class Turned(NamedTuple):
+class TurnBetweenRests(NamedTuple):
     """A turn between two rests.
 
     Attributes
@@ -74,7 +74,7 @@ def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None
     if len(turns) < FEWEST_TURNS:
         return None
     scales = rough * np.geomspace(1 / ABOUT, ABOUT, TRIED)
-    missed = np.array([_missed(one, scales) for one in turns])
+    missed = np.array([_closure_errors(one, scales) for one in turns])
     # one of the turns may have gone on beyond what a rest was taken for
     usual = np.median(missed, axis=0)
     best = int(usual.argmin())
@@ -84,10 +84,11 @@ def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None
     return float(scales[best])
 
 
-def _turns(t: Array, up: Array, gyr: Array) -> Iterator[Turned]:
+def _turns(t: Array, up: Array, gyr: Array) -> Iterator[TurnBetweenRests]:
     step = float(np.median(np.diff(t)))
     rests = [
-        _inner(*rest, step) for rest in _rests(up, max(4, round(GROUP_S / step)), step)
+        _inner_part(*rest, step)
+        for rest in _rests(up, max(4, round(GROUP_S / step)), step)
     ]
     for (a, b), (c, d) in zip(rests, rests[1:], strict=False):
         before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
@@ -101,7 +102,7 @@ def _turns(t: Array, up: Array, gyr: Array) -> Iterator[Turned]:
             continue
         many = max(1, round(STEP_S / step))
         starts = np.arange(0, len(angles), many)
-        yield Turned(before, behind, np.add.reduceat(angles, starts, axis=0))
+        yield TurnBetweenRests(before, behind, np.add.reduceat(angles, starts, axis=0))
 
 
 def _rests(up: Array, group: int, step: float) -> list[tuple[int, int]]:
@@ -118,8 +119,8 @@ def _rests(up: Array, group: int, step: float) -> list[tuple[int, int]]:
     return [(group * a, group * b) for a, b in pairs if b - a >= least]
 
 
-def _inner(first: int, last: int, step: float) -> tuple[int, int]:
-    """What of a rest is surely one: a turn begins and ends slowly.
+def _inner_part(first: int, last: int, step: float) -> tuple[int, int]:
+    """Inner part of a rest, without the slow start and end of turns.
 
     What is cut off belongs to the turn, for it may have turned already.
     """
@@ -133,8 +134,8 @@ def _direction(up: Array) -> Array:
     return unit
 
 
-def _missed(turn: Turned, scales: Array) -> Array:
-    """Angle by which a turn does not close at each of the scales (k,), rad."""
+def _closure_errors(turn: TurnBetweenRests, scales: Array) -> Array:
+    """Closure of a turn at each of the scales (k,), rad."""
     u = np.tile(turn.before, (len(scales), 1))
     for angle in turn.angles:
         size = float(np.linalg.norm(angle))

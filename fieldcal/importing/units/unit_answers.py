@@ -6,25 +6,31 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.units.gravity_size import Gravity
-from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, about
+from fieldcal.importing.units.gravity_size import GravityReading
+from fieldcal.importing.units.scales import (
+    GYR_SCALES,
+    USUAL_COUNTS,
+    Scale,
+    rounded_text,
+)
 
 
-def answers(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
-    """Options to paste: those that fit; else counts, about `lsb` in a unit."""
+def unit_options(kind: str, fits: list[Scale], unit: str, lsb: float) -> list[str]:
+    """Options for the user to paste: units that fit, else counts of about `lsb`."""
     lines = [
         f"--{kind}-unit {s.unit}" + (f" --{kind}-lsb {s.lsb:.6g}" if s.lsb != 1 else "")
         for s in fits
     ]
     return lines or [
-        f"--{kind}-unit {unit} --{kind}-lsb {about(lsb)} (about so many counts in one"
+        f"--{kind}-unit {unit} --{kind}-lsb {rounded_text(lsb)}"
+        " (about so many counts in one"
         f" {unit}; its data sheet says the number)",
         f"--{kind}-unit {unit}, if it is so",
     ]
 
 
-def zero_elsewhere(said: ReadOptions, gravity: Gravity) -> list[str]:
-    """What to paste where rests in one direction cannot show the zero of counts."""
+def zero_options(said: ReadOptions, gravity: GravityReading) -> list[str]:
+    """Options to paste if rests in one direction do not show the zero of counts."""
     if gravity.round or said.acc_zero:
         return []
     return [
@@ -34,8 +40,8 @@ def zero_elsewhere(said: ReadOptions, gravity: Gravity) -> list[str]:
     ]
 
 
-def other_rates(reads: float, rate: float, gyr: Array) -> list[str]:
-    """Rates to paste at which the unit would be a usual one.
+def rate_options(reads: float, rate: float, gyr: Array) -> list[str]:
+    """Sampling rates to paste at which the unit would be usual.
 
     Parameters
     ----------
@@ -46,13 +52,14 @@ def other_rates(reads: float, rate: float, gyr: Array) -> list[str]:
     """
     scales = USUAL_COUNTS if (gyr == np.round(gyr)).all() else GYR_SCALES[:2]
     rates = [
-        f"--rate {about(rate * reads / s.size)}, which makes it {s}" for s in scales
+        f"--rate {rounded_text(rate * reads / s.size)}, which makes it {s}"
+        for s in scales
     ]
     return rates if rate else []
 
 
-def as_written(fits: list[Scale], values: Array) -> list[Scale]:
-    """Scales without counts, where values are no whole numbers and others do."""
+def scales_of_decimals(fits: list[Scale], values: Array) -> list[Scale]:
+    """Scales without counts, if values are not integers and other scales fit."""
     known = values[np.isfinite(values)]
     plain = [fit for fit in fits if fit.lsb == 1]
     return plain if plain and (known != np.round(known)).any() else fits

@@ -10,10 +10,10 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
 from fieldcal.importing.recording import ReadOptions, Recording
-from fieldcal.importing.units.gravity_size import Gravity, gravity_in
-from fieldcal.importing.units.rate_size import rate_in, turns_said
-from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, about
-from fieldcal.importing.units.unit_answers import zero_elsewhere
+from fieldcal.importing.units.gravity_size import GravityReading, estimate_gravity
+from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
+from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, rounded_text
+from fieldcal.importing.units.unit_answers import zero_options
 from fieldcal.session.units import UNSCALED
 
 FAR = 0.25
@@ -23,8 +23,8 @@ NO_GRAVITY = 0.05
 """Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
 
 
-def hold_own_units(recording: Recording, block: Block) -> None:
-    """Ask or say where a format's own units cannot be.
+def check_format_units(recording: Recording, block: Block) -> None:
+    """Check the units of a format against the numbers; ask or report if they disagree.
 
     Raises
     ------
@@ -32,10 +32,10 @@ def hold_own_units(recording: Recording, block: Block) -> None:
         If the format has an option that would make them right.
 
     """
-    gravity = gravity_in(block.acc)
+    gravity = estimate_gravity(block.acc)
     if gravity is None or abs(np.log(gravity.size / G0)) < FAR:
         return
-    turned = rate_in(block.t, block.acc, block.gyr, gravity)
+    turned = estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
     odd = (
         f"|a| at rest is {gravity.size:.4g} m/s^2, {gravity.size / G0:.3g} times"
         " gravity: its full scale or unit is another"
@@ -45,8 +45,8 @@ def hold_own_units(recording: Recording, block: Block) -> None:
     recording.says.append(odd)
 
 
-class SaidUnits:
-    """Units that the user says, or the names of the columns.
+class StatedUnits:
+    """Units stated by the user or by the names of columns.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class SaidUnits:
     def __init__(self, name: str, said: ReadOptions, guessed: Container[str]) -> None:
         self._name, self._said, self._guessed = name, said, guessed
 
-    def doubts(self, block: Block, gravity: Gravity) -> list[str]:
+    def doubts(self, block: Block, gravity: GravityReading) -> list[str]:
         """What the user says and physics does not, a sentence each.
 
         Raises
@@ -70,7 +70,7 @@ class SaidUnits:
         """
         return self._of_forces(gravity) + self._of_rates(block, gravity)
 
-    def _of_forces(self, gravity: Gravity) -> list[str]:
+    def _of_forces(self, gravity: GravityReading) -> list[str]:
         reads = gravity.size / G0
         if not self._has_size("a") or abs(np.log(reads)) <= FAR:
             return []
@@ -85,32 +85,34 @@ class SaidUnits:
         self._ask_zero(gravity, shows)
         return self._contradict("a", shows, "--acc-unit", fits)
 
-    def _ask_zero(self, gravity: Gravity, shows: str) -> None:
+    def _ask_zero(self, gravity: GravityReading, shows: str) -> None:
         """Ask where the zero of counts lies whose size the user says."""
         unit, lsb = self._unit("a"), self._said.acc_lsb
-        zero = zero_elsewhere(self._said, gravity)
+        zero = zero_options(self._said, gravity)
         if lsb != 1 and "a" not in self._said.named and zero:
             raise InputError(
                 f"{self._name}: {lsb:g} counts in a {unit} as you say, but {shows}: add"
                 f" {zero[0]} or --acc-zero 0,0,0, if it is so"
             )
 
-    def _of_rates(self, block: Block, gravity: Gravity) -> list[str]:
+    def _of_rates(self, block: Block, gravity: GravityReading) -> list[str]:
         if not self._has_size("g"):
             return []
-        turned = rate_in(block.t, block.acc, block.gyr, gravity)
+        turned = estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if turned is None:
             return self._of_calm(block, gravity)
         if abs(np.log(turned)) <= FAR:
             return []
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
-        other = self._said.rate_hz and f"--rate {about(self._said.rate_hz * turned)}"
+        other = (
+            self._said.rate_hz and f"--rate {rounded_text(self._said.rate_hz * turned)}"
+        )
         return self._contradict("g", shows, "--gyr-unit", fits, other or "")
 
-    def _of_calm(self, block: Block, gravity: Gravity) -> list[str]:
+    def _of_calm(self, block: Block, gravity: GravityReading) -> list[str]:
         """Rates by which gravity would turn where it does not."""
-        turns = turns_said(block.t, block.acc, block.gyr, gravity)
+        turns = compare_turns(block.t, block.acc, block.gyr, gravity)
         if turns is None or turns.allow(1):
             return []
         plain = [s for s in GYR_SCALES if s.lsb == 1]

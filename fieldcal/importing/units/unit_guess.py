@@ -16,33 +16,33 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import LARGEST, ReadOptions, Recording
-from fieldcal.importing.units.calm_rates import calm_rates
+from fieldcal.importing.units.calm_rates import guess_unit_of_calm_rates
 from fieldcal.importing.units.gravity_size import (
-    Gravity,
+    GravityReading,
     are_means,
-    gravity_in,
-    with_length,
+    estimate_gravity,
+    gravity_of_length,
 )
-from fieldcal.importing.units.rate_size import rate_in, turns_said
+from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
     FEW,
     GYR_OUT,
     GYR_SCALES,
-    about,
-    fitting,
-    gains,
+    fitting_scales,
+    gain_scales,
+    rounded_text,
 )
 from fieldcal.importing.units.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.units.time_units import step_of, unit_taken
+from fieldcal.importing.units.time_units import assumed_time_unit, usual_step
 from fieldcal.importing.units.unit_answers import (
-    answers,
-    as_written,
-    other_rates,
-    zero_elsewhere,
+    rate_options,
+    scales_of_decimals,
+    unit_options,
+    zero_options,
 )
-from fieldcal.importing.units.unit_doubts import SaidUnits, hold_own_units
+from fieldcal.importing.units.unit_doubts import StatedUnits, check_format_units
 
 ROWS = 1 << 17
 """Rows at the beginning by which units are told."""
@@ -54,8 +54,8 @@ OFFSET = 0.25
 """Part of g that no bias is: what raw counts show more is where their zero lies."""
 
 
-class Settled(NamedTuple):
-    """What was taken for what nobody said.
+class AssumedUnits(NamedTuple):
+    """Assumptions about units that nobody stated.
 
     Attributes
     ----------
@@ -68,8 +68,8 @@ class Settled(NamedTuple):
     acc_bias: list[float] | None = None
 
 
-def settle_units(recording: Recording, stream: str) -> Settled:
-    """Give a recording the units that its numbers tell.
+def settle_units(recording: Recording, stream: str) -> AssumedUnits:
+    """Determine the units of a recording from its numbers.
 
     Raises
     ------
@@ -78,23 +78,25 @@ def settle_units(recording: Recording, stream: str) -> Settled:
 
     """
     parts = recording.parts
-    times = [why for part in parts if len(parts) > 1 and (why := _timed(part))]
+    times = [
+        why for part in parts if len(parts) > 1 and (why := _settle_time_unit(part))
+    ]
     heard = recording.alone(stream)
     block = _beginning(heard, stream)
     if not all(part.asks_units for part in parts):
-        hold_own_units(recording, block)
-        return Settled(heard.guessed)
-    guess = _Guess(str(recording.path), _said(parts), block)
+        check_format_units(recording, block)
+        return AssumedUnits(heard.guessed)
+    guess = _Guess(str(recording.path), _stated_units(parts), block)
     for part in parts:
         part.wanted = guess.on(part.wanted)
     parts[0].says += guess.doubts
     taken = {k: why for one in (*parts, heard) for k, why in one.guessed.items()}
     taken |= {"time": times[0]} if times else {}
-    return Settled(taken | guess.found, guess.acc_bias)
+    return AssumedUnits(taken | guess.found, guess.acc_bias)
 
 
-def _timed(part: Recording) -> str:
-    """Give one of several files the unit of its own times, and say why; "" if it has.
+def _settle_time_unit(part: Recording) -> str:
+    """Determine the time unit of one of several files; return the reason, "" if stated.
 
     Each has a clock column of its own, while each unit of a sensor stands in one.
     """
@@ -102,7 +104,7 @@ def _timed(part: Recording) -> str:
     if not part.asks_units or wanted.time_unit or wanted.rate_hz:
         return ""
     stream = part.streams()[0].name
-    unit, why = unit_taken(
+    unit, why = assumed_time_unit(
         str(part.path), part.alone(stream).first_rows(stream, ROWS).t
     )
     part.wanted = replace(part.wanted, time_unit=unit or "s")
@@ -117,7 +119,7 @@ def _beginning(recording: Recording, stream: str) -> Block:
     return replace(whole, acc=acc, gyr=gyr)
 
 
-def _said(parts: Sequence[Recording]) -> ReadOptions:
+def _stated_units(parts: Sequence[Recording]) -> ReadOptions:
     """What is said of any part: each channel stands in one of them."""
     said = parts[0].wanted
     for part in parts[1:]:
@@ -139,7 +141,7 @@ class _Guess:
     ----------
     found : what was guessed, by quantity
     said : what is said, with what was found
-    acc_bias : as in `Settled`
+    acc_bias : as in `AssumedUnits`
     doubts : what the user says and physics does not, a sentence each
 
     """
@@ -151,19 +153,19 @@ class _Guess:
         self._name, self.said, self._read = name, said, said
         # of means, the pauses between them say nothing
         if not (said.time_unit or said.rate_hz or are_means(block.acc)):
-            unit, why = unit_taken(name, block.t)
+            unit, why = assumed_time_unit(name, block.t)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
         written, block = block.acc, replace(block, acc=block.acc - self._zero)
-        gravity = gravity_in(block.acc)
-        self._step = step_of(t) if said.rate_hz is None else 1 / said.rate_hz
+        gravity = estimate_gravity(block.acc)
+        self._step = usual_step(t) if said.rate_hz is None else 1 / said.rate_hz
         if gravity and not said.acc_unit and said.acc_lsb == 1:
             self._acceleration(gravity, written)
         elif gravity and said.acc_lsb != 1:
-            gravity = with_length(block.acc, G0) or gravity
+            gravity = gravity_of_length(block.acc, G0) or gravity
         if said.acc_zero:
             self._lies_at(self._zero)
         if gravity and self.said.acc_lsb != 1:
@@ -171,7 +173,7 @@ class _Guess:
         if not said.gyr_unit and said.gyr_lsb == 1:
             self._rates(block, gravity)
         if gravity:
-            said_units = SaidUnits(name, self.said, self.found)
+            said_units = StatedUnits(name, self.said, self.found)
             self.doubts += said_units.doubts(block, gravity)
         if not said.temp_unit:
             self._temperature(block.temperature)
@@ -189,13 +191,13 @@ class _Guess:
             wanted = replace(wanted, temp_unit=found.temp_unit)
         return wanted
 
-    def _acceleration(self, gravity: Gravity, acc: Array) -> None:
-        fits = fitting(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
-        fits = as_written(fits, acc)
+    def _acceleration(self, gravity: GravityReading, acc: Array) -> None:
+        fits = fitting_scales(gravity.size, ACC_SCALES, ACC_OUT[not gravity.round])
+        fits = scales_of_decimals(fits, acc)
         if not fits and self._step:
-            scales = gains(self._step, "m/s^2", G0)
-            fits = fitting(gravity.size, scales, ACC_OUT[not gravity.round])
-        shows = f"|a| at rest is {about(gravity.size, 4)}"
+            scales = gain_scales(self._step, "m/s^2", G0)
+            fits = fitting_scales(gravity.size, scales, ACC_OUT[not gravity.round])
+        shows = f"|a| at rest is {rounded_text(gravity.size, 4)}"
         if gravity.round:
             shows += " (from a sphere through the rests)"
         if not fits and gravity.size < NO_UNIT:
@@ -203,20 +205,20 @@ class _Guess:
                 f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
                 " to be taken out of these accelerations, and nothing can be"
                 " calibrated by them; log those with gravity in them, or, if it is so,"
-                f" add --acc-unit g --acc-lsb {about(gravity.size)}"
+                f" add --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
             )
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is gravity in"
                 f" {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("acc", fits, "g", gravity.size)
-                + zero_elsewhere(self.said, gravity),
+                unit_options("acc", fits, "g", gravity.size)
+                + zero_options(self.said, gravity),
             )
         if (fits[0].unit, fits[0].lsb) != ("m/s^2", 1):
             self.found["acceleration"] = f"{fits[0]}: {shows}"
             self.said = replace(self.said, acc_unit=fits[0].unit, acc_lsb=fits[0].lsb)
 
-    def _offset(self, gravity: Gravity) -> None:
+    def _offset(self, gravity: GravityReading) -> None:
         if (np.abs(gravity.offset) > OFFSET * gravity.size).any():
             counts = self._lies_at(self._zero + gravity.offset)
             reads = " ".join(f"{number:.5g}" for number in counts)
@@ -228,30 +230,32 @@ class _Guess:
         self.acc_bias = [round(b * self.said.acc_scale, 4) for b in counts]
         return counts
 
-    def _rates(self, block: Block, gravity: Gravity | None) -> None:
+    def _rates(self, block: Block, gravity: GravityReading | None) -> None:
         gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
         if len(gyr) < FEW:
             return
-        reads = gravity and rate_in(block.t, block.acc, block.gyr, gravity)
+        reads = gravity and estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:
             self._calm(block, gyr, gravity)
             return
-        fits = fitting(reads, GYR_SCALES, GYR_OUT[not gravity.round])
-        fits = as_written(fits, block.gyr)
+        fits = fitting_scales(reads, GYR_SCALES, GYR_OUT[not gravity.round])
+        fits = scales_of_decimals(fits, block.gyr)
         if self._gained:
             # who writes gains of velocity, writes gains of angle beside them
-            degrees = gains(self._step, "deg/s", 180 / np.pi)
-            scales = (*gains(self._step, "rad/s"), *degrees)
-            fits = fitting(reads, scales, GYR_OUT[not gravity.round])
+            degrees = gain_scales(self._step, "deg/s", 180 / np.pi)
+            scales = (*gain_scales(self._step, "rad/s"), *degrees)
+            fits = fitting_scales(reads, scales, GYR_OUT[not gravity.round])
         elif self.said.acc_lsb != 1 and (counts := [f for f in fits if f.lsb != 1]):
             # who writes one sensor's registers as they are, writes the other's so too
             fits = counts
-        shows = f"as gravity turns, 1 rad/s reads {about(reads, 4)}"
+        shows = f"as gravity turns, 1 rad/s reads {rounded_text(reads, 4)}"
         if len(fits) != 1:
             self._ask(
                 f"{shows}, which is {' or '.join(map(str, fits)) or 'no usual unit'}",
-                answers("gyr", fits, "deg/s", np.deg2rad(reads))
-                + (other_rates(reads, self.said.rate_hz or 0, gyr) if not fits else []),
+                unit_options("gyr", fits, "deg/s", np.deg2rad(reads))
+                + (
+                    rate_options(reads, self.said.rate_hz or 0, gyr) if not fits else []
+                ),
             )
         if (fits[0].unit, fits[0].lsb) != ("rad/s", 1):
             self.found["angular_rate"] = f"{fits[0]}: {shows}"
@@ -262,11 +266,11 @@ class _Guess:
         """Whether accelerations are gains of velocity since the row before."""
         return self.said.acc_lsb != 1 and self.said.acc_lsb == self._step
 
-    def _calm(self, block: Block, gyr: Array, gravity: Gravity | None) -> None:
+    def _calm(self, block: Block, gyr: Array, gravity: GravityReading | None) -> None:
         """Rates of which no turn tells."""
-        turns = gravity and turns_said(block.t, block.acc, block.gyr, gravity)
+        turns = gravity and compare_turns(block.t, block.acc, block.gyr, gravity)
         gained = self._step if self._gained else None
-        found = calm_rates(gyr, turns, gained, self.said.usual)
+        found = guess_unit_of_calm_rates(gyr, turns, gained, self.said.usual)
         if found.scale is None:
             self._ask(found.asks, [*found.answers])
         else:

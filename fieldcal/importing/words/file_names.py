@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fieldcal.importing.words.heading_words import words_of
+from fieldcal.importing.words.heading_words import words_in_name
 
 _SENSORS = {
     "acc": ("acc", "accel", "accelerometer", "acceleration"),
@@ -34,10 +34,10 @@ SENSOR = {"acc": "accelerometers", "gyr": "gyroscopes"}
 """What each is called in a sentence."""
 
 
-def best_of(sensor: str, names: Iterable[str]) -> str | None:
-    """Of several names the best for a sensor, acc or gyr; None if none is of it.
+def best_name(sensor: str, names: Iterable[str]) -> str | None:
+    """Best of several file names for a sensor, acc or gyr; None if none matches.
 
-    >>> best_of("acc", ["Gyroscope", "Accelerometer", "TotalAcceleration"])
+    >>> best_name("acc", ["Gyroscope", "Accelerometer", "TotalAcceleration"])
     'TotalAcceleration'
     """
     ranks = {"acc": ACC, "gyr": GYR}[sensor]
@@ -46,18 +46,19 @@ def best_of(sensor: str, names: Iterable[str]) -> str | None:
         for name, bare in there.items():
             if bare == rank:
                 return name
-    return next((name for name in there if sensor_of(name) == sensor), None)
+    return next((name for name in there if sensor_of_file_name(name) == sensor), None)
 
 
-def sensor_of(stem: str) -> str:
-    """Sensor of a file by its name without the ending; "" if it says none, or several.
+def sensor_of_file_name(stem: str) -> str:
+    """Sensor of a file by its name without the extension; "" if none or several.
 
-    >>> sensor_of("TotalAcceleration"), sensor_of("gyro_exp01_user01")
-    ('acc', 'gyr')
-    >>> sensor_of("acc_and_gyro"), sensor_of("userAcceleration"), sensor_of("log")
-    ('', '', '')
+    >>> [sensor_of_file_name(s) for s in ("TotalAcceleration", "gyro_exp01_user01")]
+    ['acc', 'gyr']
+    >>> stems = ("acc_and_gyro", "userAcceleration", "log")
+    >>> [sensor_of_file_name(stem) for stem in stems]
+    ['', '', '']
     """
-    words = words_of(stem)
+    words = words_in_name(stem)
     before = dict(zip(words[1:], words, strict=False))
     said = [sensor for sensor, names in _SENSORS.items() if {*words} & {*names}]
     more = {*words} & {*_OTHERS} or "user" in {before.get(w) for w in _SENSORS["acc"]}

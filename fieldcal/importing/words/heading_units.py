@@ -54,11 +54,11 @@ UNITS = {
 """Units that a kind of channel may have; of an axis alone, those that tell its kind."""
 
 
-def unit_in(text: str) -> str | None:
-    """Return the unit that a text is, in brackets or bare; None if it is none.
+def parse_unit(text: str) -> str | None:
+    """Parse a text as a unit, with or without brackets; None if it is none.
 
-    >>> unit_in(" (°/s)"), unit_in("g"), unit_in("rad per sec"), unit_in("x")
-    ('deg/s', 'g', 'rad/s', None)
+    >>> [parse_unit(text) for text in (" (°/s)", "g", "rad per sec", "x")]
+    ['deg/s', 'g', 'rad/s', None]
     """
     bare = text.strip()
     # of "(m/(s^2))" the outer brackets, of "m/(s^2)" none

@@ -13,8 +13,8 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from fieldcal.importing.words.heading_units import TELLING, UNITS, unit_in
-from fieldcal.importing.words.rate_names import with_axis_of
+from fieldcal.importing.words.heading_units import TELLING, UNITS, parse_unit
+from fieldcal.importing.words.rate_names import with_axis_letter
 
 AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
 
@@ -103,8 +103,8 @@ _INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
 """Axes of an array: ``gyro_rad[0]``, or ``gyro_rad.00`` as PlotJuggler writes it."""
 
 
-class Meaning(NamedTuple):
-    """What a name says.
+class HeadingMeaning(NamedTuple):
+    """Meaning of the name of a column.
 
     Attributes
     ----------
@@ -123,27 +123,27 @@ class Meaning(NamedTuple):
     weak: bool = False
 
 
-def meaning(name: str, unit: str = "") -> Meaning | None:
-    """Say what a name means; None if it names no channel.
+def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
+    """Return the meaning of a name; None if it names no channel.
 
     Parameters
     ----------
     name : of a column
     unit : what the file says of it elsewhere, or nothing
 
-    >>> meaning("imu1_GyroX (dps)")
-    Meaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
+    >>> heading_meaning("imu1_GyroX (dps)")
+    HeadingMeaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
     """
     name = _BARE.sub("", unicodedata.normalize("NFD", name))
     name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
     if (whole := _WHOLE.get(name.lower())) is not None:
-        return Meaning(whole, "", None)
-    for bare, said in _ways(name, unit):
-        found = _of_words([w.lower() for w in _WORD.findall(bare)], said)
+        return HeadingMeaning(whole, "", None)
+    for bare, said in _name_unit_splits(name, unit):
+        found = _meaning_of_words([w.lower() for w in _WORD.findall(bare)], said)
         if found is None or (said is not None and said not in UNITS[found.kind]):
             continue
         if found.kind or said is not None:
-            found = _of_angle(found)
+            found = _as_angle_rate(found)
             return found._replace(
                 kind=found.kind or _kind_of(said),
                 weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
@@ -151,8 +151,8 @@ def meaning(name: str, unit: str = "") -> Meaning | None:
     return None
 
 
-def _of_angle(found: Meaning) -> Meaning:
-    """The meaning of a rate of whose unit the name says the angle."""
+def _as_angle_rate(found: HeadingMeaning) -> HeadingMeaning:
+    """Meaning of a rate whose name states the unit of angle."""
     words = [w for w in found.label if w in _ANGLES]
     if (
         found.kind != "g"
@@ -169,37 +169,39 @@ def _kind_of(unit: str | None) -> str:
     return next(kind for kind in "ag" if unit in UNITS[kind])
 
 
-def _ways(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
-    """Ways to part a name from its unit."""
+def _name_unit_splits(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
+    """Possible splits of a text into a name and its unit."""
     if indexed := _INDEX.fullmatch(name):
         name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
     elif bracketed := _BRACKETS.fullmatch(name):
-        yield bracketed.group(1), unit_in(bracketed.group(2))
+        yield bracketed.group(1), parse_unit(bracketed.group(2))
         return
     cuts = [cut.span() for cut in re.finditer("[_ .]", name)]
     for a, b in cuts:
         axis = re.fullmatch(r"(.*)[_ .]([xyzXYZ])", name[b:])
         inner = axis.group(1) if axis else name[b:]
         bare = f"{name[:a]}_{axis.group(2)}" if axis else name[:a]
-        if (said := unit_in(inner.replace("_", "/"))) is not None:
+        if (said := parse_unit(inner.replace("_", "/"))) is not None:
             yield bare, said
     for cut in _CAPITAL.finditer(name):
         # of "GyroXRadPerSec" the end; a letter alone is an axis
-        if (said := unit_in(_PER.sub("/", name[cut.start() :]))) in TELLING:
+        if (said := parse_unit(_PER.sub("/", name[cut.start() :]))) in TELLING:
             yield name[: cut.start()], said
-    yield name, unit_in(unit)
+    yield name, parse_unit(unit)
 
 
-def _of_words(words: list[str], unit: str | None) -> Meaning | None:
+def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | None:
     if not words:
         return None
-    words = with_axis_of(words)
+    words = with_axis_letter(words)
     if "t" in words and unit == "deg C":
-        return Meaning("temperature", "", unit, tuple(w for w in words if w != "t"))
-    if (step := _step(words, unit)) is not None:
+        return HeadingMeaning(
+            "temperature", "", unit, tuple(w for w in words if w != "t")
+        )
+    if (step := _step_meaning(words, unit)) is not None:
         return step
     for phrase, kind in (*_PHRASES, *_GAINS):
-        if (at := _place(words, phrase)) is not None:
+        if (at := _find_phrase(words, phrase)) is not None:
             rest = words[:at] + words[at + len(phrase) :]
             # of gains as well, what was measured itself goes before them
             weak = kind == "linear" or (phrase, kind) in _GAINS
@@ -210,10 +212,10 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
         # of "GyX" the axis is the X
         apart = word in _SENSORS["g"] and bool(rest[i:]) and rest[i] in "xyz"
         if kind and word[-1] in "xyz" and not apart:
-            return Meaning(kind, word[-1], unit, tuple(rest))
+            return HeadingMeaning(kind, word[-1], unit, tuple(rest))
         kind = next((k for k, names in _SENSORS.items() if word[1:] in names), "")
         if kind and word[0] in "xyz" and len(word) > len("xg"):
-            return Meaning(kind, word[0], unit, tuple(rest))
+            return HeadingMeaning(kind, word[0], unit, tuple(rest))
     for i, word in enumerate(words):
         rest = words[:i] + words[i + 1 :]
         kind = next((k for k, names in _SENSORS.items() if word in names), "")
@@ -222,20 +224,20 @@ def _of_words(words: list[str], unit: str | None) -> Meaning | None:
             found = _with_axis(kind, rest, unit)
             if found is not None:
                 return found
-    if (time := _time(words, unit)) is not None:
+    if (time := _time_meaning(words, unit)) is not None:
         return time
     for word in _TEMPERATURES:
         if word in words:
             label = tuple(w for w in words if w != word)
-            return Meaning("temperature", "", unit, label)
-    if (alone := axis_alone(words)) is not None:
-        return Meaning("", alone[0], unit, alone[1])
+            return HeadingMeaning("temperature", "", unit, label)
+    if (alone := bare_axis(words)) is not None:
+        return HeadingMeaning("", alone[0], unit, alone[1])
     # whatever it is called, an axis in rad/s is one of a gyroscope
     return _with_axis("", words, unit) if unit in TELLING else None
 
 
-def axis_alone(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
-    """An axis of no said sensor, and what of it is meant: ``x_mean``, ``y``, ``std_z``.
+def bare_axis(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
+    """An axis without a sensor, and its statistic: ``x_mean``, ``y``, ``std_z``.
 
     None where any other word is there.
     """
@@ -244,7 +246,7 @@ def axis_alone(words: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     return (rest[0], label) if rest in (["x"], ["y"], ["z"]) else None
 
 
-def words_of(name: str) -> list[str]:
+def words_in_name(name: str) -> list[str]:
     """The words of a name without its unit, in small letters."""
     bracketed = _BRACKETS.fullmatch(name.strip())
     bare = bracketed.group(1) if bracketed else name
@@ -252,16 +254,16 @@ def words_of(name: str) -> list[str]:
 
 
 def is_counter(name: str) -> bool:
-    """Whether a name says that its column counts, so its numbers are no times.
+    """Whether a name is that of a counter, whose numbers are no times.
 
     >>> is_counter("Packet number"), is_counter("sample_time"), is_counter("")
     (True, False, False)
     """
-    words = words_of(name)
+    words = words_in_name(name)
     return bool(words) and {*words} <= {*COUNTERS}
 
 
-def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:
+def _find_phrase(words: Sequence[str], phrase: Sequence[str]) -> int | None:
     n = len(phrase)
     places = range(len(words) - n + 1)
     return next((i for i in places if tuple(words[i : i + n]) == tuple(phrase)), None)
@@ -269,42 +271,42 @@ def _place(words: Sequence[str], phrase: Sequence[str]) -> int | None:
 
 def _with_axis(
     kind: str, rest: list[str], unit: str | None, weak: bool = False
-) -> Meaning | None:
-    """The meaning with the last axis among its other words; None if there is none."""
+) -> HeadingMeaning | None:
+    """Meaning with the last axis among the other words; None if there is none."""
     letters = [i for i, word in enumerate(rest) if word in "xyz" and len(word) == 1]
     if not letters:
         return None
     at = letters[-1]
-    return Meaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
+    return HeadingMeaning(kind, rest[at], unit, tuple(rest[:at] + rest[at + 1 :]), weak)
 
 
-def _step(words: list[str], unit: str | None) -> Meaning | None:
+def _step_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of the time since the row before."""
     for names in _STEPS:
-        if (at := _place(words, names)) is not None:
+        if (at := _find_phrase(words, names)) is not None:
             rest = words[:at] + words[at + len(names) :]
-            inner = [u for w in rest if (u := unit_in(w)) in UNITS["dt"]]
+            inner = [u for w in rest if (u := parse_unit(w)) in UNITS["dt"]]
             if len(inner) == len(rest):
-                return Meaning("dt", "", unit or (inner[-1] if inner else None))
+                return HeadingMeaning("dt", "", unit or (inner[-1] if inner else None))
     return None
 
 
-def _time(words: list[str], unit: str | None) -> Meaning | None:
+def _time_meaning(words: list[str], unit: str | None) -> HeadingMeaning | None:
     """The meaning of a time: by its name, or by a unit of time that is all of it."""
     said = unit if unit in UNITS["t"] else None
     named = [w for w in words if w in _TIMES]
     rest = [w for w in words if w not in _TIMES]
-    inner = [w for w in rest if unit_in(w) in UNITS["t"]]
+    inner = [w for w in rest if parse_unit(w) in UNITS["t"]]
     if named or (len(inner) == len(rest) == 1 and len(rest[0]) > 1):
-        said = said or (unit_in(inner[-1]) if inner else None)
+        said = said or (parse_unit(inner[-1]) if inner else None)
         label = tuple(w for w in rest if w not in inner)
-        return Meaning("t", "", said if unit is None or said else unit, label)
-    since = said or (unit_in(inner[-1]) if inner else None)
+        return HeadingMeaning("t", "", said if unit is None or said else unit, label)
+    since = said or (parse_unit(inner[-1]) if inner else None)
     if since and set(rest) - set(inner) and set(rest) <= {*inner, *_SINCE}:
-        return Meaning("t", "", since, tuple(w for w in rest if w not in inner))
+        return HeadingMeaning("t", "", since, tuple(w for w in rest if w not in inner))
     return None
 
 
 def bare_label(words: tuple[str, ...]) -> tuple[str, ...]:
-    """Words of a label that can tell one IMU from another."""
+    """Words of a label that distinguish one IMU from another."""
     return tuple(w for w in words if w not in _FILLERS)

@@ -15,15 +15,15 @@ ANGLES = {"roll": "x", "pitch": "y", "yaw": "z"}
 LETTERS = {"p": "x", "q": "y", "r": "z"}
 
 
-def with_axis_of(words: Sequence[str]) -> list[str]:
-    """Words of a name, with the axis in place of what it is called after.
+def with_axis_letter(words: Sequence[str]) -> list[str]:
+    """Words of a name with a rate's own name replaced by its axis.
 
-    >>> with_axis_of(["yawrate", "dps"]), with_axis_of(["gyro", "p"])
+    >>> with_axis_letter(["yawrate", "dps"]), with_axis_letter(["gyro", "p"])
     (['rate', 'z', 'dps'], ['gyro', 'x'])
-    >>> with_axis_of(["yaw"]), with_axis_of(["gyro", "yaw"])
+    >>> with_axis_letter(["yaw"]), with_axis_letter(["gyro", "yaw"])
     (['yaw'], ['gyro', 'yaw'])
     """
-    parted = [part for word in words for part in _parted(word)]
+    parted = [part for word in words for part in _split_name(word)]
     axes = LETTERS | (ANGLES if "rate" in parted else {})
     named = [word for word in parted if word in axes]
     if len(named) != 1 or not {*parted} & {*RATES}:
@@ -31,6 +31,6 @@ def with_axis_of(words: Sequence[str]) -> list[str]:
     return [axes.get(word, word) for word in parted]
 
 
-def _parted(word: str) -> list[str]:
+def _split_name(word: str) -> list[str]:
     axis = word.removesuffix("rate")
     return ["rate", axis] if word != axis and axis in ANGLES else [word]

@@ -23,7 +23,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import gains
+from fieldcal.model.evidence.gram import evidence_gains
 
 DENSITY = np.log(priors.density())
 
@@ -174,7 +174,7 @@ class Sessions:
         """What a further member adds to a set's score with its sizes as they are."""
         if not base.members:
             blocks = self._blocks(member)
-            gain = gains(*blocks, _own(blocks[0])).sum(axis=0)
+            gain = evidence_gains(*blocks, _own(blocks[0])).sum(axis=0)
             return float(np.logaddexp.reduce(gain + DENSITY))
         every = [*base.members, member]
         inner, pull, places = self._together(every)
@@ -245,7 +245,7 @@ def _gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array:
     left = inner[last, first] * wide
     own = inner[last, last]
     less = own - left @ solved[:, :-1]
-    gain: Array = gains(less, pull[last] - left @ solved[:, -1], _own(own))
+    gain: Array = evidence_gains(less, pull[last] - left @ solved[:, -1], _own(own))
     return gain
 
 

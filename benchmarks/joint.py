@@ -11,7 +11,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import Tilt
 from fieldcal.core.positions import FIVE, TWO, WIDE, Position
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import parameters, predicted
+from fieldcal.model.causes.planned import parameters, predict_outputs
 from fieldcal.planning.planner import Ladder, best_positions
 from fieldcal.solve import Observations
 from fieldcal.solve import solve as estimate
@@ -40,7 +40,7 @@ class Model:
     def means(self, places: tuple[Position, ...]) -> tuple[Array, Array]:
         """Means without noise, and their derivatives."""
         names = parameters(*([] if self.tilt == "none" else [self.tilt]))
-        return predicted(names, self.truth, places, G)
+        return predict_outputs(names, self.truth, places, G)
 
 
 OFFSET = Model("angle_offset")

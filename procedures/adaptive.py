@@ -116,7 +116,7 @@ def _worth(
     if explanation is None or not places:
         return None, places
     angle = float(np.deg2rad(angle_setting(about)))
-    likely = explanation.posterior.at_points
+    likely = explanation.posterior.weights_on_grid
     gain = ExpectedGain(
         explanation.rows, explanation.inferred, likely, _allowed(so_far), angle
     )

@@ -15,7 +15,7 @@ from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 
@@ -30,9 +30,9 @@ class Columns:
     """What of a dictionary a Gram matrix asks for."""
 
     width: int
-    held: Index
-    common: Array
-    free: NDArray[np.bool_]
+    window_positions: Index
+    window_error: Array
+    unoriented: NDArray[np.bool_]
     small_rotation: int
     known: KnownRows | None = None
 
@@ -75,7 +75,7 @@ def case(
         sd = rng.uniform(0.5, 2.0, len(window))
         off = rng.standard_normal(len(window)) * 2
         linear.append(
-            Linear(
+            LinearRows(
                 c, np.flatnonzero(kept), window, 1 / sd, at,
                 design / sd[:, None], off / sd,
             )

@@ -17,7 +17,7 @@ from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
@@ -83,7 +83,7 @@ class Session:
     """
 
     dictionary: Dictionary
-    linear: tuple[Linear, ...]
+    linear: tuple[LinearRows, ...]
 
     @classmethod
     def of(
@@ -116,7 +116,7 @@ class Session:
             out[part.rows[:, None], part.channel, part.columns] = table
         return out
 
-    def recorded(self, off: Array) -> list[Linear]:
+    def recorded(self, off: Array) -> list[LinearRows]:
         """Rows of which y - h is (n, 6)."""
         return [
             replace(p, white=off[p.rows, p.channel] * p.weight) for p in self.linear
@@ -153,7 +153,7 @@ def _narrowed(whole: Dictionary, causes: Sequence[Cause], kept: Index) -> Dictio
     return out
 
 
-def _only(part: Linear, kept: Index) -> Linear:
+def _only(part: LinearRows, kept: Index) -> LinearRows:
     there = np.isin(part.columns, kept)
     columns = np.searchsorted(kept, part.columns[there])
     return replace(part, columns=columns, design=part.design[:, there])

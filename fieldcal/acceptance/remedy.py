@@ -27,7 +27,7 @@ from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import Position, forces, ladder
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import design, parameters
+from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
@@ -246,7 +246,7 @@ def _expected_sigma(
     left = {name: size for name, size in known.factory.by_effect.items() if size}
     more = [name for name in parameters(*left) if name not in names]
     every = [*names, *more]
-    j = design(every, positions, about.gravity, about.mounting)
+    j = design_matrix(every, positions, about.gravity, about.mounting)
     t = np.stack(
         [_force_slopes(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))],
         axis=2,

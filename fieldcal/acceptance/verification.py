@@ -21,7 +21,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.causes.planned import parameters, predicted
+from fieldcal.model.causes.planned import parameters, predict_outputs
 from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.windows import Average
@@ -89,7 +89,7 @@ def verify(
 
     """
     names, x, covariance = _parameters(calibration, about)
-    u, j = predicted(names, x, [position], about.gravity, about.mounting)
+    u, j = predict_outputs(names, x, [position], about.gravity, about.mounting)
     residual = average.mean[ACC] - u[0]
     n = about.mounting.T @ forces([position], 1.0)[0]
     setting = (angle_sigma * about.gravity) ** 2 * (np.eye(3) - np.outer(n, n))

@@ -27,7 +27,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.reported import average_over_sizes
 from fieldcal.model.search.selection import Search
 from fieldcal.physics.effect import CHANCE, Motion, Scatter, Sensor
 
@@ -99,8 +99,10 @@ def _with_causes(there: WidenedSet, keys: Sequence[str]) -> WidenedSet:
     """A session with some of its causes only, and its estimates with these."""
     some = tuple(m for m in there.set.members if m[0].key in keys)
     kept = tuple(map(with_all_parameters, some))
-    found = there.search.evaluated(kept, Search.sizes_of(there.set, some))
-    return replace(there, set=found, reported_set=reported(there.search, found))
+    found = there.search.evaluate(kept, Search.sizes_of(there.set, some))
+    return replace(
+        there, set=found, reported_set=average_over_sizes(there.search, found)
+    )
 
 
 def differences(found: DecidedCauses) -> Iterator[Difference]:
@@ -210,7 +212,7 @@ def _determined_parameters(
         for p, v, s, b in zip(params, values, sigma, before, strict=True)
         if s**2 < thresholds.DETERMINED * b**2
     }
-    if there.inference.dictionary.free.all():
+    if there.inference.dictionary.unoriented.all():
         out = found_effects.merge_turned_parameters(
             group, values, covariance, before, out
         )
@@ -228,11 +230,11 @@ def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
             there.set, d, group, _size_of(there, member)
         )
     values, covariance = there.estimate(group.columns)
-    before = group.sizes(_size_of(there, member))
+    before = group.prior_sigma(_size_of(there, member))
     out = _determined_parameters(there, group, values, covariance, before)
     for shape in group.effect.shapes:
         at = group.shape[shape.name]
-        unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None
+        unsure = min(group.shape_sigma, at) if np.isfinite(group.shape_sigma) else None
         out[shape.name] = Quantity(float(at), unsure, shape.unit)
     return out
 
@@ -244,7 +246,7 @@ def _size_of(there: WidenedSet, member: Member) -> float:
 
 def _aliases(source: DiagnosedRecording, name: str) -> tuple[str, ...]:
     """Aliases of an effect in its own session."""
-    stands = source.explanation.posterior.instead.get(name, {})
+    stands = source.explanation.posterior.alternatives.get(name, {})
     return tuple(n for n in stands if n in catalogue())
 
 

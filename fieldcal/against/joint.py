@@ -38,8 +38,8 @@ import numpy as np
 
 from fieldcal.core.chances import of_odds
 from fieldcal.core.samples import Array
-from fieldcal.model.evidence.gram import gains
-from fieldcal.model.evidence.sizing import DENSITY
+from fieldcal.model.evidence.gram import evidence_gains
+from fieldcal.model.evidence.sizing import LOG_DENSITY
 
 Relation = Literal["real", "simulator", "same", "other", "neither"]
 
@@ -71,7 +71,7 @@ class EffectInformation:
     @property
     def gain(self) -> Array:
         """Ln evidence at each size v, shifted to agree with `evidence`."""
-        return gains(self.inner, self.pull, self.largest_diagonal) + self.shift
+        return evidence_gains(self.inner, self.pull, self.largest_diagonal) + self.shift
 
     @property
     def shift(self) -> float:
@@ -79,7 +79,7 @@ class EffectInformation:
         if self.evidence is None:
             return 0.0
         return self.evidence - _over_sizes(
-            gains(self.inner, self.pull, self.largest_diagonal)
+            evidence_gains(self.inner, self.pull, self.largest_diagonal)
         )
 
     @property
@@ -89,7 +89,7 @@ class EffectInformation:
 
 
 def _over_sizes(gain: Array) -> float:
-    return float(np.logaddexp.reduce(gain + DENSITY))
+    return float(np.logaddexp.reduce(gain + LOG_DENSITY))
 
 
 def relation_probabilities(
@@ -131,7 +131,7 @@ def evidence_of_same(real: EffectInformation, sim: EffectInformation) -> float:
     """Ln evidence of one and the same effect in both sessions (3)."""
     if real.inner.shape != sim.inner.shape:
         return -np.inf
-    there = gains(
+    there = evidence_gains(
         real.inner + sim.inner,
         real.pull + sim.pull,
         real.largest_diagonal + sim.largest_diagonal,
@@ -152,7 +152,9 @@ def evidence_of_proportional(
         return None
     along = course / size
     inner, pull = along @ other.inner @ along, along @ other.pull
-    times = gains(np.array([[inner]]), np.array([pull]), other.largest_diagonal)
+    times = evidence_gains(
+        np.array([[inner]]), np.array([pull]), other.largest_diagonal
+    )
     return _over_sizes(known.gain) + _over_sizes(times) + other.shift
 
 

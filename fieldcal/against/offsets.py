@@ -22,7 +22,7 @@ from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.posterior.mixture import covariance_of_means
-from fieldcal.model.posterior.model_average import of_columns
+from fieldcal.model.posterior.model_average import average_of_columns
 
 DETERMINED = {"acc_bias": 1.0, "acc_scale": 0.1, "gyr_bias": 0.1, "gyr_scale": 0.1}
 """Sigma from which a difference counts as not determined, m/s^2, rad/s, 1."""
@@ -130,7 +130,7 @@ def scatter_between_sets(explanation: Explanation, name: str, axes: Index) -> Ar
     sets = explanation.model_average.sets
     weight = np.array([w for _, w in sets])
     weight /= weight.sum()
-    means = np.array([of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
+    means = np.array([average_of_columns([(s, 1.0)], columns)[0] for s, _ in sets])
     return covariance_of_means(means, weight)
 
 
@@ -141,7 +141,7 @@ def bias_wander(there: WidenedSet, axes: Index) -> Array:
     mean of a random walk.
     """
     size = np.array(there.set.sizes.instability)[axes]
-    square = (priors.SIZES[size] * there.search.unstable[axes]) ** 2
+    square = (priors.SIZES[size] * there.search.typical_instability[axes]) ** 2
     length = float(np.ptp(there.inference.dictionary.x.t))
     for member in there.set.members:
         for name, q in cause_quantities(there, member).items():
@@ -204,7 +204,7 @@ def _mismatch_everywhere(
     """The mismatch of a difference that applies to the whole recording."""
     explanation = found.pairing.real.explanation
     about, span = explanation.prepared.source.about, explanation.rows.span
-    held = explanation.dictionary.held.tolist()
+    held = explanation.dictionary.window_positions.tolist()
     return Mismatch(
         channel=channel,
         kind="position",

@@ -61,7 +61,7 @@ class CausePairing:
         names = {c.name for c, _ in own}
         kept, taken = list(own), list[Member]()
         for name in list(names):
-            stands = explanation.posterior.instead.get(name, {})
+            stands = explanation.posterior.alternatives.get(name, {})
             for alias in stands:
                 theirs = [m for m in other if m[0].name == alias]
                 if alias in names or not theirs or name in {c.name for c, _ in other}:

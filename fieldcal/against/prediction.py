@@ -27,8 +27,8 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.system.fitted import Fitted, whole
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.fitted import FittedSet, estimates_by_column
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 
 
@@ -38,9 +38,9 @@ def predict_as_simulated(found: DecidedCauses) -> SimulatorPrediction:
     rows = found.pairing.real.explanation.rows
     columns, values, covariance = _simulator_values(found)
     linear = [p for p in real.linear if p.channel in found.sim.observed]
-    fitted = Fitted(rows, real.inference.dictionary, linear, real.values, real.set)
+    fitted = FittedSet(rows, real.inference.dictionary, linear, real.values, real.set)
     state = replace(real.set.state, columns=columns, estimate=values)
-    residual = fitted.residual(whole(state, real.inference.dictionary))
+    residual = fitted.residual(estimates_by_column(state, real.inference.dictionary))
     squares = _squares(real, linear, columns, values, covariance)
     return _prediction(rows, residual, squares, sum(len(p.white) for p in linear))
 
@@ -101,17 +101,21 @@ def _simulator_values(found: DecidedCauses) -> tuple[Index, Array, Array]:
 
 def _squares(
     real: WidenedSet,
-    linear: Sequence[Linear],
+    linear: Sequence[LinearRows],
     columns: Index,
     values: Array,
     covariance: Array,
 ) -> float:
     """Chi squared (1) of the predicted windows."""
     d = real.inference.dictionary
-    some = np.flatnonzero(real.inference.wanted(real.set.members) | (real.values != 0))
+    some = np.flatnonzero(
+        real.inference.wanted_columns(real.set.members) | (real.values != 0)
+    )
     rows = gram(linear, d, real.values, (), some)
-    tau = priors.SIZES[list(real.set.sizes.instability)] * real.search.unstable
-    weighed = rows.weighed(tau)
+    tau = (
+        priors.SIZES[list(real.set.sizes.instability)] * real.search.typical_instability
+    )
+    weighed = rows.with_instability(tau)
     inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)
     left = weighed.square - 2 * values @ pull + values @ inner @ values
     return chi2_of_uncertain_prediction(

@@ -19,7 +19,7 @@ from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.diagnosis.verdict import make_diagnosis
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import short_lag_noise
@@ -105,7 +105,7 @@ def _from_one_temperature(
     prepared: PreparedRecording, other: PreparedRecording
 ) -> PreparedRecording:
     """The recording with biases at the temperature at which the other one starts."""
-    warmth, start = prepared.source.warmth, other.source.warmth.start_c
+    warmth, start = prepared.source.thermometer, other.source.thermometer.start_c
     ahead = warmth.start_c - start
     if not np.isfinite(ahead):
         return prepared
@@ -113,7 +113,7 @@ def _from_one_temperature(
     rows = prepared.rows
     warmer = replace(rows, x=replace(rows.x, warming=rows.x.warming + ahead))
     return replace(
-        prepared, source=replace(prepared.source, warmth=warmth), rows=warmer
+        prepared, source=replace(prepared.source, thermometer=warmth), rows=warmer
     )
 
 
@@ -124,7 +124,7 @@ def sample_noise(block: Block, about: Description) -> tuple[Array, Array]:
     more, it is their scatter.
     """
     levels, counts = [], []
-    for first, last in spans(block, about):
+    for first, last in window_bounds(block, about):
         piece = block[slice(int(first), int(last))].six
         if len(piece) > 1:
             levels.append(short_lag_noise(piece))

@@ -18,11 +18,11 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import EVEN, Member, Sizes
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
+from fieldcal.model.posterior.reported import average_over_sizes
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class WidenedSet:
     search: Search
     set: Set
     reported_set: Set
-    linear: Sequence[Linear]
+    linear: Sequence[LinearRows]
     values: Array
 
     @property
@@ -64,17 +64,17 @@ class WidenedSet:
         state = self.set.state
         kept = np.ones(len(state.columns), dtype=bool)
         kept[_column_indices(state.columns, columns)] = False
-        less = Eliminated.of(state.rows, state.columns[kept], state.sizes[kept])
-        inner, pull = less.rest(columns, typical)
+        less = Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
+        inner, pull = less.schur_complement(columns, typical)
         own = np.diag(state.rows.matrix(columns, columns)) * typical**2
         return EffectInformation(inner, pull, float(own.max()), self.evidence(key))
 
     def evidence(self, key: str) -> float:
         """Rise of ln Z with a cause, without its prior probability."""
         rest = tuple(m for m in self.set.members if m[0].key != key)
-        less = self.search.evaluated(rest, Search.sizes_of(self.set, rest))
-        found = self.set.score - self.search.chance(self.set.members)
-        return float(found - less.score + self.search.chance(rest))
+        less = self.search.evaluate(rest, Search.sizes_of(self.set, rest))
+        found = self.set.score - self.search.log_chance(self.set.members)
+        return float(found - less.score + self.search.log_chance(rest))
 
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""
@@ -106,18 +106,22 @@ def widen_set(
 
     """
     found = explanation.inferred
-    own = Inference(found.inference.system.apart(), found.inference.nominal)
-    own.turned = list(found.turned)
+    own = Inference(found.inference.system.independent_copy(), found.inference.nominal)
+    own.turn_rows = list(found.turn_rows)
     every = list(members)
     for cause, group in others:
         if (more := _counterpart(own, cause, group, later)) is not None:
             every.append(more)
     values = np.pad(found.values, (0, own.dictionary.width - len(found.values)))
-    wanted = own.wanted([*every, *map(with_all_parameters, every)]) | (values != 0)
+    wanted = own.wanted_columns([*every, *map(with_all_parameters, every)]) | (
+        values != 0
+    )
     linear = own.system.linearised(found.state, wanted)
     search = Search(own.dictionary, own.gram_of(linear, values, wanted))
-    there = search.evaluated(tuple(every), _starting_sizes(found.best, every))
-    return WidenedSet(own, search, there, reported(search, there), linear, values)
+    there = search.evaluate(tuple(every), _starting_sizes(found.best, every))
+    return WidenedSet(
+        own, search, there, average_over_sizes(search, there), linear, values
+    )
 
 
 def with_all_parameters(member: Member) -> Member:
@@ -127,7 +131,7 @@ def with_all_parameters(member: Member) -> Member:
     and scale factor on some axes, it was found on the others alone.
     """
     cause, group = member
-    same = [*group.siblings(cause.variants), group]
+    same = [*group.with_same_shape(cause.variants), group]
     if group.effect is None:
         return member
     return cause, max(same, key=lambda v: len(v.params))
@@ -136,7 +140,7 @@ def with_all_parameters(member: Member) -> Member:
 def _starting_sizes(best: Set, every: Sequence[Member]) -> Sizes:
     """Initial sizes: those of the best set where it has the cause."""
     known = {m[0].key: s for m, s in zip(best.members, best.sizes.members, strict=True)}
-    sizes = tuple(known.get(c.key, EVEN) for c, _ in every)
+    sizes = tuple(known.get(c.key, UNIT_INDEX) for c, _ in every)
     return Sizes(best.sizes.calibration, best.sizes.instability, sizes)
 
 
@@ -158,6 +162,8 @@ def _counterpart(
     near = min(
         alike, key=lambda v: (v.origin != group.origin, abs(v.shape[shape.name] - at))
     )
-    here, (exact,) = own.dictionary.refined(here, near, [at])
-    own.turned = [t.copied(near.columns, exact.columns) for t in own.turned]
+    here, (exact,) = own.dictionary.add_shape_values(here, near, [at])
+    own.turn_rows = [
+        t.with_copied_columns(near.columns, exact.columns) for t in own.turn_rows
+    ]
     return here, exact

@@ -24,25 +24,29 @@ from fieldcal.model.causes.sinking import NAME as SINKING
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.held_out import HeldOut, in_question, turns_held_out
+from fieldcal.model.posterior.held_out import (
+    HeldOut,
+    candidate_sets,
+    held_out_turn_residuals,
+)
 from fieldcal.model.posterior.model_average import ModelAverage
-from fieldcal.model.posterior.on_the_way import remaining
-from fieldcal.model.posterior.probabilities import Posterior, Standing
-from fieldcal.model.posterior.reported import reported
-from fieldcal.model.posterior.time_constants import elsewhere
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.posterior.on_the_way import way_information
+from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
+from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.change_points import change_points
 from fieldcal.model.rows.interruptions import interruptions
-from fieldcal.model.rows.noise import grain_of
+from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource
-from fieldcal.model.rows.rest_onset import beginnings
-from fieldcal.model.search.inference import OWN_SIGMA, Inference, Inferred
+from fieldcal.model.rows.rest_onset import window_starts
+from fieldcal.model.search.inference import OWN_SIGMA, Inference, InferenceResult
 from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.turn_rows import Turns
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.model.turns.turn import Turn, Turning
+from fieldcal.model.turns.turn import Turn, TurnTracker
 from fieldcal.session.description import Description
 
 MOST_RESUMPTIONS = 2
@@ -64,9 +68,9 @@ class Explanation:
     """
 
     prepared: PreparedRecording
-    inferred: Inferred
-    best: Fitted
-    calibration_only: Fitted
+    inferred: InferenceResult
+    best: FittedSet
+    calibration_only: FittedSet
     posterior: Posterior
 
     @property
@@ -88,7 +92,7 @@ class Explanation:
     def rival_sets(self) -> list[Set]:
         """Sets that may become the best when a position is held out."""
         visited = list(self.inferred.search.visited.values())
-        return in_question(self.best.set, visited)
+        return candidate_sets(self.best.set, visited)
 
     @cached_property
     def held_out(self) -> HeldOut:
@@ -98,7 +102,7 @@ class Explanation:
     @cached_property
     def model_average(self) -> ModelAverage:
         """Values averaged over all sets with a noticeable weight."""
-        around = elsewhere(self.inferred)
+        around = sets_at_other_time_constants(self.inferred)
         return ModelAverage(self.posterior, around or [self.best.set])
 
     @cached_property
@@ -107,22 +111,22 @@ class Explanation:
         group = self.dictionary.filters
         if group is None:
             return None
-        return remaining(self.best.set, self.inferred.turned, group.columns)
+        return way_information(self.best.set, self.inferred.turn_rows, group.columns)
 
     @cached_property
     def turns(self) -> list[Turn]:
         """The turns, integrated with the best set."""
-        return self.inferred.inference.turns_by(self.state)
+        return self.inferred.inference.turns_at(self.state)
 
     @cached_property
     def turns_held_out(self) -> Array:
         """Whitened residuals of the turns, each predicted without itself."""
-        return turns_held_out(self.best, self.inferred.turned)
+        return held_out_turn_residuals(self.best, self.inferred.turn_rows)
 
     @cached_property
-    def probable_causes(self) -> tuple[Standing, ...]:
+    def probable_causes(self) -> tuple[ProbableCause, ...]:
         """Causes with a probability above one half."""
-        return tuple(self.posterior.standing())
+        return tuple(self.posterior.probable_causes())
 
     @cached_property
     def untracked_turns(self) -> tuple[tuple[int, int], ...]:
@@ -130,8 +134,10 @@ class Explanation:
         share: dict[tuple[int, ...], float] = {}
         for some, p in self.posterior.weights:
             for cause, group in some.members:
-                if cause.kind == "noise" and group.together:
-                    share[group.together] = share.get(group.together, 0.0) + p
+                if cause.kind == "noise" and group.moved_positions:
+                    share[group.moved_positions] = (
+                        share.get(group.moved_positions, 0.0) + p
+                    )
         return tuple((pair[0], pair[1]) for pair, p in sorted(share.items())
                      if p >= thresholds.NAMED)  # fmt: skip
 
@@ -143,7 +149,10 @@ class Explanation:
     @property
     def undecided(self) -> bool:
         """Whether an effect is probably present, but no single cause is likely."""
-        return not self.probable_causes and self.posterior.nothing < thresholds.NAMED
+        return (
+            not self.probable_causes
+            and self.posterior.probability_of_noise_alone < thresholds.NAMED
+        )
 
     @cached_property
     def earth_rate_evidence(self) -> float:
@@ -157,7 +166,7 @@ class Explanation:
             return 0.0
         found = self.best.set.state
         kept = ~np.isin(found.columns, columns)
-        less = type(found).of(found.rows, found.columns[kept], found.sizes[kept])
+        less = type(found).of(found.rows, found.columns[kept], found.prior_sigma[kept])
         return found.score - less.score
 
     @property
@@ -171,7 +180,11 @@ class Explanation:
         rows, d = self.rows, self.dictionary
         if not self.shows_earth_rate:
             return False
-        samples = rows.length.sum() / len(d.held) * rate_of(self.prepared.source.block)
+        samples = (
+            rows.length.sum()
+            / len(d.window_positions)
+            * rate_of(self.prepared.source.block)
+        )
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > thresholds.SEES_EARTH)
 
@@ -187,23 +200,23 @@ def explain(
     found = inference.run(None if before is None else _starting_causes(before))
     posterior = _calculate_posterior(found)
     for _ in range(MOST_RESUMPTIONS):
-        better, now = found.search.highest, found.best
+        better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
         if better.score <= now.score + (
             OWN_SIGMA if better.keys == now.keys else SETTLED
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of
-        found = found.inference.resumed(better, found)
+        found = found.inference.resume(better, found)
         posterior = _calculate_posterior(found)
     inference = found.inference
     windows = inference.system.linearised(found.state)
-    best = Fitted(
+    best = FittedSet(
         prepared.rows,
         inference.dictionary,
         windows,
         found.values,
-        reported(found.search, found.best),
+        average_over_sizes(found.search, found.best),
     )
     enlarge_to_shown_grade(inference.dictionary, best.set, prepared.source.about)
     return Explanation(
@@ -211,10 +224,12 @@ def explain(
     )
 
 
-def _calculate_posterior(found: Inferred) -> Posterior:
+def _calculate_posterior(found: InferenceResult) -> Posterior:
     """Probabilities of the causes found, and of their aliases."""
     return Posterior(
-        found.search, found.best, lambda there: found.inference.beside(found, there)
+        found.search,
+        found.best,
+        lambda there: found.inference.refine_beside(found, there),
     )
 
 
@@ -240,21 +255,21 @@ def build_inference(
     swayed = any(t.effect.kind == "motion" for t in prepared.spectral_lines)
     turned = bool(about.positions) and not swayed  # a base that rocks turns it as well
     held = np.unique(rows.x.position)
-    common = np.array([rows.common[rows.x.position == p][0] for p in held])
+    common = np.array([rows.window_error[rows.x.position == p][0] for p in held])
     nominal = nominal_state(about, int(rows.x.position.max()) + 1, prepared)
     unit = np.abs(nominal.scale)
     dictionary = Dictionary(
         rows.x, rows.used, times_since_turn(source, rows), common, unit, turned,
-        Wander.of(rows, unit), rows.alike,
+        Wander.of(rows, unit), rows.session_error,
     )  # fmt: skip
     dictionary.unfitted = tuple(factory_error_groups(dictionary, about, prepared))
-    dictionary.tried_at(change_points(rows).tolist())
-    dictionary.expected_within(interruptions(source.block, about))
-    grain = grain_of(source.block, spans(source.block, about))
+    dictionary.add_instants(change_points(rows).tolist())
+    dictionary.expect_within(interruptions(source.block, about))
+    grain = rounding_noise(source.block, window_bounds(source.block, about))
     rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
     # swaying is removed from windows and closures, but not from samples within turns
     rough |= "sway" in prepared.checked.ids
-    turning = Turning(source, rows, dictionary.since)
+    turning = TurnTracker(source, rows, dictionary.since)
     turns = Turns(turning, dictionary, not rough) if turned else None
     return Inference(WindowSystem(rows, dictionary), nominal, turns)
 
@@ -280,10 +295,10 @@ def times_since_turn(source: RowSource, rows: Rows) -> Array:
     before each window: the usual time is the better guess where the end is hard to see.
     Each is given with and without a turn before the first window.
     """
-    x, arrived = rows.x, source.arrived
+    x, arrived = rows.x, source.rest_began
     if not source.about.positions:
         return np.full((1, len(x)), np.inf)
-    starts = beginnings(source)
+    starts = window_starts(source)
     lead = (starts - arrived)[np.isfinite(arrived)]
     usual = starts - (float(np.median(lead)) if len(lead) else 0.0)
     first = np.arange(len(starts)) == x.position.min()
@@ -295,13 +310,13 @@ def times_since_turn(source: RowSource, rows: Rows) -> Array:
     return np.array([x.t - at[x.position] for at in instants])
 
 
-def fit_calibration_only(whole: Inference, rows: Rows) -> Fitted:
+def fit_calibration_only(whole: Inference, rows: Rows) -> FittedSet:
     """Fit bias and scale factor alone to the windows."""
-    d = whole.dictionary.plain()
+    d = whole.dictionary.calibration_only()
     inference = Inference(WindowSystem(rows, d), whole.nominal)
     start: Array = np.zeros(d.width)
-    state, values, _ = inference.settled(inference.nominal, start, ())
-    wanted = inference.wanted(())
+    state, values, _ = inference.settle(inference.nominal, start, ())
+    wanted = inference.wanted_columns(())
     linear = inference.system.linearised(state, wanted)
-    found = Search(d, inference.gram_of(linear, values, wanted)).evaluated(())
-    return Fitted(rows, d, linear, values, found)
+    found = Search(d, inference.gram_of(linear, values, wanted)).evaluate(())
+    return FittedSet(rows, d, linear, values, found)

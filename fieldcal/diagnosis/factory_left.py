@@ -18,10 +18,10 @@ from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import factory_sizes, of_factory
+from fieldcal.model.causes.effect_causes import factory_groups, factory_sizes
 from fieldcal.model.evidence.of_two_grades import chances_of_coarser
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.model_average import with_groups
+from fieldcal.model.posterior.model_average import eliminate_with_groups
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 
@@ -35,7 +35,7 @@ def factory_error_groups(
     """
     known = {term.effect.id for term in prepared.known} | {*WARMING}
     turned = not dictionary.x.oriented.any()
-    for one in of_factory(dictionary, factory_errors(about), turned):
+    for one in factory_groups(dictionary, factory_errors(about), turned):
         if one.part not in known:
             yield one
 
@@ -61,7 +61,7 @@ def enlarge_to_shown_grade(
         return
     stated, coarser = (factory_errors(about, grade) for grade in (None, shows.grade))
     larger = _groups_with_sizes(dictionary, stated, coarser)
-    beside = with_groups(best, larger)
+    beside = eliminate_with_groups(best, larger)
     sizes = {}
     for kind, p in chances_of_coarser(beside, larger, coarser, stated).items():
         each = getattr(stated, kind), getattr(coarser, kind)

@@ -20,12 +20,12 @@ from fieldcal.diagnosis.signal.spectrum import find_lines, subtract_lines
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import spans
-from fieldcal.model.rows.hand_tremor import rows_of
+from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.hand_tremor import rows_of_recording
 from fieldcal.model.rows.means import rows_of_means
 from fieldcal.model.rows.reduce import Rows, RowSource
-from fieldcal.model.rows.rest_onset import arrivals
-from fieldcal.model.rows.swaying import Swaying, swaying
+from fieldcal.model.rows.rest_onset import rest_instants
+from fieldcal.model.rows.swaying import BaseSway, find_base_sway
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import Term
 from fieldcal.physics.effect import Chain, Line, Scatter
@@ -83,16 +83,17 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
     known = known_terms(about.model)
     checked = check_chain(block, about)
     about = about.with_angles_times(checked.angle_factor)
-    sways = swaying(masked(checked.block, checked.usable), about)
+    sways = find_base_sway(masked(checked.block, checked.usable), about)
     if sways is not None:
         checked = _without_sway(checked, sways, about)
-    rest = arrivals(checked.block, about, checked.noise)
+    rest = rest_instants(checked.block, about, checked.noise)
     warmth = Thermometer.of(checked.block)
     source = RowSource(
         checked.block, about, checked.usable, rest, warmth, checked.clock_pace,
-        *(() if sways is None else (sways.left, sways.white, sways.gravity)),
+        *(() if sways is None else
+          (sways.excess_variance, sways.white, sways.gravity_sigma)),
     )  # fmt: skip
-    rows = rows_of(source)
+    rows = rows_of_recording(source)
     _refuse_turning(rows, about)
     lines = find_lines(source, rows)
     found = tuple(tone for tone, _ in lines)
@@ -101,7 +102,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
         source = replace(
             source, block=subtract_lines(source.block, source, rows, found)
         )
-        rows = _with_vibration(rows_of(source), rows)
+        rows = _with_vibration(rows_of_recording(source), rows)
         checked = recheck_without_lines(checked, source.block, about)
     if not rows.used.any():
         raise InputError(
@@ -114,7 +115,7 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
 
 
 def _without_sway(
-    checked: CheckedRecording, sways: Swaying, about: Description
+    checked: CheckedRecording, sways: BaseSway, about: Description
 ) -> CheckedRecording:
     """Subtract the swaying of the base; the effect "sway" is added to the faults."""
     size, spread = np.rad2deg(sways.amplitude), np.rad2deg(sways.spread[0])
@@ -123,7 +124,7 @@ def _without_sway(
         values={
             "amplitude_deg": float(size),
             "hz": sways.hz,
-            "needed_s": sways.seconds,
+            "needed_s": sways.needed_seconds,
         },
         sigmas={"amplitude_deg": float(spread), "hz": sways.spread[1]},
         from_s=float(checked.block.t[0]),
@@ -184,7 +185,7 @@ def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
 
 
 def _refuse_empty(block: Block, about: Description) -> None:
-    windows = spans(block, about)
+    windows = window_bounds(block, about)
     if not (windows[:, 1] - windows[:, 0] >= SHORTEST).any():
         held = len(about.positions)
         raise InputError(

@@ -47,8 +47,8 @@ from fieldcal.diagnosis.wording.lines import by_impact, effect_lines
 from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
-from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.posterior.probabilities import ProbableCause
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.session.description import Description
 
 
@@ -131,7 +131,7 @@ def _quality(
         and not of_samples
         and all(map(found_effects.shows_mainly_in_turns, lost.values()))
     ):
-        if explanation.inferred.turned:
+        if explanation.inferred.turn_rows:
             return *turn_quality(explanation), TURN_UNIT
     triad = most_different_triad(first, then)
     return first.quality(triad), then.quality(triad), UNITS[triad]
@@ -207,10 +207,10 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
     Turns during which faults of samples were found are left out.
     """
     source, faults = explanation.prepared.source, explanation.prepared.checked.faults
-    t, windows = source.block.t, spans(source.block, source.about)
+    t, windows = source.block.t, window_bounds(source.block, source.about)
     wrong = [f for _, f in faults if {f.channel, *f.channels} & {"t", *CHANNELS[GYR]}]
     out = []
-    for p, q in explanation.inferred.contradicted:
+    for p, q in explanation.inferred.contradicted_turns:
         leaves, arrives = t[windows[p, 1] - 1], t[windows[q, 0]]
         if not any(f.from_s <= arrives and f.to_s >= leaves for f in wrong):
             before, behind = source.about.numbered((p, q))
@@ -218,7 +218,7 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
     return out
 
 
-def _is_open(explanation: Explanation, one: Standing) -> bool:
+def _is_open(explanation: Explanation, one: ProbableCause) -> bool:
     """Whether an alias, or bias and scale factor, may explain what a cause does."""
     if one.name in catalogue() and catalogue()[one.name].like_calibration:
         return True
@@ -234,14 +234,14 @@ def _probability(explanation: Explanation, verdict: Verdict) -> float:
     """
     posterior = explanation.posterior
     if verdict == "consistent":
-        return posterior.nothing
+        return posterior.probability_of_noise_alone
     if verdict == "ambiguous" and explanation.undecided:
-        return 1 - posterior.nothing
+        return 1 - posterior.probability_of_noise_alone
     wanted = [{one.name, *one.aliases} for one in explanation.probable_causes]
     return sum(
         w
         for s, w in posterior.weights
-        if all(some & set(posterior.names(s)) for some in wanted)
+        if all(some & set(posterior.cause_names(s)) for some in wanted)
     )
 
 
@@ -252,7 +252,7 @@ def _all_mismatches(
     strange: Sequence[UnknownMismatch],
 ) -> list[Mismatch]:
     prepared = explanation.prepared
-    windows = spans(block, prepared.source.about)
+    windows = window_bounds(block, prepared.source.about)
     out = list(mismatches.of_faults(block.t, windows, prepared.checked.faults))
     out += mismatches.of_tones(explanation)
     for one in explanation.probable_causes:
@@ -304,16 +304,16 @@ def _degrees_of_freedom(explanation: Explanation, first: int) -> int:
     part = slice(first, first + 3)
     held = [
         rows.used[rows.x.position == p][:, part].any(axis=0).sum()
-        for p in explanation.dictionary.held
+        for p in explanation.dictionary.window_positions
     ]
-    free = explanation.dictionary.free
+    free = explanation.dictionary.unoriented
     turns = 2 * int(free.sum()) if first == 0 else 0
     reach = np.zeros(explanation.dictionary.width, dtype=bool)
     for one in explanation.best.linear:
         if first <= one.channel < first + 3:
             reach[one.columns] |= np.abs(one.design).max(axis=0) > 0
     for cause, group in explanation.best.set.members:
-        if not cause.told:  # noise is no parameter
+        if not cause.reportable:  # noise is no parameter
             reach[group.columns] = False
-    narrowed = np.diag(found.inverse) < thresholds.DETERMINED * found.sizes**2
+    narrowed = np.diag(found.inverse) < thresholds.DETERMINED * found.prior_sigma**2
     return int(sum(held) - turns - (reach[found.columns] & narrowed).sum())

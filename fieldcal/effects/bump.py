@@ -18,10 +18,10 @@ from fieldcal.physics.pushes import (
     LARGEST,
     MEAN,
     SHAKEN,
-    Usual,
-    disturbed,
+    UsualSpread,
+    disturbed_stretches,
     running_means,
-    usual,
+    usual_spread,
 )
 from fieldcal.physics.recording import CheckedSamples, Fault, medians
 from fieldcal.physics.shape import Shape
@@ -86,8 +86,8 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
         z[np.abs(z[:, c]) <= NEXT, c] = 0.0
     if recording.x.rate[p].any():
         z[:, :3] = 0.0  # the force goes round with the table
-    there = Usual.of(z, shortest)
-    for a, b in disturbed(z, shortest, there):
+    there = UsualSpread.of(z, shortest)
+    for a, b in disturbed_stretches(z, shortest, there):
         if b - a > LONGEST_S * rate:
             continue
         near = recording.six(first + max(a - around, 0), min(first + b + around, last))
@@ -155,7 +155,7 @@ def _medians_by_part(column: Array, parts: int) -> tuple[Array, Array]:
 
 
 def _has_steady_change(
-    near: Array, there: Usual, at: tuple[int, int], rate: float
+    near: Array, there: UsualSpread, at: tuple[int, int], rate: float
 ) -> bool:
     """Whether a jump or an exponential change explains the samples near a stretch.
 
@@ -174,9 +174,9 @@ def _has_steady_change(
             continue
         rest = near - course
         _flatten(rest, rate)
-        calm = (usual(rest) < SHAKEN * there.sample).all()
-        usually = there.at_least(np.delete(rest, beside, axis=0), shortest)
-        if calm and len(disturbed(rest, shortest, usually)) == 0:
+        calm = (usual_spread(rest) < SHAKEN * there.sample).all()
+        usually = there.no_less_than(np.delete(rest, beside, axis=0), shortest)
+        if calm and len(disturbed_stretches(rest, shortest, usually)) == 0:
             return True
     return False
 

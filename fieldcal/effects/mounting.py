@@ -34,7 +34,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.core.sampling import rate_of, unbroken
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns, signed_axes
+from fieldcal.physics.rate_axes import ObservedTurn, axes_by_turns, signed_axes
 from fieldcal.physics.recording import CheckedSamples, Fault
 
 BIAS, SCALE, FLOOR = 1.0, 0.1, 0.1
@@ -111,7 +111,7 @@ def _odds(measured: Array, f: Array) -> tuple[float, float]:
 
 def measured_turns(
     recording: CheckedSamples, held: Sequence[int], f: Array
-) -> list[SeenTurn]:
+) -> list[ObservedTurn]:
     """Turns between windows by number, where the force is f (n, 3).
 
     Those that are too small, or of which a part was not recorded, say nothing.
@@ -127,11 +127,11 @@ def measured_turns(
         rest = recording.mean(p)[3:]
         rate = (block.gyr[gap] - rest) / recording.scale[3:]
         middle = (rate[1:] + rate[:-1]) / 2
-        out.append(SeenTurn(one, two, middle * np.diff(block.t[gap])[:, None]))
+        out.append(ObservedTurn(one, two, middle * np.diff(block.t[gap])[:, None]))
     return out
 
 
-def rate_unit(turns: Sequence[SeenTurn]) -> str:
+def rate_unit(turns: Sequence[ObservedTurn]) -> str:
     """Unit of the gyroscopes, if it is not the declared one; empty if it is."""
     ratios = [
         float(np.linalg.norm(turn.angles, axis=1).sum())

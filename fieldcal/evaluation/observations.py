@@ -22,7 +22,7 @@ from fieldcal.evaluation.window_mean import (
     average_window,
     table_rate,
 )
-from fieldcal.model.rows.swaying import swaying
+from fieldcal.model.rows.swaying import find_base_sway
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
@@ -168,7 +168,7 @@ def _average_windows(
     """Averages by position number; sentences about omitted windows go to `said`."""
     about, grain = session.about, _rounding_grain(session)
     said += _range_warnings(session)
-    sways = swaying(block, about)
+    sways = find_base_sway(block, about)
     if sways is not None:
         block = sways.block
         said.append(sways.sentence)
@@ -187,7 +187,7 @@ def _average_windows(
             said.append(f"{_position_label(session, i)} is left out: {error}")
             continue
         if sways is not None:
-            more = np.diag(sways.left[i])
+            more = np.diag(sways.excess_variance[i])
             found = replace(found, covariance=found.covariance + more)
         taken[i] = found
         if remark:

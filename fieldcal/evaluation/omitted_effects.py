@@ -29,7 +29,7 @@ from fieldcal.diagnosis.wording.paragraph import angle_errors_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.physics.effect import Chain, Scatter
 from fieldcal.session.folder import Session
 
@@ -110,7 +110,7 @@ def wrong_angle_sentences(explanation: Explanation) -> list[str]:
         if s.kind == "position":
             cure = (
                 "mend it before the next recording"
-                if any(group.together for _, group in s.members)
+                if any(group.moved_positions for _, group in s.members)
                 else "set it again and repeat it, and this is known better"
             )
             out.append(
@@ -120,7 +120,7 @@ def wrong_angle_sentences(explanation: Explanation) -> list[str]:
     return out
 
 
-def _describe_wrong_angles(explanation: Explanation, standing: Standing) -> str:
+def _describe_wrong_angles(explanation: Explanation, standing: ProbableCause) -> str:
     """Wrong angles in words, with their positions and sizes."""
     errors = angle_errors(explanation, standing)
     return " and ".join(
@@ -131,7 +131,7 @@ def _describe_wrong_angles(explanation: Explanation, standing: Standing) -> str:
     )
 
 
-def _is_included(calibration: Calibration, standing: Standing) -> bool:
+def _is_included(calibration: Calibration, standing: ProbableCause) -> bool:
     """Whether a cause is in the calibration, is random, or is not an effect.
 
     A wrong angle is not an effect. The fit may attribute it to cross-coupling within
@@ -150,14 +150,14 @@ def _is_included(calibration: Calibration, standing: Standing) -> bool:
 
 
 def _shift_sigmas(
-    explanation: Explanation, out: Sequence[Standing]
+    explanation: Explanation, out: Sequence[ProbableCause]
 ) -> dict[str, float]:
     """Shift of each parameter by some causes, in sigmas, by full name."""
     names = {s.name for s in out}
     best = explanation.posterior.best
     kept = tuple(m for m in best.members if m[0].name not in names)
     search = explanation.posterior.search
-    less: Set = search.evaluated(kept, search.sizes_of(best, kept))
+    less: Set = search.evaluate(kept, search.sizes_of(best, kept))
     now, before = (calibration_of_set(explanation, one) for one in (best, less))
     return {
         name: float((now[name][0] - before[name][0]) / before[name][1])

@@ -13,8 +13,8 @@ import numpy as np
 
 from fieldcal.core.errors import Moved, SessionError
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.model.rows.orientation import readings
-from fieldcal.model.rows.turntable import going_round
+from fieldcal.model.rows.orientation import gyro_readings
+from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window, average
 
@@ -86,7 +86,9 @@ def table_rate(
     if part is None or not len(part):
         return np.zeros(3)
     at = np.full(len(part), row, dtype=np.intp)
-    found: Array = readings(about, at, part).rates(about.mounting)[0] @ about.mounting
+    found: Array = (
+        gyro_readings(about, at, part).rates(about.mounting)[0] @ about.mounting
+    )
     return found
 
 
@@ -107,7 +109,7 @@ def without_table_rotation(block: Block, rate: Array) -> tuple[Block, Array]:
         return blind, np.zeros((3, 3))
     noise = np.nanstd(np.diff(block.gyr, axis=0), axis=0) / np.sqrt(2)
     sd = np.broadcast_to(np.where(noise > 0, noise, np.nan), block.gyr.shape)
-    found = going_round(block.t, rate, block.gyr, sd, np.ones(3), 0.0)
+    found = fit_rotating_earth_rate(block.t, rate, block.gyr, sd, np.ones(3), 0.0)
     return replace(blind, gyr=block.gyr - found.values), found.covariance
 
 

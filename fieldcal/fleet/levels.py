@@ -24,7 +24,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import gains
+from fieldcal.model.evidence.gram import evidence_gains
 
 DENSITY = np.log(priors.density())
 """Logarithm of the prior density of each size."""
@@ -178,7 +178,7 @@ class PooledSessions:
         """Log evidence that a further effect adds to a set whose sizes are fixed."""
         if not base.effects:
             blocks = self._blocks(member)
-            gain = gains(*blocks, _largest_diagonal(blocks[0])).sum(axis=0)
+            gain = evidence_gains(*blocks, _largest_diagonal(blocks[0])).sum(axis=0)
             return float(np.logaddexp.reduce(gain + DENSITY))
         every = [*base.effects, member]
         inner, pull, places = self._combined_blocks(every)
@@ -256,7 +256,9 @@ def _evidence_gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array
     left = inner[last, first] * wide
     own = inner[last, last]
     less = own - left @ solved[:, :-1]
-    gain: Array = gains(less, pull[last] - left @ solved[:, -1], _largest_diagonal(own))
+    gain: Array = evidence_gains(
+        less, pull[last] - left @ solved[:, -1], _largest_diagonal(own)
+    )
     return gain
 
 

@@ -103,7 +103,7 @@ class ReducedSession:
 def reduce_session(explanation: Explanation) -> ReducedSession:
     """Reduce a session by its explanation, (1)."""
     search, best = explanation.posterior.search, explanation.inferred.best
-    wide, _ = search.opened(best)
+    wide, _ = search.with_typical_calibration(best)
     own = np.ones(len(wide), dtype=bool)
     first = len(wide) - sum(len(g.columns) for _, g in best.members)
     for cause, group in best.members:
@@ -122,7 +122,7 @@ def reduce_session(explanation: Explanation) -> ReducedSession:
     none = np.empty(0, dtype=np.intp)
     columns = np.concatenate([none, *(g.columns for _, _, g in groups)])
     typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
-    matrix, pull = less.rest(columns, typical)
+    matrix, pull = less.schur_complement(columns, typical)
     named = [c for cause, shape, g in groups for c in _shared_columns(cause, shape, g)]
     return ReducedSession(tuple(named), 0.5 * (matrix + matrix.T), pull)
 

@@ -1,7 +1,7 @@
-"""Every number that decides something, with why.
+"""Prior probabilities and typical sizes, each with its reason.
 
-Chances are probabilities before the rows are seen; sizes are in the units of the
-catalogue. What is typical of an effect stands in its own file.
+Chances are prior probabilities; sizes are in the units of the catalogue. Typical sizes
+of an effect are in its own file.
 """
 
 from __future__ import annotations
@@ -142,15 +142,15 @@ UNKNOWN = 5e-4
 """Chance of a function that no effect makes, for each covariate."""
 
 
-def loosely() -> Array:
-    """Probability of each of `SIZES` of instability where nobody looks for causes."""
+def instability_density_of_given_set() -> Array:
+    """Prior of each of `SIZES` of instability if the set is given, without a search."""
     wide = (SIZES > 1) & (SIZES <= LOOSEST)
     share: Array = (1 - LOOSE) * density(STEEP) + LOOSE * wide / wide.sum()
     return share
 
 
 def density(tail: float = TAIL) -> Array:
-    """Probability of each of `SIZES`: even in ln v up to 1, then falling as v^-tail."""
+    """Prior of each of `SIZES`: even in ln v up to 1, then falling as v^-tail."""
     weight = 1 / (1 + SIZES**tail)
     share: Array = weight / weight.sum()
     return share

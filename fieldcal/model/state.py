@@ -1,4 +1,4 @@
-"""The base state, and what it predicts.
+"""The base state, and the outputs that it predicts.
 
     U = b + diag(k) f' + sum_e D_e(f', w'; psi) v_e,     W = d + diag(s) w' + ...
 
@@ -47,15 +47,15 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Everything that rows need to predict themselves.
+    """Parameters from which the rows are predicted.
 
     Attributes
     ----------
     bias, scale : (6,)
     small_rotation : (p, 2) small rotations of each position, rad
-    earth : (3,) rad/s, rate of the base beyond what is known
+    earth : (3,) rad/s, rate of the base in addition to the known rate
     terms : effects
-    attitude : (p, 3) what measured attitudes are off by, rad about the axes of the base
+    attitude : (p, 3) errors of measured attitudes, rad about the axes of the base
 
     """
 
@@ -68,15 +68,15 @@ class State:
 
     @property
     def lag(self) -> Lag:
-        """By how much its effects make the sensors lag behind the motion."""
+        """Delay and time constants of the sensors, by its effects."""
         return sum((t.effect.lag(t.values) for t in self.terms), Lag())
 
     def experienced(self, x: Experience, more: tuple[Term, ...] = ()) -> Experience:
-        """What small rotations, the Earth's rate and motion effects make of rows."""
+        """Inputs of rows with small rotations, the Earth's rate and motion effects."""
         if self.small_rotation.any():
-            x = rotated(x, self.small_rotation)
+            x = rotate_positions(x, self.small_rotation)
         if self.attitude.any():
-            x = leaned(x, self.attitude)
+            x = tilt_positions(x, self.attitude)
         if self.earth.any():
             x = x.turned(base_rate=x.base_rate + self.earth)
         terms = (*self.terms, *more) if more else self.terms
@@ -86,7 +86,7 @@ class State:
         return x
 
     def output(self, x: Experience, since: Array) -> Array:
-        """The six outputs of rows as they are experienced, (n, 6).
+        """The six outputs for inputs `x` from `experienced`, (n, 6).
 
         `since` (o, n) is the time since the turn, by origin.
         """
@@ -99,19 +99,19 @@ class State:
         return out
 
 
-def rotated(x: Experience, small_rotation: Array) -> Experience:
-    """Rows with each position rotated by a little: (p, 2) rad.
+def rotate_positions(x: Experience, small_rotation: Array) -> Experience:
+    """Rows with a small rotation of each position, (p, 2) rad.
 
-    By alpha and beta where they are known; else about two axes across the force, and
-    where a table turns about an axis that nobody knows across its rate.
+    By alpha and beta if they are known; else about two axes perpendicular to the force,
+    or to the rate of a table with an unknown axis.
     """
     small = small_rotation[np.maximum(x.position, 0)] * (x.position >= 0)[:, None]
-    # without accelerometers nobody knows where up was
+    # without accelerometers the vertical is not known
     free = ~x.oriented & (np.linalg.norm(x.f, axis=1) > 0)
     x = x.turned(alpha=x.alpha + small[:, 0], beta=x.beta + small[:, 1])
     if free.any():
         f = x.f.copy()
-        one, two = across(f[free])
+        one, two = perpendicular_vectors(f[free])
         f[free] += small[free, :1] * one + small[free, 1:] * two
         length = np.linalg.norm(f[free], axis=1, keepdims=True)
         f[free] *= np.linalg.norm(x.f[free], axis=1, keepdims=True) / length
@@ -119,18 +119,15 @@ def rotated(x: Experience, small_rotation: Array) -> Experience:
     spun = x.speed > 0
     if spun.any():
         w = x.w.copy()
-        one, two = across(w[spun])
+        one, two = perpendicular_vectors(w[spun])
         w[spun] += small[spun, :1] * one + small[spun, 1:] * two
         w[spun] *= (x.speed[spun] / np.linalg.norm(w[spun], axis=1))[:, None]
         x = replace(x, w=w)
     return x
 
 
-def leaned(x: Experience, attitude: Array) -> Experience:
-    """Rows of which each position is held otherwise by a little, (p, 3) rad.
-
-    About the axes of the base; all rows of a position are held alike.
-    """
+def tilt_positions(x: Experience, attitude: Array) -> Experience:
+    """Rows with a small rotation of each position about the base's axes, (p, 3) rad."""
     moved = np.flatnonzero(attitude.any(axis=1))
     first = np.array([int(np.argmax(x.position == p)) for p in moved])
     there = x.position[first] == moved
@@ -145,8 +142,8 @@ def leaned(x: Experience, attitude: Array) -> Experience:
     return x.turned(alpha=alpha, beta=beta, gamma=gamma)
 
 
-def across(f: Array) -> tuple[Array, Array]:
-    """Two vectors across each force and as long, (n, 3) each."""
+def perpendicular_vectors(f: Array) -> tuple[Array, Array]:
+    """Two vectors perpendicular to each force and of its length, (n, 3) each."""
     least = np.eye(3)[np.argmin(np.abs(f), axis=1)]
     one = np.cross(f, least)
     length = np.linalg.norm(f, axis=1, keepdims=True)

@@ -41,10 +41,10 @@ Seen = Literal[
 """What a mismatch depends on."""
 
 CHANCE = 0.01
-"""That a session has an effect, where its file states no other: one of a hundred."""
+"""Default prior probability that a session has an effect: one in a hundred."""
 
 BEYOND = 5e-4
-"""The same of what would change by itself beside a temperature that is known to."""
+"""Prior probability of a change in time alone if the temperature is known to change."""
 
 Values = Sequence[float] | Array
 NO_SHAPE: Mapping[str, float] = {}
@@ -54,8 +54,8 @@ NO_SHAPE: Mapping[str, float] = {}
 class Param:
     """One parameter: its name in the catalogue, its unit, the size it can have.
 
-    `typical` is the upper end of what is seen; it sets what an explanation that needs
-    the parameter costs.
+    `typical` is the upper end of sizes in devices. It is the prior size, so it decides
+    how much an explanation with the parameter costs.
     """
 
     name: str
@@ -113,7 +113,7 @@ class Effect(ABC):
         return CHANCE
 
     def lag(self, values: Values) -> Lag:
-        """By how much it makes the sensors lag behind the motion."""
+        """Delay and time constants of the sensors that it adds."""
         return Lag()
 
     @property

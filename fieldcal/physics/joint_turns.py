@@ -39,12 +39,12 @@ class JointTurns:
 
     @classmethod
     def none(cls) -> Self:
-        """Of a session of which nothing of the kind is known."""
+        """No known turns."""
         return cls(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3)))
 
     @classmethod
     def of(cls, at: Array, angles: Array) -> Self:
-        """Of positions one after the other.
+        """Turns between successive positions.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""By how much the sensors lag behind the motion.
+"""Delay and time constants of the sensors behind the motion.
 
 Accelerometers and gyroscopes follow with low-passes of first and of second order, and
 the gyroscopes come late against the accelerometers besides, all in s; and samples come
@@ -32,6 +32,6 @@ class Lag:
     stamps: float = 0.0
 
     def __add__(self, other: Lag) -> Lag:
-        """Both together."""
+        """Sum of both."""
         both = zip(astuple(self), astuple(other), strict=True)
         return Lag(*(one + more for one, more in both))

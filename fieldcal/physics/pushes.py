@@ -1,14 +1,14 @@
-"""Stretches of samples far beyond what is usual in a window.
+"""Stretches of samples far beyond the usual spread of a window.
 
-In single samples, or in the mean of a tenth or half a second, where m samples are a
-tenth. Usual is the noise, or what the window does at that length throughout, but for
-where it does most. Units: standard deviations of the noise of a sample.
+They are found in single samples, and in means over m and 4 m samples, where m samples
+are a tenth of a second. The usual spread is that of the noise, or the spread of the
+whole window if that is larger. Units: standard deviations of the noise of a sample.
 Source: model of this project.
 
 >>> import numpy as np
 >>> quiet = np.random.default_rng(1).standard_normal((1000, 1))
 >>> quiet[400:420] += 7.0
->>> [(int(a), int(b)) for a, b in disturbed(quiet, 10)]
+>>> [(int(a), int(b)) for a, b in disturbed_stretches(quiet, 10)]
 [(400, 420)]
 """
 
@@ -50,8 +50,8 @@ MANY = 50_000
 
 
 @dataclass(frozen=True, slots=True)
-class Usual:
-    """What outputs do throughout a window, in standard deviations of noise.
+class UsualSpread:
+    """Usual spread of the outputs in a window, in standard deviations of noise.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ class Usual:
     means: Mapping[int, Array]
 
     @classmethod
-    def of(cls, z: Array, m: int) -> Usual:
-        """Of outputs (n, c) without their slow part; `m` as in `disturbed`."""
-        sample = usual(z)
+    def of(cls, z: Array, m: int) -> UsualSpread:
+        """Of outputs (n, c) without slow part; `m` as in `disturbed_stretches`."""
+        sample = usual_spread(z)
         tail = np.where(sample > SHAKEN, np.maximum(_tails(z, sample), TAILS), 1.0)
         means = {width: np.ones(z.shape[1]) for width in _widths(len(z), m)}
         for c, column in enumerate(z.T):
@@ -77,36 +77,38 @@ class Usual:
                 spread[c] = _usual_mean(running_means(one, width), width)
         return cls(sample, tail, means)
 
-    def at_least(self, z: Array, m: int) -> Usual:
-        """The same, and what other outputs (n, c) do, if that is more.
+    def no_less_than(self, z: Array, m: int) -> UsualSpread:
+        """The larger of this spread and that of other outputs (n, c).
 
-        Of very few samples nobody can tell.
+        Unchanged if there are too few samples.
         """
         if len(z) < FEWEST:
             return self
-        other = Usual.of(z, m)
+        other = UsualSpread.of(z, m)
         wide = {w: np.fmax(s, other.means.get(w, s)) for w, s in self.means.items()}
-        return Usual(
+        return UsualSpread(
             np.maximum(self.sample, other.sample),
             np.maximum(self.tail, other.tail),
             wide,
         )
 
 
-def disturbed(z: Array, m: int, beside: Usual | None = None) -> NDArray[np.intp]:
-    """Stretches far beyond what is usual, (k, 2) first and one past the last sample.
+def disturbed_stretches(
+    z: Array, m: int, beside: UsualSpread | None = None
+) -> NDArray[np.intp]:
+    """Stretches far beyond the usual spread, (k, 2) first and one past the last sample.
 
     `z` is (n, c) in standard deviations, without its slow part; `m` the samples of the
-    shortest stretch looked at as a whole; `beside` what is usual there, if not in `z`.
+    shortest mean; `beside` the usual spread, if it is not that of `z`.
     """
-    there = beside or Usual.of(z, m)
+    there = beside or UsualSpread.of(z, m)
     scale = there.sample * there.tail
     # channel by channel: an hour of samples need not be in memory once more
     size = np.zeros(len(z))
     for column, one in zip(z.T, scale, strict=True):
         np.maximum(size, np.abs(column) / one, out=size)
     loud = size > LARGEST
-    alone = _alone(size)
+    alone = _isolated_outliers(size)
     for width in _widths(len(z), m):
         peak = np.zeros(len(z) - width + 1)
         for c, column in enumerate(z.T):
@@ -116,19 +118,19 @@ def disturbed(z: Array, m: int, beside: Usual | None = None) -> NDArray[np.intp]
         for first, last in runs(peak > MEAN):
             at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
-    found = _joined(runs(loud), 2 * m)
-    return np.array([_trimmed(size, a, b) for a, b in found])
+    found = _close_gaps(runs(loud), 2 * m)
+    return np.array([_trim(size, a, b) for a, b in found])
 
 
 def _widths(n: int, m: int) -> list[int]:
-    """Samples of the stretches whose means are looked at, of n."""
+    """Lengths of the means, in samples, for n samples."""
     return [width for width in (m, 4 * m) if 2 <= width < n]
 
 
-def _alone(size: Array) -> NDArray[np.bool_]:
+def _isolated_outliers(size: Array) -> NDArray[np.bool_]:
     """Single samples beyond noise between usual ones, by their deviations (n,).
 
-    >>> _alone(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
+    >>> _isolated_outliers(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
     (array([1]),)
     """
     calm = np.concatenate([[True], size <= LARGE, [True]])
@@ -137,23 +139,23 @@ def _alone(size: Array) -> NDArray[np.bool_]:
 
 
 def running_means(column: Array, width: int) -> Array:
-    """Means over stretches of that width, in those of noise, (n - width + 1,)."""
+    """Means over `width` samples, in those of noise, (n - width + 1,)."""
     total = np.concatenate([[0.0], np.cumsum(column)])
     mean: Array = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
     return mean
 
 
 def _usual_mean(mean: Array, width: int) -> float:
-    """Spread of means over stretches of that width, but for the furthest."""
+    """Spread of means over `width` samples, without the largest one."""
     at = int(np.argmax(mean))
     rest = np.delete(mean, slice(max(at - width + 1, 0), at + width))
-    return float(usual(rest[:, None])[0]) if len(rest) >= width else np.inf
+    return float(usual_spread(rest[:, None])[0]) if len(rest) >= width else np.inf
 
 
-def usual(z: Array) -> Array:
+def usual_spread(z: Array) -> Array:
     """Spread of each column by its middle half, at least that of the noise, (c,).
 
-    >>> usual(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
+    >>> usual_spread(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
     array([4.45])
     """
     some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
@@ -185,7 +187,7 @@ def _tails(z: Array, spread: Array) -> Array:
     return shortest
 
 
-def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
+def _close_gaps(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
     """Stretches with the short breaks between them closed."""
     out: list[list[int]] = []
     for first, last in stretches:
@@ -196,7 +198,7 @@ def _joined(stretches: NDArray[np.intp], gap: int) -> NDArray[np.intp]:
     return np.array(out, dtype=np.intp).reshape(-1, 2)
 
 
-def _trimmed(size: Array, first: int, last: int) -> tuple[int, int]:
+def _trim(size: Array, first: int, last: int) -> tuple[int, int]:
     """A stretch from its first large sample to its last; `size` (n,) in deviations.
 
     All of it where none stands out by itself: a gentle push.

@@ -1,4 +1,4 @@
-"""Axes of the gyroscopes that are not those of the accelerometers, told by turns.
+"""Axes of gyroscopes that differ from those of the accelerometers, found from turns.
 
 Between two rests gravity turns in the device as the rates w say that the device turned:
 
@@ -23,7 +23,7 @@ from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
 
 FEWEST = 3
-"""Turns by which axes are told: one closes by chance under several."""
+"""Least number of turns: one turn closes under several permutations by chance."""
 
 FOLLOWED = 0.8
 """Share of turns that must close: one may have gone on beyond what a rest was taken
@@ -37,7 +37,7 @@ OPENS, ALIKE = 3.0, np.deg2rad(0.5)
 """How much more others miss by, and what makes no difference, rad."""
 
 
-class SeenTurn(NamedTuple):
+class ObservedTurn(NamedTuple):
     """A turn between two rests.
 
     Attributes
@@ -61,16 +61,16 @@ def signed_axes() -> list[Array]:
     ]
 
 
-def axes_by_turns(turns: Sequence[SeenTurn]) -> Array | None:
-    """P by which the turns close, (3, 3), where they do not as declared; else None.
+def axes_by_turns(turns: Sequence[ObservedTurn]) -> Array | None:
+    """P by which the turns close, (3, 3), if they do not close as declared; else None.
 
-    None as well where several close them: turns about one axis do not tell the others.
-    Where only the sense of one axis is open, it is that of a right-handed device.
+    None also if several close them, as of turns about a single axis. If only the sense
+    of one axis is undetermined, the device is taken to be right-handed.
     """
     if len(turns) < FEWEST:
         return None
     every = signed_axes()
-    each = [_missed(one, every) for one in turns]
+    each = [_closure_angles(one, every) for one in turns]
     # few axes are turned about in many turns; a fifth may have been followed badly
     missed = np.quantile(each, FOLLOWED, axis=0, method="higher")
     if missed.min() > CLOSES or missed[0] < CLOSES:
@@ -82,9 +82,9 @@ def axes_by_turns(turns: Sequence[SeenTurn]) -> Array | None:
     return every[near[0]] if len(near) == 1 else None
 
 
-def _missed(turn: SeenTurn, every: Sequence[Array]) -> list[float]:
+def _closure_angles(turn: ObservedTurn, every: Sequence[Array]) -> list[float]:
     """Angle between where gravity is and where each P leads it, rad, (1)."""
-    ways = {sign: _turned(sign * turn.angles) for sign in (1.0, -1.0)}
+    ways = {sign: _rotation_product(sign * turn.angles) for sign in (1.0, -1.0)}
     out = []
     for axes in every:
         sign = float(np.sign(np.linalg.det(axes)))
@@ -95,7 +95,7 @@ def _missed(turn: SeenTurn, every: Sequence[Array]) -> list[float]:
     return out
 
 
-def _turned(angles: Array) -> Array:
+def _rotation_product(angles: Array) -> Array:
     """Product of all steps, (3, 3), the last at the left."""
     steps = exponential(-angles)
     while len(steps) > 1:

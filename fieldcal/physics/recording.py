@@ -30,7 +30,7 @@ class CheckedSamples:
     ----------
     block : the samples, SI
     windows : (p, 2) first and one past the last sample of each position's window
-    x : what each position should bring about, p rows
+    x : expected inputs in each position, p rows
     scale, bias : (6,) nominal calibration, in `samples.CHANNELS` order
     noise : (6,) standard deviation of one sample, as means over a second obey it
     quick : (6,) the same, as one sample differs from the next
@@ -72,7 +72,7 @@ class CheckedSamples:
         return out.T
 
     def mean(self, position: int) -> Array:
-        """Mean of what is known in a window, (6,); nan where nothing is."""
+        """Mean of the finite samples in a window, (6,); nan without any."""
         six = self.six(*self.windows[position].tolist())
         known = np.isfinite(six)
         count = known.sum(axis=0)
@@ -118,7 +118,7 @@ class Fault:
 
 
 def medians(values: Array) -> Array:
-    """Median of what is known in each row, (n,); nan where nothing is.
+    """Median of the finite values in each row, (n,); nan if there are none.
 
     `numpy.median` looks for nan in each row, which takes four times as long.
     """
@@ -133,10 +133,10 @@ def medians(values: Array) -> Array:
 
 
 def lsb_of(values: Array) -> float:
-    """Step of the grid that values lie on, 0 where they lie on none.
+    """Step of the grid that values lie on, 0 if they lie on none.
 
-    Zero is not looked at: half a step added outward to what was cut off towards zero
-    leaves it where it is.
+    Values of zero are ignored: a program that adds half a step outward to values cut
+    off towards zero does not change them.
 
     >>> round(lsb_of(np.array([0.5, 1.25, -0.25, 1.0])), 12)
     0.25

@@ -76,7 +76,7 @@ def _columns(effect: Effect, view: RowView) -> Array | None:
     """Columns of an effect in the six outputs at rest, (6n, k); None without any."""
     if effect.shapes or not isinstance(effect, Motion | Sensor) or not effect.params:
         return None
-    seen = columns.of_effect(effect, {}, 0).of(view)
+    seen = columns.effect_basis(effect, {}, 0).evaluate(view)
     typical = np.array([p.typical for p in effect.params])
     flat: Array = (seen * typical).reshape(-1, len(typical))
     return flat

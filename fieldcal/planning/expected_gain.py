@@ -40,12 +40,12 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Cause
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.planned import late
-from fieldcal.model.evidence.gram import Eliminated, Weighed, gains
+from fieldcal.model.causes.planned import rows_at_session_end
+from fieldcal.model.evidence.gram import Eliminated, WeightedGram, evidence_gains
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import DENSITY
+from fieldcal.model.evidence.sizing import LOG_DENSITY
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.search.inference import Inferred
+from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State
 
 LEAST = 1e-3
@@ -116,7 +116,7 @@ class ExpectedGain:
     def __init__(
         self,
         rows: Rows,
-        found: Inferred,
+        found: InferenceResult,
         likely: Iterable[tuple[Set, float]],
         allowed: Mapping[str, float],
         angles: float,
@@ -189,7 +189,9 @@ class ExpectedGain:
         left = [g for g in self.dictionary.unfitted if g.part not in members]
         columns, sizes = self._common_columns()
         at = np.concatenate([columns, one.state.columns, *(g.columns for g in left)])
-        wide = np.concatenate([sizes, one.state.sizes, *(g.typical for g in left)])
+        wide = np.concatenate(
+            [sizes, one.state.prior_sigma, *(g.typical for g in left)]
+        )
         state = Eliminated.of(self._weighed_rows(one), at, wide)
         names = frozenset(c.name for c, _ in one.members) - COMMON.keys()
         weight = float(np.log(chance)) - one.state.score + state.score
@@ -201,17 +203,19 @@ class ExpectedGain:
         """The best explanation with one more cause, and its log weight."""
         one, score = best
         group = cause.variants[0]
-        inner, pull = one.state.rest(group.columns, group.typical)
+        inner, pull = one.state.schur_complement(group.columns, group.typical)
         rows = one.state.rows
         own = float((np.diag(rows.matrix(group.columns, group.columns))
                      * group.typical**2).max())  # fmt: skip
-        profile = gains(inner[None], pull[None], np.array([own]))[0] + DENSITY
+        profile = (
+            evidence_gains(inner[None], pull[None], np.array([own]))[0] + LOG_DENSITY
+        )
         evidence = float(np.logaddexp.reduce(profile))
         v = float(np.sqrt(np.exp(profile - evidence) @ priors.SIZES**2))
         state = Eliminated.of(
             rows,
             np.concatenate([one.state.columns, group.columns]),
-            np.concatenate([one.state.sizes, group.sizes(v)]),
+            np.concatenate([one.state.prior_sigma, group.prior_sigma(v)]),
         )
         more = score + evidence + float(np.log(cause.chance))
         return EliminatedExplanation(one.names | {cause.name}, 0.0, state), more
@@ -219,16 +223,16 @@ class ExpectedGain:
     def _common_columns(self) -> tuple[Index, Array]:
         """Columns that every explanation has, including angles, with their sizes."""
         d = self.dictionary
-        at = [d.rotations_of(d.held)]
+        at = [d.rotations_of(d.window_positions)]
         wide = [np.full(len(at[0]), max(self.angles, 1e-9))]
         for cause in d.causes:
             if cause.name in COMMON:
                 at.append(cause.variants[0].columns)
-                wide.append(cause.variants[0].sizes(COMMON[cause.name]))
+                wide.append(cause.variants[0].prior_sigma(COMMON[cause.name]))
         return np.concatenate(at), np.concatenate(wide)
 
-    def _weighed_rows(self, one: Set) -> Weighed:
-        return self.found.search.weighed(one.sizes.instability)
+    def _weighed_rows(self, one: Set) -> WeightedGram:
+        return self.found.search.gram_at(one.sizes.instability)
 
     # -- requested quantities and further windows
 
@@ -261,7 +265,7 @@ class ExpectedGain:
         )
         alpha, beta = angles(positions)
         since = np.repeat(d.since[:, -1:], len(positions), axis=1)
-        view = RowView.of(late(self.rows.x, alpha, beta), since, state)
+        view = RowView.of(rows_at_session_end(self.rows.x, alpha, beta), since, state)
         used = values != 0
         for one in self.explanations:
             used[one.state.columns] = True
@@ -269,7 +273,7 @@ class ExpectedGain:
         off = state.output(view.x, since) - table @ values
         noise = self._noise_covariance(state, since, alpha, beta)
         table, off, noise = table[:, seen], off[:, seen], noise[:, seen][:, :, seen]
-        info = np.concatenate([np.zeros(0), *(t.info for t in self.found.turned)])
+        info = np.concatenate([np.zeros(0), *(t.info for t in self.found.turn_rows)])
         if not (info > 0).any():
             return table, off, noise
         felt = replace(
@@ -277,7 +281,9 @@ class ExpectedGain:
         )
         turned = (_column_table(d, felt, used) - _column_table(d, view, used))[:, GYR]
         size = priors.SIZES[self.found.best.sizes.instability[CLOSURE]]
-        miss = 1 / np.median(info[info > 0]) + (size * d.unstable[CLOSURE]) ** 2
+        miss = (
+            1 / np.median(info[info > 0]) + (size * d.typical_instability[CLOSURE]) ** 2
+        )
         both = np.zeros((len(positions), len(seen) + 3, len(seen) + 3))
         both[:, : len(seen), : len(seen)] = noise
         both[:, len(seen) :, len(seen) :] = (miss + 2 * self.angles**2) * np.eye(3)
@@ -298,12 +304,17 @@ class ExpectedGain:
     ) -> Array:
         """R of windows, (n, 6, 6): noise of a mean, instability, and angles."""
         rows, d = self.rows, self.dictionary
-        sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(len(rows.x) / len(d.held))
-        tau = priors.SIZES[list(self.found.best.sizes.instability)] * d.unstable
-        own = sd**2 + np.nanmedian(rows.common, axis=0) ** 2 + tau[:6] ** 2
+        sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(
+            len(rows.x) / len(d.window_positions)
+        )
+        tau = (
+            priors.SIZES[list(self.found.best.sizes.instability)]
+            * d.typical_instability
+        )
+        own = sd**2 + np.nanmedian(rows.window_error, axis=0) ** 2 + tau[:6] ** 2
 
         def output(a: float, b: float) -> Array:
-            x = state.experienced(late(rows.x, alpha + a, beta + b))
+            x = state.experienced(rows_at_session_end(rows.x, alpha + a, beta + b))
             return state.output(x, since)
 
         moved = [output(a, b) - output(-a, -b) for a, b in ((STEP, 0.0), (0.0, STEP))]
@@ -316,10 +327,10 @@ def _column_table(d: Dictionary, view: RowView, used: Array) -> Array:
     """The columns that are used in some rows, (n, 6, k); zero elsewhere."""
     n = len(view.x)
     out = np.zeros((n, 6, d.width))
-    for first, end, basis in d.spans():
+    for first, end, basis in d.basis_ranges():
         if not used[first:end].any():
             continue
-        row = basis.of(view)
+        row = basis.evaluate(view)
         if isinstance(basis, Course):
             width = row.shape[1]
             for c in range(6):

@@ -27,7 +27,7 @@ import numpy as np
 from fieldcal.core.errors import PlanError
 from fieldcal.core.positions import Position, forces
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import design, parameters
+from fieldcal.model.causes.planned import design_matrix, parameters
 
 STARTS = 12
 """Number of random sets from which the exchange starts; fewer give the same result."""
@@ -123,7 +123,7 @@ def expected(
 
     """
     names = required_parameters(len(positions))
-    jacobian = design(names, positions, gravity).reshape(-1, len(names))
+    jacobian = design_matrix(names, positions, gravity).reshape(-1, len(names))
     sigma = grade.acc(seconds) * parameter_sigma(jacobian)
     found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
     gyr = grade.gyr(seconds) / np.sqrt(len(positions))
@@ -167,11 +167,11 @@ def best_positions(
     names = required_parameters(n + len(fixed))
     held = {p.degrees for p in fixed}
     candidates = [p for p in ladder.candidates() if p.degrees not in held]
-    rows = design(names, candidates, gravity)
+    rows = design_matrix(names, candidates, gravity)
     information = np.einsum("nip,niq->npq", rows, rows)
     given = np.zeros(information.shape[1:])
     if fixed:
-        taken = design(names, fixed, gravity)
+        taken = design_matrix(names, fixed, gravity)
         given = np.einsum("nip,niq->pq", taken, taken)
     rng = np.random.default_rng(0)
     starts = [rng.permutation(len(candidates))[:n] for _ in range(STARTS)]

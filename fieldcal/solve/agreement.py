@@ -99,7 +99,7 @@ def triad_agreement(
     gram: Gram, d: ParameterSet, found: Mixture, channels: tuple[int, ...]
 ) -> TriadFit:
     """Compare the means of a triad with the estimate."""
-    p = len(d.held)
+    p = len(d.window_positions)
     at = np.ix_(np.arange(p), np.array(channels))
     info, off = gram.info[at], gram.off[at]
     used = (info > 0).ravel()
@@ -111,7 +111,7 @@ def triad_agreement(
     random = _random_columns(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
     loose = _free_rotations(gram, p, channels)[used]
-    wide = means[:, random] * found.sizes[random]
+    wide = means[:, random] * found.prior_sigma[random]
     plain = np.diag(noise) + wide @ wide.T
     stated = plain + loose @ loose.T
     free = means[:, ~random]
@@ -123,7 +123,7 @@ def triad_agreement(
     chi2, rank = _least_chi2(plain[np.ix_(good, good)], columns, y[good])
     residual = seen.as_table(y - free @ found.mean[~random])
     wander = np.diag(np.tile(found.scatter[list(channels)] ** 2, p)[used])
-    sizes = free * found.sizes[~random]
+    sizes = free * found.prior_sigma[~random]
     off, unsure = _held_out_residuals(stated + wander, sizes, y, seen)
     alone = seen.as_table(off, unsure)
     return TriadFit(
@@ -138,7 +138,7 @@ def _random_columns(d: ParameterSet) -> Mask:
         g for _, g in d.explanations[0].members if isinstance(g.effect, WITH_EQUATION)
     ]
     every = [
-        np.full(len(g.columns), g.fixed != priors.FREE and g not in equations)
+        np.full(len(g.columns), g.fixed_size != priors.FREE and g not in equations)
         for g in d.groups
     ]
     return np.concatenate(every)
@@ -183,7 +183,7 @@ class _MeasuredMeans:
     @property
     def window(self) -> Index:
         """Number of the window of each mean."""
-        return np.repeat(np.arange(len(self.d.held)), 3)[self.used]
+        return np.repeat(np.arange(len(self.d.window_positions)), 3)[self.used]
 
     def as_table(self, values: Array, unsure: Array | None = None) -> Array:
         """Residuals of the means as a table, (p, 3).
@@ -192,7 +192,7 @@ class _MeasuredMeans:
         the rate of a table with an unknown axis. A force is nan if its variance shows
         that no other window checks it.
         """
-        out = np.full((len(self.d.held), 3), np.nan)
+        out = np.full((len(self.d.window_positions), 3), np.nan)
         out[np.nonzero(self.used.reshape(-1, 3))] = values
         for i in np.flatnonzero(self.freely_rotated).tolist():
             out[i] = [self._force_direction(i) @ np.nan_to_num(out[i]), np.nan, np.nan]
@@ -209,7 +209,7 @@ class _MeasuredMeans:
 
     def sigma_table(self, unsure: Array) -> Array:
         """Sigmas of the residuals in `as_table`, from covariances (p, 3, 3)."""
-        out = np.full((len(self.d.held), 3), np.nan)
+        out = np.full((len(self.d.window_positions), 3), np.nan)
         for i in np.flatnonzero(self.used.reshape(-1, 3).all(axis=1)).tolist():
             n = self._force_direction(i)[None] if self.freely_rotated[i] else np.eye(3)
             out[i, : len(n)] = np.sqrt(np.diag(n @ unsure[i] @ n.T))
@@ -218,7 +218,7 @@ class _MeasuredMeans:
     @property
     def freely_rotated(self) -> Mask:
         """Windows whose outputs unknown rotations change (p,)."""
-        loose = self.gram.loose[: len(self.d.held), list(self.channels)]
+        loose = self.gram.loose[: len(self.d.window_positions), list(self.channels)]
         return np.asarray(loose.any(axis=(1, 2)))
 
     def _force_direction(self, i: int) -> Array:
@@ -229,7 +229,7 @@ class _MeasuredMeans:
         """
         d, at = self.d, list(self.channels)
         inputs = d.x.f if 0 in self.channels else d.x.w
-        v = inputs[int(np.argmax(d.x.position == d.held[i]))]
+        v = inputs[int(np.argmax(d.x.position == d.window_positions[i]))]
         if not v.any() or not (self.gram.info[i, at] > 0).all():
             return np.full(3, np.nan)
         across = np.cross(*self.gram.loose[i][at].T)
@@ -253,7 +253,7 @@ def _held_out_residuals(
     """Residuals of means in fits without their own window, (1), and covariances."""
     inverse = np.linalg.inv(stated + wide @ wide.T)
     pull, window = inverse @ y, seen.window
-    out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.held), 3, 3))
+    out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.window_positions), 3, 3))
     for i in np.unique(window):
         own = np.flatnonzero(window == i)
         block = np.linalg.inv(inverse[np.ix_(own, own)])

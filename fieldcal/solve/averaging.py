@@ -37,8 +37,10 @@ def mixture_with_causes(
 
     With `doubt`, each window may also be bad.
     """
-    there = search.evaluated(parameter_set.with_causes(carried))
-    return Mixing(parameter_set, search.gram, there, search.unstable, doubt=doubt).run()
+    there = search.evaluate(parameter_set.with_causes(carried))
+    return Mixing(
+        parameter_set, search.gram, there, search.typical_instability, doubt=doubt
+    ).run()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +148,7 @@ def select_determined(
     """Names, values, covariance and shifts of determined parameters; other names."""
     before = np.zeros(parameter_set.width)
     for group in parameter_set.groups:
-        before[group.columns] = group.sizes(group.fixed or 1.0)
+        before[group.columns] = group.prior_sigma(group.fixed_size or 1.0)
     sigma = np.sqrt(np.diag(found.covariance))
     limits = thresholds.USEFUL | (
         {"gyr_scale": thresholds.USEFUL_TURNED} if parameter_set.options.turned else {}

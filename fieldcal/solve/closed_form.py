@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.core.errors import NotObservable
 from fieldcal.core.samples import ACC, Array
-from fieldcal.model.causes.planned import PLAIN
+from fieldcal.model.causes.planned import ACC_CALIBRATION
 from fieldcal.solve.closed_form_estimate import ClosedFormEstimate
 from fieldcal.solve.observations import Observations
 
@@ -71,7 +71,7 @@ def two_position(
             gain[axis, :, axis] = np.array([1.0, 0.0]) - f[0, axis] * slope  # (11) (14)
         elif bare[axis]:
             gain[axis, :, axis] = 0.5  # (11), both windows
-    whole = ClosedFormEstimate.of(PLAIN, gain, observations, ACC)
+    whole = ClosedFormEstimate.of(ACC_CALIBRATION, gain, observations, ACC)
     return whole.subset(np.concatenate([scaled | bare, scaled]))
 
 

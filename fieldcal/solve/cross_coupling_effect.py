@@ -95,8 +95,8 @@ def _added_sigma(estimate: ParameterEstimate, group: Group) -> Array:
 
     Returns (k,), 1 sigma, in units of the parameter.
     """
-    there = estimate.search.evaluated(estimate.parameter_set.members).state
-    inner, _ = there.rest(group.columns, group.typical)
+    there = estimate.search.evaluate(estimate.parameter_set.members).state
+    inner, _ = there.schur_complement(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
     rows = there.rows.matrix(there.columns, group.columns)
     moved = (

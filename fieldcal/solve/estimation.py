@@ -22,7 +22,7 @@ from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
-from fieldcal.model.turns.turn import Turning
+from fieldcal.model.turns.turn import TurnTracker
 from fieldcal.solve.agreement import TriadFit, triad_agreement
 from fieldcal.solve.averaging import (
     AllParameters,
@@ -62,11 +62,11 @@ class RecordedRows:
     filters: tuple[Array, Array] | None = None
     cut_sigma: tuple[float, ...] = ()
 
-    def turn_integrator(self) -> Turning | None:
+    def turn_integrator(self) -> TurnTracker | None:
         """Return the integrator of the turns; None if there are no turns."""
         if self.source is None:
             return None
-        found = Turning(self.source, self.rows, self.since_turn)
+        found = TurnTracker(self.source, self.rows, self.since_turn)
         return found if found.legs else None
 
 
@@ -147,7 +147,7 @@ class ParameterEstimate:
 
     def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
         """Probability that each kind of error is as in the set, and not as stated."""
-        state = self.search.evaluated(self.parameter_set.members).state
+        state = self.search.evaluate(self.parameter_set.members).state
         left = [
             group
             for _, group in self.parameter_set.base_members
@@ -162,7 +162,7 @@ class ParameterEstimate:
         """Unrequested causes in the set, with their probabilities."""
         out: dict[str, float] = {}
         for one in self.parameter_set.explanations:
-            told = (cause.name for cause, _ in one.members if cause.told)
+            told = (cause.name for cause, _ in one.members if cause.reportable)
             for name in dict.fromkeys(told):
                 out[name] = out.get(name, 0.0) + one.probability
         return dict(sorted(out.items(), key=lambda item: -item[1]))
@@ -173,7 +173,7 @@ class ParameterEstimate:
         return sum(
             one.probability
             for one in self.parameter_set.explanations
-            if any(cause.told for cause, _ in one.members)
+            if any(cause.reportable for cause, _ in one.members)
         )
 
     @property
@@ -189,8 +189,8 @@ class ParameterEstimate:
     @property
     def bad_probability(self) -> Array:
         """Probability that each window is bad, (n,) in the order of the positions."""
-        out = np.zeros(int(self.parameter_set.held.max()) + 1)
-        out[self.parameter_set.held] = self.mixture.bad
+        out = np.zeros(int(self.parameter_set.window_positions.max()) + 1)
+        out[self.parameter_set.window_positions] = self.mixture.bad
         return out
 
     @property
@@ -217,7 +217,7 @@ def _excess_covariance(ours: Array, theirs: Array) -> Array:
 
 def estimate_parameters(
     recorded: RecordedRows,
-    turning: Turning | None,
+    turning: TurnTracker | None,
     nominal: State,
     wanted: ParameterSetOptions,
     averaged: bool = True,
@@ -247,8 +247,10 @@ def estimate_parameters(
         parameter_set, parameters
     )
     at = [parameter_set.names.index(name) for name in names]
-    elsewhere = turning.contradicted if turning else ()
-    counts = set(parameter_set.held[found.bad <= thresholds.CERTAIN].tolist())
+    elsewhere = turning.contradicted_turns if turning else ()
+    counts = set(
+        parameter_set.window_positions[found.bad <= thresholds.CERTAIN].tolist()
+    )
     return ParameterEstimate(
         parameter_set, parameters, names, values, covariance, missing, found,
         fit.score, moved,
@@ -271,7 +273,7 @@ def _known_rows(
     group, seen = parameter_set.filters, recorded.filters
     if group is not None and seen is not None and len(seen[1]):
         rows.append(KnownRows(group.columns, *seen))
-    return KnownRows.joined(rows) if rows else None
+    return KnownRows.concatenated(rows) if rows else None
 
 
 def window_scatter(found: Mixture, channels: tuple[int, ...]) -> float:

@@ -30,13 +30,17 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import at_points, parts, points
-from fieldcal.model.causes.random_causes import of_chance
-from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.effect_causes import (
+    groups_at_points,
+    parameter_groups,
+    shape_points,
+)
+from fieldcal.model.causes.random_causes import random_causes
+from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
-from fieldcal.model.turns.turn import only
+from fieldcal.model.turns.turn import select_rows
 from fieldcal.physics.effect import Motion, Scatter, Sensor
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.solve.warm_scales import WARM_SCALE
@@ -169,8 +173,8 @@ def _in_other_dictionary(
     """
     every: dict[str, Cause] = {}
     if not all(has_equation(g) for g in wanted):
-        every = {c.key: c.of_size(size.get(c.key))
-                 for c in [*of_chance(d), *of_no_effect(d)]}  # fmt: skip
+        every = {c.key: c.with_size(size.get(c.key))
+                 for c in [*random_causes(d), *unknown_causes(d)]}  # fmt: skip
     new: dict[str, list[tuple[Group, list[Group]]]] = {}
     for group, cause in wanted.items():
         if has_equation(group):
@@ -183,8 +187,8 @@ def _in_other_dictionary(
         pairs = new.get(cause.key, [])
         variants = tuple(one for _, some in pairs for one in some)
         instants = [(at, at) for g in cause.expected for at in g.shape.values()]
-        sized = replace(cause, variants=variants).of_size(size.get(cause.key))
-        same = sized.expecting(instants)
+        sized = replace(cause, variants=variants).with_size(size.get(cause.key))
+        same = sized.expecting_within(instants)
         for group, some in pairs:
             off = (g for g in same.expected if g.shape == group.shape)
             own = same.variants[variants.index(some[0])]
@@ -196,15 +200,15 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     effect = group.effect
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
-    whole = next(at for part, at in parts(d, effect) if part == group.part)
+    whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
     if isinstance(effect, Motion) or len(whole) > AXES:
         one = replace(group, params=_in_axes_of(d, group))
-        return at_points(d, one, [(group.shape, group.origin)])
+        return groups_at_points(d, one, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
-    grid = [own, *(point for point in points(d, effect) if point != own)]
+    grid = [own, *(point for point in shape_points(d, effect) if point != own)]
     out = [
         one if len(some) == len(whole) else _with_parameters(one, some)
-        for one in at_points(d, replace(group, params=whole), grid)
+        for one in groups_at_points(d, replace(group, params=whole), grid)
         for n in range(1, len(whole) + 1)
         for some in combinations(whole, n)
     ]
@@ -234,7 +238,7 @@ def _on_other_triad(d: Dictionary, causes: Sequence[Cause]) -> Iterator[Member]:
         group = first.variants[0]
         if not isinstance(group.effect, Sensor):
             continue
-        for part, some in parts(d, group.effect):
+        for part, some in parameter_groups(d, group.effect):
             other = replace(first, part=part)
             if part != first.part and some and other.key not in known:
                 every = _group_variants(d, replace(group, part=part, params=some))
@@ -284,7 +288,7 @@ def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
 
     The last turn is taken as long ago, so that motion of the joints is excluded.
     """
-    x = only(d.x, [int(np.argmax(d.x.t))])
+    x = select_rows(d.x, [int(np.argmax(d.x.t))])
     nothing, rest = np.zeros((1, 3)), float(d.x.lasts[int(np.argmax(d.x.t))]) / 2
     x = replace(
         x, t=x.t + rest, since_start=x.since_start + rest, lasts=np.zeros(1),
@@ -292,13 +296,15 @@ def _end_outputs(d: Dictionary, there: Array, felt: Array) -> Array:
         heating=np.zeros(1), since_turn=np.full(1, np.inf),
         joint_turns=JointTurns.none(),
     )  # fmt: skip
-    nowhere = State(np.zeros(6), np.ones(6), np.zeros((d.places, 2)), np.zeros(3))
+    nowhere = State(
+        np.zeros(6), np.ones(6), np.zeros((d.position_count, 2)), np.zeros(3)
+    )
     view = RowView(x, x, np.full((len(d.since), 1), np.inf), nowhere)
     out = np.zeros((6, d.width))
-    for first, end, basis in d.spans():
+    for first, end, basis in d.basis_ranges():
         if not there[first:end].any():
             continue
-        row = basis.of(view)[0]
+        row = basis.evaluate(view)[0]
         out[:, first:end] = (
             np.kron(np.eye(6), row) if isinstance(basis, Course) else row
         )

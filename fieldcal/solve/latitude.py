@@ -60,10 +60,12 @@ class VerticalEarthRate:
         if parameter_set.earth < 0 or latitude is None:
             return None
         column = np.array([parameter_set.earth + VERTICAL])
-        group = Group("earth", "vertical", column, np.array([EARTH_RATE]), fixed=1.0)
+        group = Group(
+            "earth", "vertical", column, np.array([EARTH_RATE]), fixed_size=1.0
+        )
         other = Cause(group.cause, group.part, priors.ELSEWHERE, (group,), "given")
-        as_said = search.evaluated(parameter_set.members)
-        free = search.evaluated((*parameter_set.members, (other, group)))
+        as_said = search.evaluate(parameter_set.members)
+        free = search.evaluate((*parameter_set.members, (other, group)))
         at = free.state.columns == column[0]
         stated = EARTH_RATE * float(np.sin(latitude))
         return cls(

@@ -25,9 +25,9 @@ from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.causes.detents import columns_of, detents
+from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import of_factory, whole
+from fieldcal.model.causes.effect_causes import effect_group, factory_groups
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.reduce import Rows
@@ -108,10 +108,10 @@ class ParameterSet(Dictionary):
         self.options, self.cut = wanted, np.array(cut, dtype=float)
         self.sign = _mean_signs(rows, self.cut)
         held = np.unique(rows.x.position)
-        common = np.array([rows.common[rows.x.position == p][0] for p in held])
+        common = np.array([rows.window_error[rows.x.position == p][0] for p in held])
         wander = Wander.of(rows, unit) if len(rows.x) > len(held) else Wander.none()
         super().__init__(
-            rows.x, rows.used, since, common, unit, turns, wander, rows.alike
+            rows.x, rows.used, since, common, unit, turns, wander, rows.session_error
         )
         has = {group_of(n) for n in self.names}
         self.explanations = translate_explanations(self, shown, has) or (
@@ -165,12 +165,12 @@ class ParameterSet(Dictionary):
             at = np.intersect1d(channels, self.observed)
             if not len(at):
                 continue
-            yield Group("bias", part, self.bias + at, sizes[at], fixed=priors.FREE,
+            yield Group("bias", part, self.bias + at, sizes[at], fixed_size=priors.FREE,
                         in_state=True)  # fmt: skip
             if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
-                yield Group("scale", part, self.scale + at, size, fixed=priors.FREE,
-                            in_state=True)  # fmt: skip
+                yield Group("scale", part, self.scale + at, size,
+                            fixed_size=priors.FREE, in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
         """Causes of the requested parameters, and of errors of known size."""
@@ -183,7 +183,7 @@ class ParameterSet(Dictionary):
         if w.cross:
             yield self._effect_cause("cross_coupling", turned=not oriented)
         left = replace(w.factory, **({"cross_coupling": 0.0} if w.cross else {}))
-        for one in of_factory(self, left, turned=not oriented):
+        for one in factory_groups(self, left, turned=not oriented):
             yield _given_cause(one)
         if w.gyro_cross:
             yield self._effect_cause("gyro_cross_coupling", free=priors.COUPLED)
@@ -193,7 +193,9 @@ class ParameterSet(Dictionary):
             yield from self._angle_causes(float(np.deg2rad(w.angles_deg)))
         if (lost := np.flatnonzero(self.cut)).size:
             at = self.add(General("cut", self._truncated_outputs), 3) + lost
-            yield _given_cause(Group("rounding", "acc", at, self.cut[lost], fixed=1.0))
+            yield _given_cause(
+                Group("rounding", "acc", at, self.cut[lost], fixed_size=1.0)
+            )
 
     def _warm_scales(self, members: Iterable[Member]) -> dict[str, Member]:
         """Changes of scale factors that accompany changes of biases, by cause key."""
@@ -220,11 +222,11 @@ class ParameterSet(Dictionary):
         If the device is `turned` by an unknown rotation, the parameters that such a
         rotation can produce from others are left out.
         """
-        one = whole(self, name, turned)
+        one = effect_group(self, name, turned)
         if known is None:
-            return _given_cause(replace(one, fixed=free))
+            return _given_cause(replace(one, fixed_size=free))
         size = np.full(len(one.params), known)
-        return _given_cause(replace(one, typical=size, fixed=1.0))
+        return _given_cause(replace(one, typical=size, fixed_size=1.0))
 
     def _earth_rate_cause(self, size: Array) -> Cause:
         """Uncertainty of the Earth's rate."""
@@ -232,7 +234,14 @@ class ParameterSet(Dictionary):
         self.earth = self.add(General("earth", columns.earth, sides=sides), 3)
         kept = np.flatnonzero(size)
         return _given_cause(
-            Group("earth", "", self.earth + kept, size[kept], fixed=1.0, in_state=True)
+            Group(
+                "earth",
+                "",
+                self.earth + kept,
+                size[kept],
+                fixed_size=1.0,
+                in_state=True,
+            )
         )
 
     def _truncated_outputs(self, view: RowView) -> Array:
@@ -248,20 +257,22 @@ class ParameterSet(Dictionary):
         alike = x.oriented & ~np.isfinite(
             x.attitude_sigma
         )  # the others have their own uncertainty
-        oriented = [p for p in self.held if alike[x.position == p].all()]
+        oriented = [p for p in self.window_positions if alike[x.position == p].all()]
         if not oriented:
             return
         size = sigma / np.sqrt(2.0)
         own = self.rotations_of(oriented)
         wide = np.full(len(own), size)
         yield _given_cause(
-            Group("angle_setting", "own", own, wide, fixed=1.0, in_state=True)
+            Group("angle_setting", "own", own, wide, fixed_size=1.0, in_state=True)
         )
         # an angle that is set once has both parts of its error for itself
         if every := list(detents(self.x, oriented)):
-            at = columns_of(self, every)
+            at = detent_columns(self, every)
             wide = np.full(len(at), size)
-            yield _given_cause(Group("angle_setting", "repeated", at, wide, fixed=1.0))
+            yield _given_cause(
+                Group("angle_setting", "repeated", at, wide, fixed_size=1.0)
+            )
 
     # -- places of the parameters
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import design
+from fieldcal.model.causes.planned import design_matrix
 from fieldcal.solve.observations import Observations
 
 Mask = NDArray[np.bool_]
@@ -93,6 +93,6 @@ def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]
     known = [p for p in observations.positions if p.oriented]
 
     def rows(places: Sequence[Position]) -> Array:
-        return design(names, places, observations.gravity, observations.mounting)
+        return design_matrix(names, places, observations.gravity, observations.mounting)
 
     return [p.name for p in positions_to_add(rows, known, LADDER)]

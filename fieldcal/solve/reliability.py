@@ -112,7 +112,7 @@ def wrong_angles(
         return []
     order = np.argsort(found.columns)
     at = order[np.searchsorted(found.columns, own[0].columns, sorter=order)]
-    weight = 1 / found.sizes[at] ** 2
+    weight = 1 / found.prior_sigma[at] ** 2
     told = found.covariance[np.ix_(at, at)]
     shown = np.diag(weight) - weight[:, None] * told * weight
     moved = -picked @ found.covariance[:, at] * weight

@@ -14,9 +14,9 @@ from fieldcal.calibration import Nominal
 from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
 from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
 from fieldcal.core.samples import ACC, GYR, Array
-from fieldcal.model.rows.orientation import free_force
+from fieldcal.model.rows.orientation import force_along_mean
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.rows.turntable import Readings
+from fieldcal.model.rows.turntable import GyroReadings
 from fieldcal.physics.experience import Experience
 from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.observations import Observations
@@ -29,7 +29,7 @@ def rows_of_means(observations: Observations) -> RecordedRows:
     y = observations.mean.copy()
     told = mean_variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
-    read = Readings(
+    read = GyroReadings(
         observations.positions,
         index,
         (y[:, GYR] - nominal.gyr_bias) / np.array(nominal.gyr_scale),
@@ -71,7 +71,7 @@ def without_angles(rows: Rows, nominal: Nominal) -> Rows:
     x, nowhere = rows.x, np.full(len(rows.x), np.nan)
     apart = (rows.y[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
     still = np.isfinite(apart).all(axis=1) & ~x.rate.any(axis=1)
-    read = free_force(x.gravity, x.position, np.where(still[:, None], apart, x.f))
+    read = force_along_mean(x.gravity, x.position, np.where(still[:, None], apart, x.f))
     f = np.where(still[:, None], read, x.f)
     return replace(rows, x=replace(x, alpha=nowhere, beta=nowhere, f=f))
 
@@ -96,14 +96,14 @@ def with_window_variances(rows: Rows, known: Array) -> Rows:
 
     The part beyond white noise is an error that all rows of a window have in common.
     """
-    common = rows.common.copy()
+    common = rows.window_error.copy()
     for p in np.unique(rows.x.position):
         at = rows.x.position == p
         told = np.where(rows.used[at], 1 / rows.sd[at] ** 2, 0.0).sum(axis=0)
         white = 1 / np.maximum(told, 1e-300)
         beyond = np.maximum(np.nan_to_num(known[p]) - white, 0.0)
         common[at] = np.maximum(common[at], np.sqrt(beyond))
-    return replace(rows, common=common)
+    return replace(rows, window_error=common)
 
 
 def _earth_rate_at_rest(observations: Observations) -> float:
@@ -124,7 +124,7 @@ def _measured_force(observations: Observations) -> Array:
     nominal = observations.nominal
     apart = (observations.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
     apart[~np.isfinite(apart).all(axis=1)] = force_home(observations.gravity)
-    return free_force(observations.gravity, np.arange(len(observations)), apart)
+    return force_along_mean(observations.gravity, np.arange(len(observations)), apart)
 
 
 def unknown_earth_rate(scale: Array | tuple[float, ...]) -> Array:

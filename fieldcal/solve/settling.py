@@ -64,7 +64,7 @@ def settle_without_bad_windows(
             turns,
         )
 
-    bad, score = np.zeros(len(parameter_set.held), dtype=bool), np.nan
+    bad, score = np.zeros(len(parameter_set.window_positions), dtype=bool), np.nan
     # one bad window of six can be told from scatter, two of six cannot
     most = max(1, len(bad) // 6)
     for _ in range(1 + most):
@@ -81,7 +81,7 @@ def settle_without_bad_windows(
             break
         bad |= worst
     found = replace(found, bad=np.where(bad, 1.0, found.bad))
-    return SettledSet(found, gram, tuple(now.turned), score)
+    return SettledSet(found, gram, tuple(now.turn_rows), score)
 
 
 def _settled_fit(
@@ -98,7 +98,7 @@ def _settled_fit(
 
 def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows:
     """Rows in which bad windows (p,) have no weight."""
-    left = np.isin(rows.x.position, parameter_set.held[bad])
+    left = np.isin(rows.x.position, parameter_set.window_positions[bad])
     return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
 
 
@@ -107,9 +107,7 @@ def _settled_state(
 ) -> tuple[State, Array]:
     """The state to which the set converges, and the values of its columns there."""
     start: Array = np.zeros(parameter_set.width)
-    state, values, _ = inference.settled(
-        inference.nominal, start, parameter_set.members
-    )
+    state, values, _ = inference.settle(inference.nominal, start, parameter_set.members)
     if inference.turns is None:
         return state, values
     # windows measure only the Earth's rate: too little for scale factors of gyroscopes
@@ -120,9 +118,9 @@ def _settled_state(
     state, values = _follow_turns_first(inference, parameter_set, state, values)
     for again in range(FOLLOWED):
         if again:
-            inference.followed(state, values)
+            inference.follow_turns(state, values)
         before = state.scale
-        state, values, _ = inference.settled(state, values, parameter_set.members)
+        state, values, _ = inference.settle(state, values, parameter_set.members)
         if np.abs(state.scale / before - 1).max() < NEAR:
             break
     return state, values
@@ -142,15 +140,15 @@ def _follow_turns_first(
         return state, values
     nothing: Array = np.zeros(parameter_set.width)
     if _contradicted_turns(inference, inference.nominal, nothing) < astray:
-        state, values, _ = inference.settled(
+        state, values, _ = inference.settle(
             inference.nominal, nothing, parameter_set.members
         )
         return state, values
-    inference.followed(state, values)
+    inference.follow_turns(state, values)
     return state, values
 
 
 def _contradicted_turns(inference: Inference, state: State, values: Array) -> int:
     """Number of turns that contradict the positions, integrated with a state."""
-    inference.followed(state, values)
-    return len(inference.turns.turning.contradicted) if inference.turns else 0
+    inference.follow_turns(state, values)
+    return len(inference.turns.tracker.contradicted_turns) if inference.turns else 0

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.gram import Eliminated, gains
-from fieldcal.model.evidence.sets import chances
-from fieldcal.model.evidence.sizing import DENSITY, EVEN, Member
+from fieldcal.model.evidence.gram import Eliminated, evidence_gains
+from fieldcal.model.evidence.sets import log_chances
+from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.model.search.selection import Search
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
 
@@ -101,7 +101,7 @@ def _with_and_without(
     cause = member[0]
     score = _scores(search, members, member)
     best = (cause, cause.variants[int(np.argmax(score))])
-    gain = search.evaluated((*members, best)).score - search.evaluated(members).score
+    gain = search.evaluate((*members, best)).score - search.evaluate(members).score
     score = np.append(0.0, score - score.max() + gain)
     choices: list[tuple[Member, ...]] = [(), *(((cause, v),) for v in cause.variants)]
     out: Array = np.exp(score - np.logaddexp.reduce(score))
@@ -116,22 +116,24 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
     rest = _without_columns(search, members, own.columns)
-    inner, pull = rest.rest(every, np.ones(len(every)))
+    inner, pull = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
-    score = chances(member[0], beside) + np.zeros(len(others))
+    score = log_chances(member[0], beside) + np.zeros(len(others))
     width = np.array([len(g.columns) for g in others])
     for k in np.unique(width).tolist():
         some = np.flatnonzero(width == k)
         at = np.searchsorted(every, [others[j].columns for j in some])
-        size = np.array([others[j].sizes(others[j].fixed or 1.0) for j in some])
+        size = np.array(
+            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in some]
+        )
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
-        gain = gains(square, pull[at] * size, top)
-        known = np.array([others[j].fixed is not None for j in some])
-        summed = np.logaddexp.reduce(gain + DENSITY, axis=1)
-        score[some] += np.where(known, gain[:, EVEN], summed)
+        gain = evidence_gains(square, pull[at] * size, top)
+        known = np.array([others[j].fixed_size is not None for j in some])
+        summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
+        score[some] += np.where(known, gain[:, UNIT_INDEX], summed)
     return score
 
 
@@ -139,7 +141,7 @@ def _without_columns(
     search: Search, members: tuple[Member, ...], own: Index
 ) -> Eliminated:
     """A set without some columns, with the instability of windows unchanged."""
-    full = search.evaluated(members)
+    full = search.evaluate(members)
     kept = ~np.isin(full.state.columns, own)
-    rows = search.weighed(full.sizes.instability)
-    return Eliminated.of(rows, full.state.columns[kept], full.state.sizes[kept])
+    rows = search.gram_at(full.sizes.instability)
+    return Eliminated.of(rows, full.state.columns[kept], full.state.prior_sigma[kept])

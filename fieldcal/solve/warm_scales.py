@@ -50,7 +50,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
         return None
 
     def columns(view: RowView) -> Array:
-        c_of_t = course.of(view)[:, which]
+        c_of_t = course.evaluate(view)[:, which]
         out = np.zeros((len(view.x), 6, ACC, len(which)))
         for c in range(ACC):
             out[:, c, c] = c_of_t * view.x.f[:, [c]]  # (1)
@@ -61,7 +61,7 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
     wide = np.abs(np.outer(table.unit[:ACC], priors.SCALE_WARMS * size / G0))
     one = Group(
         WARM_SCALE, "", at, wide.ravel(), group.effect, group.shape, group.origin,
-        tuple(np.repeat(range(ACC), len(which)).tolist()), fixed=1.0,
+        tuple(np.repeat(range(ACC), len(which)).tolist()), fixed_size=1.0,
     )  # fmt: skip
     return Cause(WARM_SCALE, "", 1.0, (one,), "noise"), one
 
@@ -81,7 +81,7 @@ def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
     """
     first, basis = next(
         (first, basis)
-        for first, end, basis in table.spans()
+        for first, end, basis in table.basis_ranges()
         if first <= group.columns[0] < end
     )
     if not isinstance(basis, Course):
@@ -89,7 +89,8 @@ def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
     channel, number = np.divmod(group.columns - first, basis.width)
     on_acc = channel < ACC
     wide = (
-        group.sizes(1.0 if group.fixed is None else group.fixed) / table.unit[channel]
+        group.prior_sigma(1.0 if group.fixed_size is None else group.fixed_size)
+        / table.unit[channel]
     )
     which, at = np.unique(number[on_acc], return_inverse=True)
     count = np.bincount(at, minlength=len(which))

@@ -209,7 +209,7 @@ def _few_windows_warnings(method: Method, estimate: ParameterEstimate) -> list[s
 
 def _scatter_warnings(estimate: ParameterEstimate) -> list[str]:
     """Warnings of scatter beyond the noise."""
-    what = "norms" if estimate.parameter_set.free.all() else "positions"
+    what = "norms" if estimate.parameter_set.unoriented.all() else "positions"
     sentences = []
     for name, agreed, channels in (
         (what, estimate.acc, (0, 1, 2)), ("gyroscopes' means", estimate.gyr, (3, 4, 5)),

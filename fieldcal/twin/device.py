@@ -115,7 +115,7 @@ def device_profile(
             _triad(state.scale[3:]),
         ),
         noise=noise,
-        temperature=temperature_course(source.warmth, float(source.block.t[0])),
+        temperature=temperature_course(source.thermometer, float(source.block.t[0])),
         effects=tuple(effects),
     )
 
@@ -202,7 +202,7 @@ def vibration_by_position(explanation: Explanation) -> Array:
     """Vibration in each position beyond the quietest window, (p,) m/s^2 rms."""
     x, scale = explanation.rows.x, explanation.state.scale[:3]
     more = (x.variance - x.variance.min(axis=0)) / scale**2
-    out = np.zeros(explanation.dictionary.places)
+    out = np.zeros(explanation.dictionary.position_count)
     out[x.position] = np.sqrt(np.maximum(more, 0.0).mean(axis=1))
     return out
 
@@ -217,7 +217,7 @@ def _noise(explanation: Explanation, effects: list[SimulatedEffect]) -> NoiseFig
         if one.id == "noise_level":
             noise[CHANNELS.index(one.words["channel"])] /= one["ratio"]
     still = (0.0, 0.0, 0.0)
-    thermometer = explanation.prepared.source.warmth.noise
+    thermometer = explanation.prepared.source.thermometer.noise
     return NoiseFigures(
         acc=_triad(noise[:3]),
         gyr=_triad(noise[3:]),

@@ -27,7 +27,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.physics.experience import Experience
 
@@ -62,12 +62,14 @@ def physical_twin_state(explanation: Explanation) -> TwinState:
     return TwinState(from_one_instant(state, best.dictionary.since), heading)
 
 
-def state_without_earth_rate(explanation: Explanation, fitted: Fitted) -> State:
+def state_without_earth_rate(explanation: Explanation, fitted: FittedSet) -> State:
     """The fitted state, given that the fitted rate of the base is zero."""
     return _state_given_rate(explanation, fitted, np.zeros(3))
 
 
-def _state_given_rate(explanation: Explanation, fitted: Fitted, rate: Array) -> State:
+def _state_given_rate(
+    explanation: Explanation, fitted: FittedSet, rate: Array
+) -> State:
     """The fitted state, given the rate of the base, (3,) rad/s (1)."""
     nominal = explanation.inferred.inference.nominal
     inference = Inference(WindowSystem(fitted.rows, fitted.dictionary), nominal)
@@ -76,7 +78,7 @@ def _state_given_rate(explanation: Explanation, fitted: Fitted, rate: Array) -> 
         shared = found.inverse[:, at]
         off = np.linalg.solve(shared[at], rate - found.estimate[at])
         found = replace(found, estimate=found.estimate + shared @ off)
-    return inference.moved(replace(fitted.set, state=found))[0]
+    return inference.state_at_estimate(replace(fitted.set, state=found))[0]
 
 
 def from_one_instant(state: State, since: Array) -> State:
@@ -96,7 +98,7 @@ def from_one_instant(state: State, since: Array) -> State:
     return replace(state, terms=tuple(terms))
 
 
-def _base_rate_columns(fitted: Fitted) -> Index:
+def _base_rate_columns(fitted: FittedSet) -> Index:
     """Indices of the rate of the base among the estimates, (3,) or (0,)."""
     first = fitted.dictionary.earth
     if first < 0:
@@ -104,7 +106,7 @@ def _base_rate_columns(fitted: Fitted) -> Index:
     return np.flatnonzero(np.isin(fitted.set.state.columns, first + np.arange(3)))
 
 
-def _best_heading(fitted: Fitted) -> float:
+def _best_heading(fitted: FittedSet) -> float:
     """Heading that best agrees with the fitted rate, rad; 0 if north agrees with it."""
     found, at = fitted.set.state, _base_rate_columns(fitted)
     off = _earth_rates_by_heading(fitted.rows.x, HEADINGS) - found.estimate[at]

@@ -29,8 +29,8 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.turns.turn import Turn, Turning
+from fieldcal.model.system.fitted import FittedSet
+from fieldcal.model.turns.turn import Turn, TurnTracker
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.twin import device as twin
@@ -52,7 +52,7 @@ VIBRATED_REPLAYS = 64
 
 
 def replay_session(
-    explanation: Explanation, found: Diagnosis, raw: Fitted
+    explanation: Explanation, found: Diagnosis, raw: FittedSet
 ) -> ReplayResult:
     """Replay a session on the twin and on the devices that it is compared with.
 
@@ -104,7 +104,7 @@ class _ReplayCase:
     """
 
     device: Profile
-    fitted: Fitted
+    fitted: FittedSet
     state: State
     not_replayed: Array
     turns: tuple[Turn, ...]
@@ -115,7 +115,7 @@ class _ReplayCase:
 
 
 def _replay_cases(
-    explanation: Explanation, profile: Profile, found: State, raw: Fitted
+    explanation: Explanation, profile: Profile, found: State, raw: FittedSet
 ) -> dict[str, _ReplayCase]:
     """The three devices, by name, with equal weights of their differences."""
     best, nominal = explanation.best, explanation.inferred.inference.nominal
@@ -139,17 +139,21 @@ def _replay_cases(
 
 
 def _replay_case(
-    explanation: Explanation, device: Profile, fitted: Fitted, state: State, off: Array
+    explanation: Explanation,
+    device: Profile,
+    fitted: FittedSet,
+    state: State,
+    off: Array,
 ) -> _ReplayCase:
     """A device with its turns, if the diagnosis uses turns."""
     made: tuple[Turn, ...] = ()
     if explanation.inferred.inference.turns is not None:
         source, since = explanation.prepared.source, fitted.dictionary.since
-        made = tuple(Turning(source, fitted.rows, since).turns(state))
+        made = tuple(TurnTracker(source, fitted.rows, since).turns(state))
     return _ReplayCase(_without_random_effects(device), fitted, state, off, made)
 
 
-def _outputs_of_no_effect(fitted: Fitted) -> Array:
+def _outputs_of_no_effect(fitted: FittedSet) -> Array:
     """Outputs by random effects and by causes that are no effects, (n, 6)."""
     taken = fitted.values.copy()
     for _, group in fitted.set.members:
@@ -196,7 +200,7 @@ def _replay(explanation: Explanation, case: _ReplayCase) -> ReplayFigures:
     )
 
 
-def _by_position(fitted: Fitted, off: Array) -> tuple[Array, Array]:
+def _by_position(fitted: FittedSet, off: Array) -> tuple[Array, Array]:
     """Rms of each window, (p, 2), and its chi squared per mean, (p,)."""
     rows, places, chi2 = fitted.rows, [], []
     for p in np.unique(rows.x.position):

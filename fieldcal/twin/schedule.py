@@ -14,10 +14,10 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import Fitted
-from fieldcal.model.turns.turn import Turn, only
+from fieldcal.model.system.fitted import FittedSet
+from fieldcal.model.turns.turn import Turn, select_rows
 from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.replay import HeldWindow
 from fieldcal.twin.ways import manoeuvre_of_turn
@@ -35,7 +35,7 @@ PUT_S = 60.0
 def replay_windows(
     explanation: Explanation,
     state: State,
-    fitted: Fitted,
+    fitted: FittedSet,
     shaken: Array,
     turns: Sequence[Turn],
 ) -> list[HeldWindow]:
@@ -48,11 +48,11 @@ def replay_windows(
     start, t = float(source.block.t[0]), source.block.t
     felt, arrived = state.experienced(x).f, _rest_onsets(state, fitted)
     out: list[HeldWindow] = []
-    bounds = spans(source.block, source.about)
+    bounds = window_bounds(source.block, source.about)
     ways = {turn.positions[1]: manoeuvre_of_turn(turn, start) for turn in turns}
     for p in sorted(np.unique(x.position), key=lambda p: int(bounds[p, 0])):
         row = int(np.argmax(x.position == p))
-        alpha, beta = _joint_angles(state, only(x, [row]), felt[row])
+        alpha, beta = _joint_angles(state, select_rows(x, [row]), felt[row])
         begin, end = (float(v) - start for v in (t[bounds[p, 0]], t[bounds[p, 1] - 1]))
         if not out and np.isfinite(arrived[row]):  # put there not long before
             out.append(HeldWindow(alpha, beta, begin - PUT_S, begin - PUT_S + 1.0))
@@ -86,7 +86,7 @@ def _joint_angles(state: State, x: Experience, felt: Array) -> tuple[float, floa
         return float(x.alpha[0] + small[0]), float(x.beta[0] + small[1])
     state = replace(state, small_rotation=np.zeros_like(state.small_rotation))
     asked = np.array([0.0, 1.0])
-    gauged = state.experienced(only(x, [0, 0]).turned(alpha=asked, beta=asked))
+    gauged = state.experienced(select_rows(x, [0, 0]).turned(alpha=asked, beta=asked))
     there = _angles_for_force(gauged.base_force, x.mounting @ felt)
     out = []
     for angle, read in zip(there, (gauged.alpha, gauged.beta), strict=True):
@@ -113,7 +113,7 @@ def _angles_for_force(base: Array, seen: Array) -> tuple[float, float]:
     return alpha, beta
 
 
-def _rest_onsets(state: State, fitted: Fitted) -> Array:
+def _rest_onsets(state: State, fitted: FittedSet) -> Array:
     """Instant by row, (n,) s, at which the device came to rest, for settling."""
     x, since = fitted.rows.x, fitted.dictionary.since
     arrived: Array = x.t - since[max((t.origin for t in state.terms), default=0)]

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.turns.attitude import vee
+from fieldcal.model.turns.attitude import antisymmetric_vector
 from fieldcal.model.turns.turn import Turn
 from fieldcal.sim_device.way import Manoeuvre
 
@@ -43,7 +43,7 @@ class TurnDifference:
 def manoeuvre_of_turn(turn: Turn, start: float) -> Manoeuvre:
     """The rotation of a turn, in procedure axes, as a function of s since `start`."""
     steps = turn.attitude[1:] @ np.swapaxes(turn.attitude[:-1], 1, 2)
-    sine = -vee(steps)
+    sine = -antisymmetric_vector(steps)
     size = np.linalg.norm(sine, axis=1)
     longer = np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0)
     small = sine * np.where(size > 0, longer, 1.0)[:, None]

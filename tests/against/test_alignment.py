@@ -57,7 +57,7 @@ def test_delay_drift_and_axes_are_those_that_were_drawn(
     expected = np.zeros(6)
     if lost == 1:  # what stands upright is known of the recording
         expected[1] = -G
-    np.testing.assert_allclose(where.unseen, expected, atol=0.5)
+    np.testing.assert_allclose(where.unseen_gravity, expected, atol=0.5)
     assert found.hz.shape == (6,)
 
 

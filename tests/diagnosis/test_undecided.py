@@ -37,7 +37,7 @@ def weighed(explanation: Explanation, *shares: float) -> list[str]:
     for offer in posterior.search.offers(empty):
         name = offer.member[0].name
         if name in catalogue() and name not in alone:
-            alone[name] = posterior.search.taken(empty, offer)
+            alone[name] = posterior.search.accept(empty, offer)
         if len(alone) == len(shares) - 1:
             break
     sets = [empty, *alone.values()]

@@ -13,7 +13,7 @@ from fieldcal.diagnosis.findings import unknown_mismatch
 from fieldcal.diagnosis.findings.unknown_mismatch import unknown_mismatches
 from fieldcal.diagnosis.result import Mismatch
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 
 
 def off_in(positions: tuple[int, ...]) -> Mismatch:
@@ -29,10 +29,12 @@ def test_two_wrong_angles_each_have_their_own_positions_and_size(
 
     monkeypatch.setattr(unknown_mismatch, "column_estimates", estimates)
     wide = np.ones(1)
-    shared = Group("wrong", "", np.array([0]), wide, params=(0,), together=(1, 4))
+    shared = Group(
+        "wrong", "", np.array([0]), wide, params=(0,), moved_positions=(1, 4)
+    )
     single = Group("wrong", "", np.array([1, 2]), wide, params=(1, 0), position=6)
     cause = Cause("wrong", "", 0.01, (shared, single), "position")
-    standing = Standing("wrong", ((cause, shared), (cause, single)), 1.0, ())
+    standing = ProbableCause("wrong", ((cause, shared), (cause, single)), 1.0, ())
     explanation = cast(Explanation, SimpleNamespace(best=SimpleNamespace(set=None)))
     first, second = unknown_mismatches(
         explanation, standing, [off_in((1, 4)), off_in((6,))]

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.core.frames import earth_rate_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model.causes.columns import RowView, of_effect
+from fieldcal.model.causes.columns import RowView, effect_basis
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -60,7 +60,7 @@ def columns(effect: Motion | Sensor, x: Experience) -> Array:
     perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
     since = x.since_turn[None]
     shape = {s.name: SHAPE[s.name] for s in effect.shapes}
-    return of_effect(effect, shape, 0).of(RowView.of(x, since, perfect))
+    return effect_basis(effect, shape, 0).evaluate(RowView.of(x, since, perfect))
 
 
 EFFECTS = catalogue()

@@ -16,7 +16,7 @@ from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
 from fieldcal.evaluation import angles_shown, omitted_effects
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import checked_effect
 from fieldcal.solve import solve
@@ -299,7 +299,7 @@ def test_a_tilt_that_a_result_has_some_of_beside_the_other_is_carried() -> None:
     both = solve(seen, beside_tilt_sigma_deg=0.05)
     only = solve(seen, tilt="base_tilt", beside_tilt_sigma_deg=0.05)
     for name in TILTS:
-        shown = Standing(name, (), 0.99, ())
+        shown = ProbableCause(name, (), 0.99, ())
         assert omitted_effects._is_included(both, shown)
         assert omitted_effects._is_included(only, shown) == (name == "base_tilt")
 

@@ -13,7 +13,7 @@ from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.model.rows.vibration import usual_noise
+from fieldcal.model.rows.vibration import quiet_window_noise
 from fieldcal.physics.recording import grids_of
 from fieldcal.sim_device.profile import ZERO, NoiseFigures, Profile
 
@@ -53,5 +53,5 @@ def test_noise_has_a_floor_of_the_grain_that_shows_on_the_way() -> None:
         [np.searchsorted(block.t, (p["start_s"] + 1, p["end_s"] - 1)) for p in WHERE]
     )
     np.testing.assert_allclose(grids_of(block), [MG] * 3 + [MRAD] * 3, rtol=1e-6)
-    noise = usual_noise(block, windows, 100.0).white
+    noise = quiet_window_noise(block, windows, 100.0).white
     assert (noise > np.repeat([0.99 * MG, 0.99 * MRAD], 3) / np.sqrt(12)).all()

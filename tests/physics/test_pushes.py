@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.pushes import Usual, disturbed
+from fieldcal.physics.pushes import UsualSpread, disturbed_stretches
 
 M = 10
 
@@ -16,7 +16,7 @@ def noise(seed: int, n: int = 3000) -> Array:
 
 
 def test_noise_is_pushed_in_less_than_one_window_of_a_hundred() -> None:
-    assert sum(len(disturbed(noise(seed), M)) > 0 for seed in range(300)) <= 3
+    assert sum(len(disturbed_stretches(noise(seed), M)) > 0 for seed in range(300)) <= 3
 
 
 @pytest.mark.parametrize("n", [800, 3000])
@@ -25,7 +25,7 @@ def test_a_gentle_push_is_found_whole_and_no_sample_of_it_stands_out(n: int) -> 
     for seed in range(10):
         z = noise(seed, n)
         z[200:240, 2] += 13.0 / np.sqrt(40)
-        ((first, last),) = disturbed(z, M)
+        ((first, last),) = disturbed_stretches(z, M)
         assert abs(first - 200) <= 24 and abs(last - 240) <= 24
 
 
@@ -37,23 +37,23 @@ def test_what_trembles_throughout_is_not_pushed() -> None:
         for i, one in enumerate(drawn):
             course = 0.97 * course + 0.3 * one
             z[i] += course
-        assert len(disturbed(z, M)) == 0
+        assert len(disturbed_stretches(z, M)) == 0
 
 
 def test_what_is_usual_does_not_count_where_it_is_most() -> None:
     """The means of a window of which a tenth was pushed are as wide as without."""
     z = noise(5, 600)
-    calm = Usual.of(z, M).means[4 * M]
+    calm = UsualSpread.of(z, M).means[4 * M]
     z[200:260] += 3.0
-    assert np.abs(Usual.of(z, M).means[4 * M] / calm - 1).max() < 0.6
+    assert np.abs(UsualSpread.of(z, M).means[4 * M] / calm - 1).max() < 0.6
 
 
 def test_a_part_is_judged_by_what_is_usual_in_the_whole() -> None:
     """Of 200 samples half are pushed; by themselves they would do so throughout."""
     z = noise(6)
     z[1000:1100] += 2.0
-    there, part = Usual.of(z, M), z[950:1150]
-    found = disturbed(part, M, there)
+    there, part = UsualSpread.of(z, M), z[950:1150]
+    found = disturbed_stretches(part, M, there)
     assert abs(found[0, 0] - 50) <= 24 and abs(found[-1, 1] - 150) <= 24
     assert np.diff(found, axis=1).sum() > 60
-    assert len(disturbed(part, M)) == 0
+    assert len(disturbed_stretches(part, M)) == 0

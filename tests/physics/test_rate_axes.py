@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array
-from fieldcal.physics.rate_axes import SeenTurn, axes_by_turns, signed_axes
+from fieldcal.physics.rate_axes import ObservedTurn, axes_by_turns, signed_axes
 
 
-def turned(axes: Array, rng: np.random.Generator, count: int = 6) -> list[SeenTurn]:
+def turned(axes: Array, rng: np.random.Generator, count: int = 6) -> list[ObservedTurn]:
     """Turns of a device whose gyroscopes put out axes^T w."""
     out = []
     for _ in range(count):
@@ -20,7 +20,7 @@ def turned(axes: Array, rng: np.random.Generator, count: int = 6) -> list[SeenTu
         for step in steps:
             way = Rotation.from_rotvec(-step).apply(way)
         bias = rng.normal(0, 0.2, 3)
-        out.append(SeenTurn(up + bias, way + bias, steps @ axes))
+        out.append(ObservedTurn(up + bias, way + bias, steps @ axes))
     return out
 
 
@@ -44,7 +44,7 @@ def test_turns_about_one_axis_do_not_tell_the_others() -> None:
     rng = np.random.default_rng(3)
     swapped = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
     about_x = [
-        SeenTurn(one.before, Rotation.from_rotvec([-a, 0, 0]).apply(one.before),
+        ObservedTurn(one.before, Rotation.from_rotvec([-a, 0, 0]).apply(one.before),
                  np.tile([0, a / 40, 0], (40, 1)))
         for one, a in zip(turned(swapped, rng), np.linspace(0.5, 2, 6), strict=True)
     ]  # fmt: skip

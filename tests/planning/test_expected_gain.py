@@ -60,7 +60,7 @@ def explained(
 
 
 def gain_of(found: Explanation) -> ExpectedGain:
-    likely = found.posterior.at_points
+    likely = found.posterior.weights_on_grid
     return ExpectedGain(found.rows, found.inferred, likely, ALLOWED, ANGLE)
 
 
@@ -199,11 +199,11 @@ def test_explanations_between_the_points_of_a_grid_count_at_the_points() -> None
     posterior = found.posterior
     causes = {c.key: c for c in found.dictionary.causes}
     other = causes["warm_up:gyr"]
-    there = posterior.search.evaluated(((other, other.variants[3]),))
-    nearer = found.inferred.inference.beside(found.inferred, there)
+    there = posterior.search.evaluate(((other, other.variants[3]),))
+    nearer = found.inferred.inference.refine_beside(found.inferred, there)
     likely = replace(nearer, score=found.best.set.score)
     posterior._nearer.append((there, likely))
-    at_points = dict(posterior.at_points)
+    at_points = dict(posterior.weights_on_grid)
     assert sum(at_points.values()) == pytest.approx(1.0)
     assert at_points[there] >= dict(posterior.weights)[likely] > 0.3
     assert likely.state.columns.max() >= len(posterior.search.gram.index)
@@ -222,7 +222,7 @@ def test_what_a_part_showed_may_be_contradicted_without_a_search_from_nothing(
     def refused(*_: object) -> None:
         raise AssertionError("searched from nothing")
 
-    monkeypatch.setattr(Inference, "_from_nothing", refused)
+    monkeypatch.setattr(Inference, "_search_from_nominal", refused)
     quick = explain(whole.prepared, before)
     assert [c.name for c, _ in quick.best.set.members] == ["base_tilt"]
     assert quick.best.set.keys == whole.best.set.keys

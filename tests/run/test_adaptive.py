@@ -17,7 +17,7 @@ from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.history.store import History
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures import adaptive
 from fieldcal.run import plan_file, session_run
@@ -234,10 +234,10 @@ def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
 ) -> None:
     """It ended NO-GO where a tilted base was certain, which it takes into account."""
     chances = {"time": 0.6}
-    standing = [Standing(n, (), chances.get(n, 0.9999), ()) for n in names]
+    standing = [ProbableCause(n, (), chances.get(n, 0.9999), ()) for n in names]
     so_far = SimpleNamespace(
         sufficient=False,
-        explanation=SimpleNamespace(standing=standing),
+        explanation=SimpleNamespace(probable_causes=standing),
         calibration=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
     )
     assert adaptive._named(so_far) == said  # type: ignore[arg-type]

@@ -11,9 +11,9 @@ from observed import BIAS, SCALE, observe, outputs
 
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.positions import SIX_FACES, Position
-from fieldcal.model.causes.effect_causes import of_effects
-from fieldcal.model.causes.random_causes import of_chance
-from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.effect_causes import effect_causes
+from fieldcal.model.causes.random_causes import random_causes
+from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
@@ -73,7 +73,9 @@ def member(name: str, params: tuple[int, ...] | None = None) -> Member:
     """A cause of the accelerometers, by the columns of a dictionary of its own."""
     d = given()
     (cause,) = [
-        c for c in (*of_effects(d), *of_chance(d)) if (c.name, c.part) == (name, "acc")
+        c
+        for c in (*effect_causes(d), *random_causes(d))
+        if (c.name, c.part) == (name, "acc")
     ]
     return next((cause, g) for g in cause.variants if params in (None, g.params))
 
@@ -107,12 +109,12 @@ def test_a_cause_is_as_large_as_its_likeliest_explanation_has_it(name: str) -> N
         WeightedExplanation((one,), 0.7, sizes=(5.0,)),
     ]
     ((cause, group),) = given(shown).explanations[0].members
-    assert {g.fixed for g in (*cause.variants, group)} == {5.0}
+    assert {g.fixed_size for g in (*cause.variants, group)} == {5.0}
     assert group in cause.variants
     ((cause, group),) = (
         given([WeightedExplanation((one,), 1.0)]).explanations[0].members
     )
-    assert {g.fixed for g in (*cause.variants, group)} == {None}
+    assert {g.fixed_size for g in (*cause.variants, group)} == {None}
 
 
 def test_what_is_uncertain_beside_a_cause_does_not_make_it_smaller() -> None:
@@ -145,7 +147,7 @@ def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None
     )
     assert [s.probability for s in unlikely.explanations] == [1.0]
     d = given()
-    (cause,) = [c for c in of_effects(d) if c.name == "base_tilt"]
+    (cause,) = [c for c in effect_causes(d) if c.name == "base_tilt"]
     shown = [WeightedExplanation(((cause, cause.variants[0]),), 1.0)]
     rows = recording()
     same = ParameterSet(
@@ -161,7 +163,7 @@ def test_one_that_hardly_can_be_is_left_out_and_so_is_what_the_set_has() -> None
 
 def test_a_tilt_is_carried_beside_the_other_one_where_both_are_shown() -> None:
     d, rows = given(), recording()
-    both = {c.name: (c, c.variants[0]) for c in of_effects(d) if c.name in TILTS}
+    both = {c.name: (c, c.variants[0]) for c in effect_causes(d) if c.name in TILTS}
     for names, carried in ((TILTS, ["base_tilt"]), (("base_tilt",), [])):
         shown = [WeightedExplanation(tuple(both[name] for name in names), 1.0)]
         wanted = ParameterSetOptions("angle_offset")
@@ -174,7 +176,7 @@ def test_a_tilt_is_carried_beside_the_other_one_where_both_are_shown() -> None:
 def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
     """It has those already, as windows that scatter or may be bad."""
     d = given()
-    every = [*of_chance(d), *of_no_effect(d)]
+    every = [*random_causes(d), *unknown_causes(d)]
     for name in ("window", "position"):
         cause = next(c for c in every if c.name == name)
         shown = given(
@@ -195,7 +197,7 @@ def test_windows_that_are_off_each_for_itself_are_no_cause_of_a_set() -> None:
 
 def test_a_position_that_was_set_wrongly_is_carried() -> None:
     """Axes that may be out of square hide it from a set of six faces."""
-    cause = next(c for c in of_chance(given()) if c.name == "misset")
+    cause = next(c for c in random_causes(given()) if c.name == "misset")
     shown = given(
         [
             WeightedExplanation(((cause, cause.variants[3]),), 0.9),
@@ -209,7 +211,7 @@ def test_a_position_that_was_set_wrongly_is_carried() -> None:
 
 def test_functions_without_physics_are_carried_by_their_place() -> None:
     d = given()
-    cause = next(c for c in of_no_effect(d) if c.key == "time:ay")
+    cause = next(c for c in unknown_causes(d) if c.key == "time:ay")
     shown = given([WeightedExplanation(((cause, cause.variants[2]),), 1.0)])
     ((same, group),) = shown.explanations[0].members
     assert same.key == "time:ay" and group.shape == cause.variants[2].shape
@@ -223,7 +225,7 @@ def test_functions_without_physics_are_carried_by_their_place() -> None:
 def test_a_scale_factor_that_changes_has_its_value_at_the_end() -> None:
     """Of a function of force and time: at the end every Legendre polynomial is 1."""
     d = given()
-    cause = next(c for c in of_no_effect(d) if c.key == "force and time:ax")
+    cause = next(c for c in unknown_causes(d) if c.key == "force and time:ax")
     shown = given([WeightedExplanation(((cause, cause.variants[1]),), 1.0)])
     ((_, group),) = shown.explanations[0].members
     bias, scale = shown.bias_scale_at_end
@@ -348,7 +350,7 @@ def test_cross_coupling_is_carried_in_the_axes_of_the_set() -> None:
     nowhere = np.full(len(rows.x), np.nan)
     unknown = replace(rows.x, alpha=nowhere, beta=nowhere)
     cause, group = next(
-        (c, c.variants[0]) for c in of_effects(given()) if c.name == "cross_coupling"
+        (c, c.variants[0]) for c in effect_causes(given()) if c.name == "cross_coupling"
     )
     carried = {}
     for x in (rows.x, unknown):

@@ -13,8 +13,8 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.columns import RowView
+from fieldcal.model.causes.detents import detent_rotations as turned_alike
 from fieldcal.model.causes.detents import detents
-from fieldcal.model.causes.detents import together as turned_alike
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.parameter_set import (
@@ -95,7 +95,7 @@ def test_a_repeated_angle_is_off_by_the_same_in_half_of_the_variance() -> None:
     assert set(parts) == {"own", "repeated"}
     assert len(parts["own"].columns) == 2 * 6 and len(parts["repeated"].columns) == 4
     for group in parts.values():
-        assert group.fixed == 1.0
+        assert group.fixed_size == 1.0
         np.testing.assert_allclose(group.typical, size)
 
 
@@ -219,12 +219,12 @@ def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
 
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
     free = given(FIVE, ParameterSetOptions("base_tilt"))
-    assert all(g.fixed == priors.FREE for g in free.always)
+    assert all(g.fixed_size == priors.FREE for g in free.always)
     (tilt,) = [g for c, g in free.members if c.name == "base_tilt"]
-    assert tilt.fixed == priors.FREE
+    assert tilt.fixed_size == priors.FREE
     level = given(FIVE, ParameterSetOptions("base_tilt", level_deg=0.2))
     (tilt,) = [g for c, g in level.members if c.name == "base_tilt"]
-    sizes: Array = tilt.sizes(tilt.fixed or 0.0)
+    sizes: Array = tilt.prior_sigma(tilt.fixed_size or 0.0)
     np.testing.assert_allclose(sizes, [0.2, 0.2])
 
 
@@ -265,12 +265,12 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
         cut=(0.01, 0.0, 0.02),
     )
     (one,) = (g for _, g in d.base_members if g.cause == "rounding")
-    assert one.typical.tolist() == [0.01, 0.02] and one.fixed == 1.0
+    assert one.typical.tolist() == [0.01, 0.02] and one.fixed_size == 1.0
     np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
     assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
     view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE)))
-    table = basis.of(view)
+    table = basis.evaluate(view)
     np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
     np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])
     assert np.count_nonzero(table[:, 1:, 0]) == 0

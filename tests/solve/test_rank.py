@@ -8,7 +8,7 @@ from observed import BIAS, SCALE, G, observe, outputs
 
 from fieldcal.core.positions import FIVE, TWO, Position
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import design, parameters
+from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.solve import solve
 from fieldcal.solve.rank import (
     LADDER,
@@ -53,7 +53,7 @@ def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
     taken: tuple[Position, ...],
 ) -> None:
     def rows(places: tuple[Position, ...]) -> Array:
-        return design(TILTED, places, G)
+        return design_matrix(TILTED, places, G)
 
     extra = positions_to_add(lambda p: rows(tuple(p)), taken, LADDER)
     assert 0 < len(extra) <= MAX_POSITIONS
@@ -67,7 +67,7 @@ def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None
     def rows(places: Sequence[Position]) -> Array:
         return np.ones((len(places), 1, 2))
 
-    assert positions_to_add(lambda p: design(TILTED, p, G), FIVE, LADDER) == []
+    assert positions_to_add(lambda p: design_matrix(TILTED, p, G), FIVE, LADDER) == []
     assert positions_to_add(rows, TWO, LADDER) == []
 
 

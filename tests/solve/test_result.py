@@ -34,7 +34,7 @@ def estimated(**known: Any) -> ParameterEstimate:
         factory=FactoryErrors(),
     )  # fmt: skip
     given = SimpleNamespace(
-        options=options, free=np.zeros(5, dtype=bool), names=("acc_bias.x",)
+        options=options, unoriented=np.zeros(5, dtype=bool), names=("acc_bias.x",)
     )
     nothing: dict[str, Any] = {
         "names": ("acc_bias.x",), "undetermined": (), "parameter_set": given,

@@ -31,7 +31,7 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession
 from fieldcal.evaluation.solution import solve_session as solve_session
 from fieldcal.model.turns import rotation
-from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.session.folder import Session
 from fieldcal.solve import solve
 from fieldcal.windows import Average
@@ -66,7 +66,7 @@ def test_exponential_is_a_rotation(v: Array) -> None:
 def whole(t: Array, w: Array, each: int = 1) -> Array:
     """Attitude after a turn, in steps of some samples."""
     edge = np.arange(0, len(t), each)
-    return np.asarray(carry(small_turns(t, w, edge))[-1])
+    return np.asarray(attitudes_from_rotations(small_turns(t, w, edge))[-1])
 
 
 @pytest.mark.parametrize("each", [1, 7])
@@ -80,7 +80,7 @@ def test_constant_rate_is_exact(each: int) -> None:
 @given(st.lists(vectors, min_size=1, max_size=9))
 def test_attitudes_on_the_way_are_products_of_the_turns(steps: list[Array]) -> None:
     there = Rotation.identity()
-    found = carry(np.array(steps))
+    found = attitudes_from_rotations(np.array(steps))
     np.testing.assert_array_equal(found[0], np.eye(3))
     for step, seen in zip(steps, found[1:], strict=True):
         there = there * Rotation.from_rotvec(step)

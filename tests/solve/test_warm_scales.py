@@ -14,8 +14,8 @@ from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
-from fieldcal.model.causes.effect_causes import of_effects
-from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.effect_causes import effect_causes
+from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.state import State
 from fieldcal.solve.estimation import (
@@ -65,15 +65,17 @@ def with_gyroscopes() -> ParameterSet:
 
 def drift(d: ParameterSet) -> Member:
     """A cause on all accelerometers, as large as the biases drift."""
-    cause = next(c for c in of_effects(d) if c.key == "bias_drift:acc")
+    cause = next(c for c in effect_causes(d) if c.key == "bias_drift:acc")
     group = next(g for g in cause.variants if len(g.params) == 3)
-    cause = replace(cause, variants=(group,)).of_size(SIZE / group.typical[0])
+    cause = replace(cause, variants=(group,)).with_size(SIZE / group.typical[0])
     return cause, cause.variants[0]
 
 
 def fitted(recorded: RecordedRows) -> ParameterEstimate:
     cause, group = drift(given())
-    shown = (WeightedExplanation(((cause, group),), 1.0, sizes=(group.fixed or 0.0,)),)
+    shown = (
+        WeightedExplanation(((cause, group),), 1.0, sizes=(group.fixed_size or 0.0,)),
+    )
     return estimate_parameters(
         replace(recorded, explanations=shown), None, NOMINAL, ParameterSetOptions()
     )
@@ -85,15 +87,15 @@ def test_columns_are_the_course_times_the_force_and_as_large_as_the_biases() -> 
     found = warm_scale(d, group)
     assert found is not None
     _, one = found
-    first, end, basis = list(d.spans())[-1]
+    first, end, basis = list(d.basis_ranges())[-1]
     assert one.columns.tolist() == list(range(first, end))
-    columns = basis.of(RowView.of(d.x, d.since, NOMINAL))
+    columns = basis.evaluate(RowView.of(d.x, d.since, NOMINAL))
     expected = np.zeros((COUNT, 6, 3))
     for c in range(3):
         expected[:, c, c] = TIMES * d.x.f[:, c]
     np.testing.assert_allclose(columns, expected)
     each = 0.25 * SIZE / 9.80665
-    np.testing.assert_allclose(one.sizes(one.fixed or 0.0), each, rtol=1e-6)
+    np.testing.assert_allclose(one.prior_sigma(one.fixed_size or 0.0), each, rtol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -119,14 +121,14 @@ def test_what_changes_scale_factors_is_the_temperature(
 def test_nothing_comes_of_gyroscopes_or_of_what_is_no_bias() -> None:
     d = with_gyroscopes()
     _, group = drift(d)
-    cause = next(c for c in of_effects(d) if c.key == "bias_drift:gyr")
+    cause = next(c for c in effect_causes(d) if c.key == "bias_drift:gyr")
     assert warm_scale(d, cause.variants[0]) is None
     assert warm_scale(d, replace(group, effect=None)) is None
 
 
 def unknown(d: ParameterSet, name: str, part: str) -> Group:
     """A function without physics."""
-    causes = of_no_effect(d)
+    causes = unknown_causes(d)
     return next(c for c in causes if (c.name, c.part) == (name, part)).variants[0]
 
 
@@ -134,16 +136,16 @@ def unknown(d: ParameterSet, name: str, part: str) -> Group:
 def test_a_course_without_physics_may_be_the_temperatures(part: str, axes: int) -> None:
     """All scale factors by each of its cosines, however many biases follow it."""
     d = given()
-    group = replace(unknown(d, "time", part), fixed=2.0)
+    group = replace(unknown(d, "time", part), fixed_size=2.0)
     found = warm_scale(d, group)
     assert found is not None
     _, one = found
     count = len(group.columns) // axes
-    sizes = 0.25 * group.sizes(2.0)[:count] / 9.80665
-    np.testing.assert_allclose(one.sizes(1.0), np.tile(sizes, 3))
-    first, _, basis = list(d.spans())[-1]
+    sizes = 0.25 * group.prior_sigma(2.0)[:count] / 9.80665
+    np.testing.assert_allclose(one.prior_sigma(1.0), np.tile(sizes, 3))
+    first, _, basis = list(d.basis_ranges())[-1]
     assert one.columns[0] == first
-    columns = basis.of(RowView.of(d.x, d.since, NOMINAL))
+    columns = basis.evaluate(RowView.of(d.x, d.since, NOMINAL))
     expected = d.span.waves(d.x)[:, None, :count] * d.x.f[:, :, None]
     for c in range(3):
         own = columns[:, :, c * count : (c + 1) * count]
@@ -162,10 +164,10 @@ def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() ->
     """Drawn from the prior, all of what is said of the end is as far off as stated."""
     rng = np.random.default_rng(20)
     d, pulls = given(), []
-    cause = next(c for c in of_no_effect(d) if c.key == "time:acc")
+    cause = next(c for c in unknown_causes(d) if c.key == "time:acc")
     group = cause.variants[0]
     count = len(group.columns) // 3
-    size = group.sizes(1.0)[:count]
+    size = group.prior_sigma(1.0)[:count]
     shown = (WeightedExplanation(((cause, group),), 1.0, sizes=(1.0,)),)
     waves, force = d.span.waves(d.x)[:, :count], outputs(PLACES, bias=np.zeros(3))
     end = np.cos(np.pi * np.arange(1, count + 1))

@@ -121,7 +121,7 @@ def test_scatter_of_each_triad_and_of_turns_is_said_with_its_unit() -> None:
     assert spread.format("1.3", "rad/s") in gyr
     assert turns.startswith("the turns scatter") and "6 degrees" in turns
     assert spread.format("5", "rad") in turns
-    both.parameter_set.free[:] = True
+    both.parameter_set.unoriented[:] = True
     assert warnings._scatter_warnings(both)[0].startswith("the norms scatter")
     few = estimated(closure_squares=(90.0, 5), names=("gyr_scale.x",))
     assert len(warnings._scatter_warnings(few)) == 1, "four of five are left over"

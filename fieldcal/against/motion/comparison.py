@@ -55,8 +55,8 @@ def compare_in_motion(
     found = explain_motion(
         block, about, Reference(sim), align_motion(block, sim, names)
     )
-    standing = found.posterior.standing()
-    wide, _ = found.inferred.search.opened(found.set)
+    standing = found.posterior.probable_causes()
+    wide, _ = found.inferred.search.with_typical_calibration(found.set)
     state = _with_sizes(found, wide)
     free = _with_sizes(found, free_calibration_sizes(found, wide))
     every = (
@@ -94,7 +94,7 @@ def _with_sizes(found: MotionExplanation, sizes: Array) -> Eliminated:
 def _probability(found: MotionExplanation, differences: Sequence[Difference]) -> float:
     if differences:
         return float(np.prod([d.probability for d in differences]))
-    return found.posterior.nothing
+    return found.posterior.probability_of_noise_alone
 
 
 def _facts(block: Block) -> Facts:
@@ -129,8 +129,8 @@ def _facts_of_the_device(
 def _warnings(found: MotionExplanation, names: tuple[str, str]) -> Iterator[str]:
     """Warnings about what limits the comparison."""
     reference = found.rows.reference
-    if len(reference.lost):
-        channels = ", ".join(CHANNELS[c] for c in reference.lost)
+    if len(reference.missing_channels):
+        channels = ", ".join(CHANNELS[c] for c in reference.missing_channels)
         yield (
             f"{names[1]}: says nothing of {channels}, which are taken as constant:"
             " what moves there counts as noise"

@@ -22,9 +22,9 @@ from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows
 from fieldcal.model.rows.response import Response
-from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.motion_rows import MotionSystem, noise_levels
 from fieldcal.physics.lag import Lag
 
@@ -70,7 +70,7 @@ class MotionFit:
         """The rows at the present alignment."""
         return self.system.motion
 
-    def search(self, members: Sequence[Member]) -> Inferred:
+    def search(self, members: Sequence[Member]) -> InferenceResult:
         """Search for the best set of causes, beginning with some."""
         found = Inference(self.system, self.nominal).run(members or None)
         # a search for effects first has columns of its own
@@ -82,15 +82,15 @@ class MotionFit:
     def copy(self) -> Self:
         """A copy with columns, rows and noise of its own."""
         dictionary = MotionDictionary(self.rows, np.abs(self.nominal.scale))
-        dictionary.moved(self.rows)
+        dictionary.realign(self.rows)
         system = MotionSystem(dictionary, self.system.power.copy())
         return type(self)(system, self.nominal, self.bands, self.hz)
 
     def evidence(self, members: tuple[Member, ...]) -> float:
         """Ln evidence of causes after `settle`, including that of the noise."""
         fit = Inference(self.system, self.nominal)
-        members = fit.dictionary.like(members)
-        *_, found = fit.settled(self.nominal, np.zeros(fit.dictionary.width), members)
+        members = fit.dictionary.match_members(members)
+        *_, found = fit.settle(self.nominal, np.zeros(fit.dictionary.width), members)
         frequency, power = self.rows.frequency, self.system.power
         told = [np.log(power[frequency <= self.hz[c], c]).sum() for c in self.levels]
         return found.score - 0.5 * float(sum(told))
@@ -99,10 +99,10 @@ class MotionFit:
         """Fit some causes, the alignment and the noise in turn until convergence."""
         for _ in range(SETTLED):
             fit = Inference(self.system, self.nominal)
-            members = fit.dictionary.like(members)
+            members = fit.dictionary.match_members(members)
             none: Array = np.zeros(fit.dictionary.width)
-            state, values, found = fit.settled(self.nominal, none, members)
-            wanted = fit.wanted(members) | (values != 0)
+            state, values, found = fit.settle(self.nominal, none, members)
+            wanted = fit.wanted_columns(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
             rows, power = self.rows, self.system.power.copy()
             self._weigh(linear, values, found)
@@ -111,7 +111,7 @@ class MotionFit:
             if self._step(found, rows) < STAYS and change < STEADY:
                 break
 
-    def _weigh(self, linear: Sequence[Linear], values: Array, found: Set) -> None:
+    def _weigh(self, linear: Sequence[LinearRows], values: Array, found: Set) -> None:
         """Set the noise of the rows to that of a fit's residuals."""
         frequency = self.rows.frequency
         self.levels = noise_levels(self.bands, frequency, linear, values, found.state)
@@ -140,7 +140,7 @@ class MotionFit:
         now = replace(
             self.rows, alignment=alignment, acc=acc, gyr=gyr, share=there.lag.stamps
         )
-        self.system.dictionary.moved(now)
+        self.system.dictionary.realign(now)
 
     def _alignment(self, found: Set) -> Alignment:
         """The present alignment, corrected by a fit."""
@@ -152,7 +152,7 @@ class MotionFit:
             delay=now.delay + float(delay),
             drift=now.drift + float(drift),
             rotation=exponential(turn) @ now.rotation,
-            unseen=now.unseen + self._unseen(found),
+            unseen_gravity=now.unseen_gravity + self._unseen(found),
         )
 
     def _step(self, found: Set, before: MotionRows) -> float:
@@ -166,25 +166,27 @@ class MotionFit:
             fixed_column_estimates(found, d.turn, 3),
         ]
         moved = [np.abs(step / np.sqrt(np.diag(cov))).max() for step, cov in steps]
-        followed = [now.acc.apart(before.acc), now.gyr.apart(before.gyr)]
+        followed = [now.acc.distance_to(before.acc), now.gyr.distance_to(before.gyr)]
         return float(max(*moved, *followed, abs(now.share - before.share)))
 
     def _responses(self, there: State, free: bool) -> tuple[Response, Response]:
         """Responses of both triads to the motion; the same object if they are equal."""
         lag, rows = there.lag, self.rows
         acc, gyr = (lag.acc, lag.acc_second), (lag.gyr, lag.gyr_second)
-        first = rows.acc.towards(rows.reference, 0.0, *acc, free)
+        first = rows.acc.step_towards(rows.reference, 0.0, *acc, free)
         if not lag.delay and acc == gyr:
             return first, first
-        return first, rows.gyr.towards(rows.reference, lag.delay, *gyr, free)
+        return first, rows.gyr.step_towards(rows.reference, lag.delay, *gyr, free)
 
     def _unseen(self, found: Set) -> Array:
         """Correction of gravity along an axis that the reference lacks, (6,)."""
         d = self.system.dictionary
         out: Array = np.zeros(6)
-        if len(d.lost):
-            out[d.lost], _ = fixed_column_estimates(found, d.unseen, len(d.lost))
-        out[self.rows.alignment.unseen == 0] = 0.0
+        if len(d.missing_channels):
+            out[d.missing_channels], _ = fixed_column_estimates(
+                found, d.unseen, len(d.missing_channels)
+            )
+        out[self.rows.alignment.unseen_gravity == 0] = 0.0
         return out
 
 
@@ -207,4 +209,4 @@ def fixed_column_estimates(found: Set, first: int, count: int) -> tuple[Array, A
 def column_estimates(state: Eliminated, columns: Index) -> tuple[Array, Array, Array]:
     """Values, covariance and prior standard deviations of some columns."""
     at = np.array([int(np.flatnonzero(state.columns == c)[-1]) for c in columns])
-    return state.estimate[at], state.inverse[np.ix_(at, at)], state.sizes[at]
+    return state.estimate[at], state.inverse[np.ix_(at, at)], state.prior_sigma[at]

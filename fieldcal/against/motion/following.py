@@ -22,7 +22,7 @@ from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
 from fieldcal.model.rows.reference import Reference
-from fieldcal.model.search.inference import Inferred
+from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State
 from fieldcal.model.system.motion_rows import MotionSystem
 from fieldcal.physics.lag import Lag
@@ -63,7 +63,7 @@ class MotionExplanation:
     """
 
     fit: MotionFit
-    inferred: Inferred
+    inferred: InferenceResult
     posterior: Posterior
 
     @property
@@ -152,7 +152,9 @@ def _likeliest_fit(fit: MotionFit, dictionary: MotionDictionary) -> MotionFit:
     return best
 
 
-def _without_idle_lags(fit: MotionFit, found: Inferred) -> tuple[MotionFit, Inferred]:
+def _without_idle_lags(
+    fit: MotionFit, found: InferenceResult
+) -> tuple[MotionFit, InferenceResult]:
     """Remove filters and delays without which a new fit is at least as likely.
 
     Linearised about a filter, its absence looks worse than it is, since its effect is

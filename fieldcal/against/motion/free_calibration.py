@@ -27,8 +27,8 @@ def free_calibration_sizes(found: MotionExplanation, sizes: Array) -> Array:
     wide, first = sizes.copy(), 0
     for group in found.dictionary.always:
         some = slice(first, first := first + len(group.columns))
-        if group.fixed is None:
-            wide[some] = group.sizes(priors.FREE)
+        if group.fixed_size is None:
+            wide[some] = group.prior_sigma(priors.FREE)
     return wide
 
 

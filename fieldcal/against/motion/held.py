@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.causes.cause import FEW
+from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.session.description import Description
 
 APART = np.cos(np.deg2rad(10.0))
@@ -20,11 +20,11 @@ def holds_positions(block: Block, about: Description) -> bool:
     """Whether a recording holds enough different positions."""
     windows = [w for w in about.windows if w is not None]
     if any(p.alpha is not None or p.rate or p.speed for p in about.positions):
-        return len(windows) >= FEW
+        return len(windows) >= MIN_WINDOWS
     seen: list[Array] = []
     for start, end in windows:
         force = np.nanmean(block.between(start, end).acc, axis=0)
         up = force / max(float(np.linalg.norm(force)), 1e-12)
         if all(up @ other < APART for other in seen):
             seen.append(up)
-    return len(seen) >= FEW
+    return len(seen) >= MIN_WINDOWS

@@ -19,11 +19,11 @@ from fieldcal.against.prediction import chi2_of_uncertain_prediction
 from fieldcal.against.result import SimulatorPrediction
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.held_out import in_question
+from fieldcal.model.posterior.held_out import candidate_sets
 from fieldcal.model.rows.motion import MotionRows, frequencies
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.motion_rows import noise_levels
 
@@ -59,7 +59,7 @@ def _as_simulated(found: MotionExplanation) -> SimulatorPrediction:
     d, nominal = system.dictionary, found.fit.nominal
     nothing = np.zeros(d.width, dtype=bool)
     nothing[d.bias : d.bias + 6] = True  # a channel has rows where it has a column
-    places = np.zeros((d.places, 2))
+    places = np.zeros((d.position_count, 2))
     bare = State(nominal.bias, nominal.scale, places, np.zeros(3))
     linear = system.linearised(bare, nothing)
     squares, count, off = 0.0, 0, _ResidualSquares()
@@ -74,9 +74,9 @@ def _as_simulated(found: MotionExplanation) -> SimulatorPrediction:
 def _as_explained(found: MotionExplanation) -> SimulatorPrediction:
     inferred, system = found.inferred, found.fit.system
     visited = list(inferred.search.visited.values())
-    sets = in_question(inferred.best, visited)
-    d, values = system.dictionary, inferred.inference.padded(inferred.values)
-    wanted = inferred.inference.wanted([m for s in sets for m in s.members])
+    sets = candidate_sets(inferred.best, visited)
+    d, values = system.dictionary, inferred.inference.pad(inferred.values)
+    wanted = inferred.inference.wanted_columns([m for s in sets for m in s.members])
     linear = system.linearised(inferred.state, wanted | (values != 0))
     rows, fold, hz = found.rows, _folds(found), found.fit.hz
     squares, count, off = 0.0, 0, _ResidualSquares()
@@ -86,7 +86,7 @@ def _as_explained(found: MotionExplanation) -> SimulatorPrediction:
         frequency = frequencies(len(kept) * rows.length, rows.length, rows.step)
         for _ in range(ROUNDS):
             search = Search(d, gram(rest, d, values, (), np.flatnonzero(wanted)))
-            best = max((search.evaluated(s.members, s.sizes) for s in sets), key=_score)
+            best = max((search.evaluate(s.members, s.sizes) for s in sets), key=_score)
             levels = noise_levels(found.fit.bands, frequency, rest, values, best.state)
             rest = [_reweighted(found, p, levels, frequency) for p in rest]
         frequency = frequencies(len(gone) * rows.length, rows.length, rows.step)
@@ -105,7 +105,7 @@ class _ResidualSquares:
     def __init__(self) -> None:
         self.square, self.count = np.zeros(2), np.zeros(2)
 
-    def add(self, part: Linear, white: Array, told: NDArray[np.bool_]) -> None:
+    def add(self, part: LinearRows, white: Array, told: NDArray[np.bool_]) -> None:
         """Add whitened residuals of a channel where `told` (n,) is true."""
         triad = part.channel // 3
         self.square[triad] += float(np.sum((white / part.weight)[told] ** 2))
@@ -128,10 +128,10 @@ def _folds(found: MotionExplanation) -> Index:
     return np.arange(count) * min(FOLDS, count) // count
 
 
-def _of_stretches(part: Linear, rows: MotionRows, some: Index) -> Linear:
+def _of_stretches(part: LinearRows, rows: MotionRows, some: Index) -> LinearRows:
     """A channel's coefficients of some stretches only, with unchanged weights."""
     every = np.column_stack([part.white, part.design]) / part.weight[:, None]
-    raw = rows.of_stretches(every, some)
+    raw = rows.select_stretches(every, some)
     weight = part.weight.reshape(-1, rows.length)[some].ravel()
     window = part.window.reshape(-1, rows.length)[some].ravel()
     raw *= weight[:, None]
@@ -143,10 +143,10 @@ def _of_stretches(part: Linear, rows: MotionRows, some: Index) -> Linear:
 
 def _reweighted(
     found: MotionExplanation,
-    part: Linear,
+    part: LinearRows,
     levels: Mapping[int, Array],
     frequency: Array,
-) -> Linear:
+) -> LinearRows:
     """A channel's coefficients with another power of the noise."""
     c = part.channel
     weight = found.fit.power(c, levels[c], frequency) ** -0.5
@@ -157,7 +157,7 @@ def _reweighted(
     )  # fmt: skip
 
 
-def _residual(part: Linear, values: Array, best: Set) -> Array:
+def _residual(part: LinearRows, values: Array, best: Set) -> Array:
     """Whitened coefficients less those that a set predicts."""
     estimate: Array = np.zeros(len(values))
     np.add.at(estimate, best.state.columns, best.state.estimate)
@@ -166,7 +166,7 @@ def _residual(part: Linear, values: Array, best: Set) -> Array:
     return out
 
 
-def _squares(left: Sequence[Linear], values: Array, best: Set) -> float:
+def _squares(left: Sequence[LinearRows], values: Array, best: Set) -> float:
     """Chi squared of the held-out part, with the uncertainty of the prediction."""
     state = best.state
     inner = np.zeros((len(state.columns), len(state.columns)))

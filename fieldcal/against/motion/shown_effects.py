@@ -15,11 +15,11 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 
 
 def effect_differences(
-    found: MotionExplanation, standing: Sequence[Standing], state: Eliminated
+    found: MotionExplanation, standing: Sequence[ProbableCause], state: Eliminated
 ) -> Iterator[Difference]:
     """Differences by the causes with a probability above one half."""
     for one in standing:
@@ -52,13 +52,13 @@ def _quantities(group: Group, state: Eliminated) -> dict[str, Quantity]:
     }
     for shape in effect.shapes:
         at = float(group.shape[shape.name])
-        unsure = min(group.unsure, at) if np.isfinite(group.unsure) else None
+        unsure = min(group.shape_sigma, at) if np.isfinite(group.shape_sigma) else None
         out[shape.name] = Quantity(at, unsure, shape.unit)
     return out
 
 
 def _mismatches_of_cause(
-    found: MotionExplanation, one: Standing, state: Eliminated
+    found: MotionExplanation, one: ProbableCause, state: Eliminated
 ) -> Iterator[Mismatch]:
     """Mismatches in the channels in which a cause is significant."""
     inferred, system = found.inferred, found.fit.system

@@ -9,8 +9,8 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import CalibrationGroup, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.model_average import of_columns
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.model_average import average_of_columns
+from fieldcal.model.posterior.reported import average_over_sizes
 
 GROUP_UNITS = {
     "acc_bias": "m/s^2",
@@ -47,10 +47,12 @@ def calibration_of_set(
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
     found = one  # the best set has its reported sizes already
     if one is not explanation.best.set:
-        found = reported(explanation.posterior.search, one)
+        found = average_over_sizes(explanation.posterior.search, one)
     at = _calibration_columns(explanation)
     left = explanation.dictionary.unfitted
-    return _values_by_name(explanation, at, *of_columns([(found, 1.0)], at, left))
+    return _values_by_name(
+        explanation, at, *average_of_columns([(found, 1.0)], at, left)
+    )
 
 
 def averaged_calibration(
@@ -58,7 +60,9 @@ def averaged_calibration(
 ) -> dict[str, tuple[float, float, float]]:
     """Bias and scale factor averaged over sets, as `calibration_of_set`."""
     at = _calibration_columns(explanation)
-    return _values_by_name(explanation, at, *explanation.model_average.of_columns(at))
+    return _values_by_name(
+        explanation, at, *explanation.model_average.average_of_columns(at)
+    )
 
 
 def _calibration_columns(explanation: Explanation) -> Index:

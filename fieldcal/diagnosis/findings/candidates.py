@@ -13,7 +13,7 @@ from fieldcal.diagnosis.result import Candidate, FoundEffect
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.held_out import held_out
+from fieldcal.model.posterior.held_out import held_out_residuals
 from fieldcal.model.search.offer import Offer
 from fieldcal.physics.effect import Scatter
 
@@ -30,7 +30,7 @@ def tried_candidates(
     """Every effect that was tried on the rows, by decreasing fall of chi squared."""
     posterior = explanation.posterior
     search, best = posterior.search, posterior.best
-    nothing = search.evaluated(())
+    nothing = search.evaluate(())
     alone = _best_offer_by_effect(search.offers(nothing))
     beside = _best_offer_by_effect(search.offers(best))
     taken = {f.id: f for f in found}
@@ -49,7 +49,7 @@ def tried_candidates(
         why = "" if one else _reason_rejected(id_, explanation, offer, beside.get(id_))
         gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
         if one is None and offer is not None and id_ in followed:
-            gain = _held_out_gain_alone(explanation, search.taken(nothing, offer))
+            gain = _held_out_gain_alone(explanation, search.accept(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
         out.append(
@@ -68,9 +68,11 @@ def tried_candidates(
 
 def _held_out_gain_alone(explanation: Explanation, there: Set) -> float:
     """Part of the held-out rms that a set removes, in the channel that changes most."""
-    best, nothing = explanation.best, explanation.posterior.search.evaluated(())
+    best, nothing = explanation.best, explanation.posterior.search.evaluate(())
     before = rms_over_parts(best.rows, explanation.held_out.residual([nothing]))
-    after = rms_over_parts(best.rows, held_out(replace(best, set=there), [there]))
+    after = rms_over_parts(
+        best.rows, held_out_residuals(replace(best, set=there), [there])
+    )
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)
     if not known.any():
         return np.nan
@@ -106,10 +108,10 @@ def _reason_rejected(
                 f"explains it about as well as {standing.name}; this recording cannot"
                 " tell"
             )
-    rise = _evidence_rise(alone, posterior.search.evaluated(())) if alone else 0.0
+    rise = _evidence_rise(alone, posterior.search.evaluate(())) if alone else 0.0
     if rise < thresholds.TAKES_LITTLE or alone is None:
         return "takes no more than chance would"
-    odds = _odds(alone.score - posterior.search.evaluated(()).score)
+    odds = _odds(alone.score - posterior.search.evaluate(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
     if beside is not None and _evidence_rise(beside, best) > thresholds.TAKES_LITTLE:

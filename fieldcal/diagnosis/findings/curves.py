@@ -27,7 +27,7 @@ def residual_curves(
 ) -> Iterator[Curve]:
     """One curve for each channel and covariate of the mismatches in the windows."""
     source = explanation.prepared.source
-    start = source.warmth.start_c
+    start = source.thermometer.start_c
     done = set()
     for m in mismatch:
         name, unit = CURVE_AXES.get(m.kind, ("", ""))

@@ -20,10 +20,14 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import Member, likeliest, likeliest_of_axis
-from fieldcal.model.posterior.held_out import turn_residual, turns_held_out
-from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.evidence.sizing import (
+    Member,
+    most_probable_axis_size,
+    most_probable_size,
+)
+from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_residual
+from fieldcal.model.posterior.probabilities import ProbableCause
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.physics.effect import Param, Scatter
 from fieldcal.physics.recording import Fault
 
@@ -58,29 +62,29 @@ def root_mean_square(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
 
 
-def remove_cause(explanation: Explanation, standing: Standing) -> CauseRemoval:
+def remove_cause(explanation: Explanation, standing: ProbableCause) -> CauseRemoval:
     """Remove a cause, and calculate what its columns had explained."""
     best = explanation.best
     less = explanation.posterior.without(standing.name)
-    there = Fitted(best.rows, best.dictionary, best.linear, best.values, less)
-    residual = there.residual(there.certain)
-    now = best.squares_of(best.residual(best.certain))
+    there = FittedSet(best.rows, best.dictionary, best.linear, best.values, less)
+    residual = there.residual(there.deterministic_estimate)
+    now = best.squares_of(best.residual(best.deterministic_estimate))
     turned = _squares_of_turns(explanation, there) - _squares_of_turns(
         explanation, best
     )
     return CauseRemoval(less, residual, best.squares_of(residual) - now, turned)
 
 
-def _squares_of_turns(explanation: Explanation, fitted: Fitted) -> float:
+def _squares_of_turns(explanation: Explanation, fitted: FittedSet) -> float:
     """Whitened squares of all turns."""
     values = fitted.estimate
-    parts = (turn_residual(t, values) for t in explanation.inferred.turned)
+    parts = (turn_residual(t, values) for t in explanation.inferred.turn_rows)
     return float(sum(part @ part for part in parts))
 
 
 def effect_of_cause(
     explanation: Explanation,
-    standing: Standing,
+    standing: ProbableCause,
     lost: CauseRemoval,
     then: ModelResiduals,
 ) -> FoundEffect:
@@ -113,11 +117,11 @@ def effect_of_cause(
 def _score_at_instability(less: Set, best: Set) -> float:
     """Log evidence of a set with the instabilities of another."""
     rows = best.state.rows
-    return type(less.state).of(rows, less.state.columns, less.state.sizes).score
+    return type(less.state).of(rows, less.state.columns, less.state.prior_sigma).score
 
 
 def parameter_estimates(
-    explanation: Explanation, standing: Standing
+    explanation: Explanation, standing: ProbableCause
 ) -> dict[str, Quantity]:
     """Parameters of a cause that the rows determine, averaged over sets."""
     effect = catalogue()[standing.name]
@@ -126,7 +130,7 @@ def parameter_estimates(
     out: dict[str, Quantity] = {}
     for member in standing.members:
         group = member[1]
-        value, covariance = explanation.model_average.of_member(member)
+        value, covariance = explanation.model_average.average_of_member(member)
         _, _, prior = column_estimates(explanation.best.set, group.columns)
         own: dict[str, Quantity] = {}
         sigma = np.sqrt(np.diag(covariance))
@@ -134,7 +138,7 @@ def parameter_estimates(
             if s**2 < thresholds.DETERMINED * wide**2:
                 name = effect.params[j].name
                 own[name] = Quantity(float(v), float(s), effect.params[j].unit)
-        if explanation.dictionary.free.all():
+        if explanation.dictionary.unoriented.all():
             own = merge_turned_parameters(group, value, covariance, prior, own)
         out |= _with_arrival_uncertainty(own, group)
     for shape in effect.shapes:
@@ -210,14 +214,14 @@ def shape_estimate(explanation: Explanation, member: Member) -> tuple[float, flo
     (shape,) = group.effect.shapes  # type: ignore[union-attr]
     if shape.kind == "instant":
         return estimate_instant(explanation, member)
-    return value, min(group.unsure, value)
+    return value, min(group.shape_sigma, value)
 
 
 def column_estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
     """Value, sigma and prior standard deviation of some columns of a set."""
     at = _column_indices(found, columns)
     value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
-    return value, sigma, found.state.sizes[at]
+    return value, sigma, found.state.prior_sigma[at]
 
 
 def _column_indices(found: Set, columns: Index) -> Index:
@@ -227,7 +231,9 @@ def _column_indices(found: Set, columns: Index) -> Index:
     )
 
 
-def random_sizes(explanation: Explanation, standing: Standing) -> dict[str, Quantity]:
+def random_sizes(
+    explanation: Explanation, standing: ProbableCause
+) -> dict[str, Quantity]:
     """Sizes of a random effect, each with its uncertainty.
 
     They are those of the likeliest set: a covariance averaged over several sizes
@@ -248,11 +254,11 @@ def random_sizes_of_group(
     Their uncertainty follows from the information on ln v.
     """
     out = {}
-    whole = likeliest(found.state, _column_indices(found, group.columns), v)
+    whole = most_probable_size(found.state, _column_indices(found, group.columns), v)
     for param, at in _scattered_columns(d, group):
         size, part = whole
         if len(at) < len(group.columns):
-            size, part = likeliest_of_axis(
+            size, part = most_probable_axis_size(
                 found.state, _column_indices(found, at), v, whole
             )
         size *= param.typical
@@ -266,12 +272,15 @@ def _scattered_columns(d: Dictionary, group: Group) -> Iterator[tuple[Param, Ind
     if not group.params:
         yield from ((one, group.columns) for one in params)
     for c in group.params:
-        yield params[c], np.intersect1d(group.columns, d.wave(c, d.wander.modes[c]))
+        yield (
+            params[c],
+            np.intersect1d(group.columns, d.cosine_columns(c, d.wander.modes[c])),
+        )
 
 
 def _held_out_gain(
     explanation: Explanation,
-    standing: Standing,
+    standing: ProbableCause,
     lost: CauseRemoval,
     then: ModelResiduals,
 ) -> float:
@@ -300,10 +309,10 @@ def held_out_rms_gain(
     explanation: Explanation, lost: CauseRemoval, then: ModelResiduals
 ) -> float:
     """Part of the held-out rms that is removed, in the channel with the most effect."""
-    best, turned = explanation.best, explanation.inferred.turned
-    there = Fitted(best.rows, best.dictionary, best.linear, best.values, lost.set)
+    best, turned = explanation.best, explanation.inferred.turn_rows
+    there = FittedSet(best.rows, best.dictionary, best.linear, best.values, lost.set)
     if shows_mainly_in_turns(lost):
-        without = root_mean_square(turns_held_out(there, turned))
+        without = root_mean_square(held_out_turn_residuals(there, turned))
         return float(1 - root_mean_square(explanation.turns_held_out) / without)
     ahead = rms_over_parts(best.rows, explanation.held_out.residual([lost.set]))
     now = then.held_out_rms

@@ -25,13 +25,13 @@ from fieldcal.diagnosis.result import Kind, Mismatch
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
-from fieldcal.model.posterior.probabilities import Standing
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.posterior.probabilities import ProbableCause
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.physics.recording import Fault
 
 
 def of_cause(
-    explanation: Explanation, standing: Standing, lost: CauseRemoval
+    explanation: Explanation, standing: ProbableCause, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that an effect of the catalogue accounts for."""
     effect = catalogue()[standing.name]
@@ -95,16 +95,16 @@ def time_span(
 ) -> tuple[float, float]:
     """Device time from the first to the last sample of some positions, s."""
     source = explanation.prepared.source
-    windows = spans(source.block, source.about)[list(positions)]
+    windows = window_bounds(source.block, source.about)[list(positions)]
     t = source.block.t
     return float(t[windows[:, 0].min()]), float(t[windows[:, 1].max() - 1])
 
 
 def _of_turns(
-    explanation: Explanation, standing: Standing, lost: CauseRemoval
+    explanation: Explanation, standing: ProbableCause, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that a cause makes in turns, one for each channel."""
-    turned = explanation.inferred.turned
+    turned = explanation.inferred.turn_rows
     if not turned:
         return
     columns = np.concatenate([g.columns for _, g in standing.members])
@@ -119,7 +119,7 @@ def _of_turns(
     some = [t for t, o in zip(turned, out, strict=True) if o] or list(turned)
     places = tuple(sorted({p for t in some for p in t.positions}))
     source = explanation.prepared.source
-    windows = spans(source.block, source.about)
+    windows = window_bounds(source.block, source.about)
     t = source.block.t
     gaps = [(windows[p, 1], windows[q, 0]) for p, q in (s.positions for s in some)]
     effect = catalogue()[standing.name]
@@ -138,13 +138,13 @@ def _of_turns(
 
 
 def largest_turn_outputs(
-    explanation: Explanation, standing: Standing
+    explanation: Explanation, standing: ProbableCause
 ) -> dict[str, float]:
     """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
     inference = explanation.inferred.inference
     out: dict[str, float] = {}
     state, members = explanation.state, standing.members
-    for course in inference.on_turns(explanation.turns, state, members):
+    for course in inference.outputs_in_turns(explanation.turns, state, members):
         for c, name in enumerate(CHANNELS):
             size = float(np.sqrt(np.mean(course[:, c] ** 2)))
             out[name] = max(out.get(name, 0.0), size)
@@ -157,7 +157,7 @@ def largest_turn_outputs(
 
 
 def of_unknown(
-    explanation: Explanation, standing: Standing, lost: CauseRemoval
+    explanation: Explanation, standing: ProbableCause, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that no effect in the catalogue accounts for."""
     for member in standing.members:
@@ -169,7 +169,7 @@ def _of_group(
     explanation: Explanation, cause: Cause, group: Group, lost: CauseRemoval
 ) -> Iterator[Mismatch]:
     """Mismatches that a group accounts for, on its channels, in its positions."""
-    positions = (group.position,) if group.position >= 0 else group.together
+    positions = (group.position,) if group.position >= 0 else group.moved_positions
     triad = np.arange(3, 6) if group.part == "gyr" else np.arange(3)
     squares = np.nan_to_num(lost.squares[triad])
     channels = (
@@ -249,7 +249,7 @@ def of_faults(
 
 def of_tones(explanation: Explanation) -> Iterator[Mismatch]:
     """Mismatches by lines in the spectrum."""
-    positions = tuple(int(p) for p in explanation.dictionary.held)
+    positions = tuple(int(p) for p in explanation.dictionary.window_positions)
     start, end = time_span(explanation, positions)
     for tone in explanation.prepared.spectral_lines:
         for name in tone.channels:

@@ -21,24 +21,28 @@ from fieldcal.diagnosis.findings.agreement import ModelResiduals
 from fieldcal.diagnosis.findings.found_effects import root_mean_square
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.result import Quality
-from fieldcal.model.posterior.held_out import held_out, turn_residual, turns_held_out
-from fieldcal.model.rows.hand_tremor import rows_of
-from fieldcal.model.rows.reduce import reduce
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.posterior.held_out import (
+    held_out_residuals,
+    held_out_turn_residuals,
+    turn_residual,
+)
+from fieldcal.model.rows.hand_tremor import rows_of_recording
+from fieldcal.model.rows.reduce import reduce_to_rows
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.turn_rows import TurnRows
 
 TURN_UNIT = "standard deviations, in turns"
 
 
 def _model_residuals(
-    fitted: Fitted, ahead: Array, lines: Array, predicted: Array, weighed: Fitted
+    fitted: FittedSet, ahead: Array, lines: Array, predicted: Array, weighed: FittedSet
 ) -> ModelResiduals:
     """Residuals of a fit; its chi squared has the instability of another fit."""
     same = fitted.rows.y.shape == weighed.rows.y.shape
     squares = weighed.squares_of(fitted.residual()) if same else fitted.squares
     return ModelResiduals(
         fitted.rows,
-        fitted.residual(fitted.certain),
+        fitted.residual(fitted.deterministic_estimate),
         ahead,
         lines,
         predicted,
@@ -51,7 +55,7 @@ def simulation_residuals(block: Block, explanation: Explanation) -> ModelResidua
     prepared = explanation.prepared
     base = fit_recorded_samples(block, explanation)
     lines = sum((r.before for r in prepared.line_remainders), np.zeros(6))
-    ahead = held_out(base, [base.set])
+    ahead = held_out_residuals(base, [base.set])
     return _model_residuals(base, ahead, lines, lines, explanation.best)
 
 
@@ -62,7 +66,7 @@ def explained_residuals(explanation: Explanation) -> ModelResiduals:
     predicted = sum((r.held_out for r in remains), np.zeros(6))
     if not best.set.members and not explanation.each_window_shows_earth_rate:
         base = explanation.calibration_only
-        ahead = held_out(base, [base.set])
+        ahead = held_out_residuals(base, [base.set])
         return _model_residuals(base, ahead, lines, predicted, best)
     ahead = explanation.held_out.residual(explanation.rival_sets)
     return _model_residuals(best, ahead, lines, predicted, best)
@@ -70,17 +74,17 @@ def explained_residuals(explanation: Explanation) -> ModelResiduals:
 
 def turn_quality(explanation: Explanation) -> tuple[Quality, Quality]:
     """Quality in the turns without and with the effects, in standard deviations."""
-    best, turned = explanation.best, explanation.inferred.turned
-    nothing = explanation.posterior.search.evaluated(())
+    best, turned = explanation.best, explanation.inferred.turn_rows
+    nothing = explanation.posterior.search.evaluate(())
     plain = replace(best, set=nothing)
     return (
-        _quality_of_turns(plain, turned, turns_held_out(plain, turned)),
+        _quality_of_turns(plain, turned, held_out_turn_residuals(plain, turned)),
         _quality_of_turns(best, turned, explanation.turns_held_out),
     )
 
 
 def _quality_of_turns(
-    fitted: Fitted, turned: Sequence[TurnRows], ahead: Array
+    fitted: FittedSet, turned: Sequence[TurnRows], ahead: Array
 ) -> Quality:
     residual = np.concatenate([turn_residual(t, fitted.estimate) for t in turned])
     return Quality(
@@ -88,7 +92,7 @@ def _quality_of_turns(
     )
 
 
-def fit_recorded_samples(block: Block, explanation: Explanation) -> Fitted:
+def fit_recorded_samples(block: Block, explanation: Explanation) -> FittedSet:
     """Fit of bias and scale factor alone to the samples as recorded."""
     prepared: PreparedRecording = explanation.prepared
     if block is prepared.source.block and not prepared.checked.ids:
@@ -99,8 +103,8 @@ def fit_recorded_samples(block: Block, explanation: Explanation) -> Fitted:
         usable=np.hstack([np.isfinite(block.acc), np.isfinite(block.gyr)]),
     )
     # rows of the same kind as before: by-hand or not is not decided again
-    in_hand = prepared.rows.wander.any()
-    rows = rows_of(source) if in_hand else reduce(source)
+    in_hand = prepared.rows.hand_angle.any()
+    rows = rows_of_recording(source) if in_hand else reduce_to_rows(source)
     return fit_calibration_only(build_inference(source, rows, prepared), rows)
 
 

@@ -33,7 +33,7 @@ def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.in
             total = weight.sum(axis=0)
             some = np.where(total > 0, total, np.nan)
             means.append((weight * np.nan_to_num(residual[part])).sum(axis=0) / some)
-            sds.append(np.hypot(1 / np.sqrt(some), rows.common[part[0]]))
+            sds.append(np.hypot(1 / np.sqrt(some), rows.window_error[part[0]]))
             position.append(p)
     return np.array(means), np.array(sds), np.array(position, dtype=np.intp)
 

@@ -13,7 +13,7 @@ from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.probabilities import Standing
+from fieldcal.model.posterior.probabilities import ProbableCause
 
 JOINTS = ("α", "β")
 
@@ -42,7 +42,7 @@ class UnknownMismatch:
 
 
 def unknown_mismatches(
-    explanation: Explanation, standing: Standing, found: Sequence[Mismatch]
+    explanation: Explanation, standing: ProbableCause, found: Sequence[Mismatch]
 ) -> list[UnknownMismatch]:
     """Mismatches of one cause, each with the angle errors that would explain it."""
     turned = angle_errors(explanation, standing)
@@ -52,7 +52,7 @@ def unknown_mismatches(
 
 
 def angle_errors(
-    explanation: Explanation, standing: Standing
+    explanation: Explanation, standing: ProbableCause
 ) -> dict[Places, AngleErrors]:
     """Errors of wrongly set angles, by the positions that have them.
 
@@ -61,7 +61,7 @@ def angle_errors(
     if standing.kind != "position":
         return {}
     return {
-        one.together or (one.position,): _errors(explanation, one)
+        one.moved_positions or (one.position,): _errors(explanation, one)
         for member in standing.members
         for one in single_errors(explanation, member)
     }
@@ -70,7 +70,7 @@ def angle_errors(
 def single_errors(explanation: Explanation, member: Member) -> list[Group]:
     """The single setting errors of a member; of several, only the significant ones."""
     cause, group = member
-    parts = [*cause.parts_of(group)]
+    parts = [*cause.single_errors_of(group)]
     if len(parts) == 1:
         return parts  # it may be an error other than of an angle
     return [one for one in parts if _errors(explanation, one)] or parts

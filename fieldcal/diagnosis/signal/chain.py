@@ -18,10 +18,10 @@ from fieldcal.core.sampling import rate_of
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.means import median_sigma
-from fieldcal.model.rows.orientation import readings
-from fieldcal.model.rows.vibration import usual_noise
+from fieldcal.model.rows.orientation import gyro_readings
+from fieldcal.model.rows.vibration import quiet_window_noise
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
@@ -218,12 +218,12 @@ def samples_to_check(
     block: Block, usable: NDArray[np.bool_], about: Description
 ) -> CheckedSamples:
     """Samples and facts that the checks are given."""
-    windows, rate = spans(block, about), rate_of(block)
+    windows, rate = window_bounds(block, about), rate_of(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
     unknown = np.full(6, np.nan)
     noise = ChannelNoise(unknown, unknown)
     if len(held):
-        noise = usual_noise(block, held, rate)
+        noise = quiet_window_noise(block, held, rate)
     if about.positions:
         alpha, beta = angles(about.positions)
         gamma = third_angles(about.positions)
@@ -236,7 +236,7 @@ def samples_to_check(
         beta,
         about.gravity,
         gamma=gamma,
-        rate=readings(about, here, np.full((len(alpha), 3), np.nan)).rates(
+        rate=gyro_readings(about, here, np.full((len(alpha), 3), np.nan)).rates(
             about.mounting
         ),
         base_force=about.base_force,

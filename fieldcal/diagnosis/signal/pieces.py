@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.core.sampling import rate_of
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.change_points import clear_jumps
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.experience import Experience
@@ -69,7 +69,7 @@ class WindowSamples:
 def long_windows(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
     """Windows that are long enough: index of their first row, and sample bounds."""
     first = {int(p): i for i, p in reversed(list(enumerate(rows.x.position)))}
-    bounds = enumerate(spans(source.block, source.about))
+    bounds = enumerate(window_bounds(source.block, source.about))
     return [
         (first[p], int(a), int(b))
         for p, (a, b) in bounds

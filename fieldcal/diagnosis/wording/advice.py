@@ -58,7 +58,7 @@ def advice(
         )
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
         yield "Hold more positions, or hold them longer: random errors average out."
-    held = len(explanation.dictionary.held)
+    held = len(explanation.dictionary.window_positions)
     if held < FEWEST_POSITIONS:
         yield f"Record more than {held} position{'s' * (held > 1)}: so few show little."
 

@@ -14,7 +14,7 @@ import numpy as np
 from fieldcal.core.positions import Position, ladder
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
-from fieldcal.model.causes.planned import late
+from fieldcal.model.causes.planned import rows_at_session_end
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 
@@ -58,20 +58,20 @@ def deciding_position(
 
     None if no position of the ladder decides, or if the angles are not known.
     """
-    rows, instead = explanation.rows, explanation.posterior.instead.get(one, {})
+    rows, instead = explanation.rows, explanation.posterior.alternatives.get(one, {})
     if other not in instead or not rows.x.oriented.all():
         return None
     states = [_state(explanation, s) for s in (explanation.best.set, instead[other])]
     x = rows.x
     sd = np.nanmedian(rows.sd, axis=0)
-    sd = sd / np.sqrt(len(x) / len(explanation.dictionary.held))
-    sd = np.hypot(sd, np.nanmedian(rows.common, axis=0))
+    sd = sd / np.sqrt(len(x) / len(explanation.dictionary.window_positions))
+    sd = np.hypot(sd, np.nanmedian(rows.window_error, axis=0))
     since = explanation.dictionary.since[:, -1:]
     about = explanation.prepared.source.about
     held = [p.degrees for p in about.positions]
     best: DecidingPosition | None = None
     for alpha, beta in ladder(about.positions):
-        place = late(x, *np.deg2rad([[alpha], [beta]]))
+        place = rows_at_session_end(x, *np.deg2rad([[alpha], [beta]]))
         seen = [s.output(s.experienced(place), since) for s in states]
         apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
         if best is None or apart > best.apart * 1.2:
@@ -83,5 +83,5 @@ def deciding_position(
 
 def _state(explanation: Explanation, found: Set) -> State:
     """The state at a set's estimates, without errors of single orientations."""
-    state, _ = explanation.inferred.inference.moved(found)
+    state, _ = explanation.inferred.inference.state_at_estimate(found)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))

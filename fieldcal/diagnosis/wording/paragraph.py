@@ -219,12 +219,12 @@ def _undecided(explanation: Explanation) -> str:
     posterior = explanation.posterior
     likeliest = [
         f"{name} ({probability:.2f})"
-        for name, probability in posterior.suspects()
+        for name, probability in posterior.ranked_causes()
         if probability > thresholds.MENTIONED and name in catalogue()
     ]
     said = (
         "The simulation leaves something out, which this recording shows too weakly to"
-        f" name it (probability {1 - posterior.nothing:.2f})"
+        f" name it (probability {1 - posterior.probability_of_noise_alone:.2f})"
     )
     return f"{said}; likeliest: {', '.join(likeliest)}." if likeliest else f"{said}."
 

@@ -16,25 +16,26 @@ Basis = Course | General
 Point = tuple[Mapping[str, float], int]
 """Values of an effect's shape parameters, and the origin of its times."""
 
-FEW = 3
-"""Windows below which nobody can tell what each is off by from the bias."""
+MIN_WINDOWS = 3
+"""Number of windows below which their offsets are not separable from the bias."""
 
 CLOSURE = 6
-"""Kind of the closures of turns, beside the six outputs."""
+"""Index of the instability of turns' closures; 0 to 5 are those of the six outputs."""
 
 TRIADS = (("acc", (0, 1, 2)), ("gyr", (3, 4, 5)))
 
 BOTH = frozenset({"acc", "gyr"})
 """Accelerometers and gyroscopes."""
 
-OFFERED = 60
-"""Columns by which a group is offered: a course on three axes by twenty waves each."""
+MAX_OFFERED_COLUMNS = 60
+"""Largest number of columns used to predict the worth of a group: three axes of twenty
+cosines each."""
 
 Kind = Literal["effect", "random", "noise", "unknown", "position", "given"]
 
 
 def triads_of(part: str) -> frozenset[str]:
-    """Triads that a triad, a channel or, if it is empty, everything belongs to.
+    """Triads of a part: of a triad itself, of a channel, or both if it is empty.
 
     >>> sorted(triads_of("gx")), sorted(triads_of(""))
     (['gyr'], ['acc', 'gyr'])
@@ -50,20 +51,20 @@ class Group:
 
     Attributes
     ----------
-    cause : id of the effect, or what it is called where it is none
-    part : "acc", "gyr", a channel, or "" for all it touches
-    columns : (k,) of the dictionary
-    typical : (k,) size of each at v = 1
-    effect, shape, origin : where it is an effect with an equation
+    cause : id of the effect; a name of its own if there is no effect
+    part : "acc", "gyr", a channel, or "" for all channels it changes
+    columns : (k,) indices in the dictionary
+    typical : (k,) standard deviation of each column at size v = 1
+    effect, shape, origin : of an effect with an equation
     params : (k,) index of each column among the effect's parameters
-    position : the one it belongs to, -1 for all
-    together : positions that it moves alike, if it moves some only
-    in_state : whether its estimate is in the base state, and not only in the columns
-    unsure : standard uncertainty of the shape, where it was refined
-    in_step : whether one cause may change all its columns by the same
-    fixed : v, where that is known
-    random : whether it is what is drawn anew all the time: it takes nothing from a
-        residual, and predicts nothing
+    position : position it belongs to, -1 for all
+    moved_positions : positions that it rotates by the same angle, if not all
+    in_state : whether the base state contains its estimate
+    changes_together : whether a single cause may change all columns by the same amount
+    shape_sigma : standard uncertainty of the shape; nan unless it was refined
+    fixed_size : v, if it is known; None if it is estimated
+    random : whether it is a random process: it is not subtracted from residuals and
+        not used for predictions
 
     """
 
@@ -76,49 +77,50 @@ class Group:
     origin: int = 0
     params: tuple[int, ...] = ()
     position: int = -1
-    together: tuple[int, ...] = ()
+    moved_positions: tuple[int, ...] = ()
     in_state: bool = False
-    in_step: bool = False
-    unsure: float = np.nan
-    fixed: float | None = None
+    changes_together: bool = False
+    shape_sigma: float = np.nan
+    fixed_size: float | None = None
     random: bool = False
 
     @property
-    def foremost(self) -> Index:
-        """The largest of its columns, by their place among them; all but of wide ones.
+    def leading_columns(self) -> Index:
+        """Indices, within the group, of the columns of largest typical size.
 
-        By these it is offered: what the quick waves of a course add decides no rank,
-        but for a walk far above the noise.
+        They predict the worth of the group. The quick cosines of a course hardly change
+        it, except for a random walk far above the noise. All columns of a group that
+        has at most `MAX_OFFERED_COLUMNS`.
         """
-        if len(self.columns) <= OFFERED:
+        if len(self.columns) <= MAX_OFFERED_COLUMNS:
             return np.arange(len(self.columns))
         order = np.argsort(-self.typical, kind="stable")
-        return np.sort(order[:OFFERED])
+        return np.sort(order[:MAX_OFFERED_COLUMNS])
 
-    def alike(self, others: Iterable[Group]) -> list[Group]:
-        """Those of others that are of the same parameters, whatever their shapes."""
+    def with_same_parameters(self, others: Iterable[Group]) -> list[Group]:
+        """Groups among others with the same parameters and any shape."""
         own = (self.params, self.origin, self.position, self.shape.keys())
         return [
             g for g in others if (g.params, g.origin, g.position, g.shape.keys()) == own
         ]
 
-    def siblings(self, others: Iterable[Group]) -> list[Group]:
-        """Those of others that are of the same shape, whatever their parameters."""
+    def with_same_shape(self, others: Iterable[Group]) -> list[Group]:
+        """Groups among others with the same shape and any parameters."""
         own = (self.origin, self.position, self.shape)
         return [g for g in others if (g.origin, g.position, g.shape) == own]
 
     @property
-    def begins(self) -> bool:
-        """Whether its shape is the instant from which it is there."""
+    def begins_at_instant(self) -> bool:
+        """Whether its shape is the instant at which the effect begins."""
         shapes = self.effect.shapes if self.effect and self.shape else ()
         return [s.kind for s in shapes] == ["instant"]
 
-    def apart(self, other: Group) -> float:
-        """How far the shape of one alike is from its own."""
+    def shape_distance(self, other: Group) -> float:
+        """Largest relative difference of its shape from that of another group."""
         return max((abs(other.shape[k] - v) / max(abs(v), 1e-9)
                     for k, v in self.shape.items()), default=0.0)  # fmt: skip
 
-    def sizes(self, v: float) -> Array:
+    def prior_sigma(self, v: float) -> Array:
         """Standard deviation of each column before the rows are seen, (k,)."""
         wide: Array = v * self.typical
         return wide
@@ -126,17 +128,17 @@ class Group:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cause:
-    """One explanation on one triad, with every variant of it.
+    """One possible cause on one triad, with all its variants.
 
     Attributes
     ----------
     name : of the effect, or of the unknown function
     part : "acc", "gyr" or ""
-    chance : that a session has it
+    chance : prior probability that a session has it
     variants : groups, one for each value of the shape
-    kind : of the catalogue, random, noise that every device has, without physics, an
-        angle, or asked for
-    expected : variants that are likelier than others, as the device may have been off
+    kind : "effect" of the catalogue, "random" effect, "noise" that every device has,
+        "unknown" function without physics, error of a "position", or "given"
+    expected : variants that begin where the device may have been off: they are likelier
 
     """
 
@@ -149,46 +151,47 @@ class Cause:
     _nearest: dict[Group, tuple[Group, ...]] = field(
         default_factory=dict, init=False, repr=False
     )
-    """What `at_once` found, as every pair of a search asks again."""
+    """Cached results of `simultaneous_variants`."""
 
-    def at_once(self, other: Group) -> tuple[Group, ...]:
-        """Variants that happen when a group does of the same effect on the other triad.
+    def simultaneous_variants(self, other: Group) -> tuple[Group, ...]:
+        """Variants that begin at the same instant as a group on the other triad.
 
-        Those of the instants next to it; none where the effect has no instant.
+        These are the variants with the nearest instant. Empty if the group is of
+        another effect, or of one that does not begin at an instant.
         """
-        if other.cause != self.name or not other.begins:
+        if other.cause != self.name or not other.begins_at_instant:
             return ()
         if other not in self._nearest:
-            apart = [g.apart(other) for g in self.variants]
+            apart = [g.shape_distance(other) for g in self.variants]
             least, each = min(apart), zip(self.variants, apart, strict=True)
             self._nearest[other] = tuple(g for g, d in each if d == least)
         return self._nearest[other]
 
-    def parts_of(self, group: Group) -> tuple[Group, ...]:
-        """The single mistakes that a variant combines; the variant itself if one."""
+    def single_errors_of(self, group: Group) -> tuple[Group, ...]:
+        """The single position errors that a variant combines; else the variant."""
         if self.kind != "position":
-            return (group,)  # fewer columns are a weaker form of it, and no part
+            return (group,)  # of other kinds, a group is never a sum of several causes
         own = {*group.columns.tolist()}
         parts = tuple(g for g in self.variants if own > {*g.columns.tolist()})
         return parts or (group,)
 
-    def of_size(self, v: float | None) -> Cause:
-        """The same with variants of size v; itself where that is not known."""
+    def with_size(self, v: float | None) -> Cause:
+        """The cause with all variants of known size v; unchanged if v is None."""
         if v is None:
             return self
-        every = tuple(replace(group, fixed=v) for group in self.variants)
+        every = tuple(replace(group, fixed_size=v) for group in self.variants)
         return replace(self, variants=every)
 
-    def expecting(self, spans: Sequence[tuple[float, float]]) -> Cause:
-        """The same with what begins within some spans, s, likelier in all its axes.
+    def expecting_within(self, spans: Sequence[tuple[float, float]]) -> Cause:
+        """The cause with additional variants that begin within some spans, s.
 
-        It is as large as is typical there: nothing shrinks what the rows do not show.
+        These have all axes and the typical size v = 1, and are likelier than others.
         """
-        if not (spans and self.variants and self.variants[0].begins):
+        if not (spans and self.variants and self.variants[0].begins_at_instant):
             return self
         every = max((g.params for g in self.variants), key=len)
         some = [
-            replace(g, fixed=1.0)
+            replace(g, fixed_size=1.0)
             for g in self.variants
             if g.params == every
             and any(a <= at <= b for at in g.shape.values() for a, b in spans)
@@ -203,12 +206,12 @@ class Cause:
 
     @property
     def by_window(self) -> bool:
-        """Whether windows are off by it one by one: angles, offsets without physics."""
+        """Whether it changes windows one by one: angle errors and unknown offsets."""
         return self.kind == "position" or self.name in ("window", "position")
 
     @property
-    def told(self) -> bool:
-        """Whether it is something that is left out, and no noise."""
+    def reportable(self) -> bool:
+        """Whether it is reported as a cause. Noise, which every device has, is not."""
         return self.kind != "noise"
 
     @property

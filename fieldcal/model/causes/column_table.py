@@ -1,4 +1,4 @@
-"""The columns of a session: what every session has of them, and where more begin."""
+"""The table of a session's columns: those that every session has, and appended ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ColumnTable:
     Parameters
     ----------
     x : rows of the windows
-    used : (n, 6) rows that say something, by channel
+    used : (n, 6) rows with information, by channel
     since : (o, n) s since the turn, by origin
     unit : (6,) outputs per SI unit
     wander : how the biases wander inside windows
@@ -29,15 +29,15 @@ class ColumnTable:
     Attributes
     ----------
     observed : channels that were measured
-    held : positions that have a window
-    bases : what columns are, each with the first that it has
-    width : columns so far
-    bias, scale, small_rotation, windows, waves : the first column of each kind
+    window_positions : positions that have a window
+    bases : functions that calculate columns, each with its first column
+    width : number of columns
+    bias, scale, small_rotation, windows, waves : first column of each kind
 
     """
 
     turns = False
-    """Whether the ways between windows were recorded."""
+    """Whether the turns between windows were recorded."""
 
     def __init__(
         self,
@@ -49,8 +49,8 @@ class ColumnTable:
     ) -> None:
         self.x, self.used, self.since, self.unit = x, used, since, unit
         self.observed = np.flatnonzero(np.any(used, axis=0))
-        self.held = np.unique(x.position)
-        self.places = int(x.position.max()) + 1
+        self.window_positions = np.unique(x.position)
+        self.position_count = int(x.position.max()) + 1
         self.wander = wander
         self.span = smooth.CourseSpan(x.t, int(wander.modes.max()))
         self.bases: list[tuple[int, Basis]] = []
@@ -61,49 +61,51 @@ class ColumnTable:
             "aside",
             columns.small_rotation,
             sides=columns.small_rotation_sides,
-            each=True,
+            per_position=True,
         )
-        self.small_rotation = self.add(turns, 2 * self.places)
-        self.windows = self.course("window", self._inside, len(self.held), False)
-        self.waves = self.course("waves", self.span.waves, self.span.count, True)
+        self.small_rotation = self.add(turns, 2 * self.position_count)
+        self.windows = self.add_course(
+            "window", self._inside, len(self.window_positions), False
+        )
+        self.waves = self.add_course("waves", self.span.waves, self.span.count, True)
 
     def add(self, basis: Basis, width: int) -> int:
-        """Append a basis; back comes its first column."""
+        """Append a basis; returns its first column."""
         start = self.width
         self.bases.append((start, basis))
         self.width += width
         return start
 
-    def spans(self) -> Iterator[tuple[int, int, Basis]]:
-        """Every basis with its first column, and the first of the next one."""
+    def basis_ranges(self) -> Iterator[tuple[int, int, Basis]]:
+        """First column, end column and basis, of every basis."""
         ends = [*(first for first, _ in self.bases[1:]), self.width]
         for (first, basis), end in zip(self.bases, ends, strict=True):
             yield first, end, basis
 
-    def course(
+    def add_course(
         self, name: str, of: Callable[[Experience], Array], width: int, timed: bool
     ) -> int:
-        """Append a function of the row on every channel; back comes its first column.
+        """Append a function of the row on every channel; returns its first column.
 
-        `timed` says that it is known on the way between windows as well.
+        `timed` states that the function is also known during turns.
         """
         return self.add(Course(name, lambda v: of(v.x), width, timed), 6 * width)
 
-    def wave(self, channel: int, count: int = smooth.WAVES) -> Index:
-        """Columns of a channel's first cosines, (count,)."""
+    def cosine_columns(self, channel: int, count: int = smooth.WAVES) -> Index:
+        """Columns of the first cosines in time of a channel, (count,)."""
         at: Index = self.waves + channel * self.span.count + np.arange(count)
         return at
 
-    def window(self, channel: int) -> Index:
-        """Columns of what each window of a channel is off by, (p,)."""
-        count = len(self.held)
+    def window_columns(self, channel: int) -> Index:
+        """Columns of the offsets of a channel's windows, (p,)."""
+        count = len(self.window_positions)
         at: Index = self.windows + channel * count + np.arange(count)
         return at
 
     @property
     def rotations(self) -> slice:
         """Columns of the small rotations of all positions."""
-        return slice(self.small_rotation, self.small_rotation + 2 * self.places)
+        return slice(self.small_rotation, self.small_rotation + 2 * self.position_count)
 
     def rotations_of(self, positions: ArrayLike) -> Index:
         """Columns of the small rotations of some positions, two of each, (2 m,)."""
@@ -112,5 +114,5 @@ class ColumnTable:
         return at
 
     def _inside(self, x: Experience) -> Array:
-        inside: Array = np.equal.outer(x.position, self.held).astype(float)
+        inside: Array = np.equal.outer(x.position, self.window_positions).astype(float)
         return inside

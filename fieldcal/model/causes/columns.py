@@ -1,8 +1,8 @@
-"""Columns: the derivative of the rows by what a group can change.
+"""Columns: the derivatives of the rows by the parameters of a group.
 
-A `Course` is one function of the row on every channel, one column for each channel; all
-other columns are general. Windows and turns use the same object, with what the device
-experiences there.
+A `Course` is a function of the row, with one column for each channel. All other columns
+are `General`. Windows and turns use the same objects, with the inputs of the device in
+each.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.model.state import State, Term, across
+from fieldcal.model.state import State, Term, perpendicular_vectors
 from fieldcal.physics.effect import (
     NO_SHAPE,
     BiasChange,
@@ -28,10 +28,10 @@ from fieldcal.physics.effect import (
 from fieldcal.physics.experience import Experience
 
 STEP = 1e-3
-"""Of numerical derivatives, in typical sizes."""
+"""Step of numerical derivatives, in typical sizes."""
 
 SMALL = 1e-5
-"""Of turns, rad."""
+"""Step of numerical derivatives by rotations, rad."""
 
 CentralDifference = tuple[Experience, Experience, float]
 Sides = Callable[[Experience, State], Iterator[CentralDifference]]
@@ -39,19 +39,19 @@ Sides = Callable[[Experience, State], Iterator[CentralDifference]]
 
 @dataclass(frozen=True, slots=True)
 class RowView:
-    """Rows as columns see them.
+    """Rows at which columns are evaluated.
 
     Attributes
     ----------
-    plain : before the state changes what is experienced
-    x : as the state has it
+    nominal : inputs of the device without the state's rotations and motion effects
+    x : inputs with them
     since : (o, n) s since the turn, by origin
     state : the base state
-    rotations : what `small_rotation` found, if it was asked for
+    rotations : cached result of `small_rotation`
 
     """
 
-    plain: Experience
+    nominal: Experience
     x: Experience
     since: Array
     state: State
@@ -63,8 +63,8 @@ class RowView:
         """Rows at a base state."""
         return cls(plain, state.experienced(plain), since, state)
 
-    def counting_from(self, origin: int) -> Experience:
-        """Rows as the state has them, since the turn by one origin."""
+    def with_origin(self, origin: int) -> Experience:
+        """Inputs whose time since the turn counts from one origin."""
         if origin not in self._by_origin:
             seen = replace(self.x, since_turn=self.since[origin])
             self._by_origin[origin] = seen
@@ -75,15 +75,15 @@ class RowView:
 class Course:
     """A function of the row alone, (n, m), on every channel: 6 m columns.
 
-    `timed` says that it is known on the way between windows as well, `standing` that it
-    is there while an output of the gyroscopes stands on its value of the windows.
+    `timed` states that the function is also known during turns; `while_output_stands`
+    that it acts during a turn while a gyroscope output keeps its value of the windows.
     """
 
     name: str
-    of: Callable[[RowView], Array]
+    evaluate: Callable[[RowView], Array]
     width: int
     timed: bool = False
-    standing: bool = False
+    while_output_stands: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,28 +92,28 @@ class General:
 
     Attributes
     ----------
-    name : what it is called
-    of : the columns of rows
-    sides : where it changes what is experienced in positions, rows with each column a
-        step up and down, and the step
-    each : whether every position has columns of its own, which follow each other; in
-        `sides` all positions are then changed at once
-    along : whether rows of a turn have it by those beside them
+    name : of the basis
+    evaluate : calculates the columns
+    sides : if it changes the inputs in positions: yields, for each column, the inputs a
+        step up, a step down, and the step
+    per_position : whether every position has columns of its own, in sequence; `sides`
+        then changes all positions at once
+    needs_whole_turn : whether its value in a row of a turn depends on neighbouring rows
 
     """
 
     name: str
-    of: Callable[[RowView], Array]
+    evaluate: Callable[[RowView], Array]
     sides: Sides | None = None
-    each: bool = False
-    along: bool = False
+    per_position: bool = False
+    needs_whole_turn: bool = False
 
 
-def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
+def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> General:
     """Columns of an effect of the catalogue."""
 
     def sensor(view: RowView) -> Array:
-        seen = view.counting_from(origin)
+        seen = view.with_origin(origin)
         design: Array = effect.design(seen, shape or NO_SHAPE)  # type: ignore[attr-defined]
         return design
 
@@ -121,7 +121,9 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
             step[j] = STEP * param.typical
-            up, down = (_with(plain, state, effect, s) for s in (step, -step))
+            up, down = (
+                _with_changed_parameters(plain, state, effect, s) for s in (step, -step)
+            )
             yield up, down, float(step[j])
 
     def on_the_way(view: RowView) -> Array:
@@ -136,34 +138,34 @@ def of_effect(effect: Effect, shape: Mapping[str, float], origin: int) -> Genera
     if isinstance(effect, Motion):
         if effect.on_the_way:
             return General(effect.id, on_the_way)
-        return General(effect.id, _of_sides(sides), sides=sides)
+        return General(effect.id, _central_differences(sides), sides=sides)
     return General(effect.id, sensor)
 
 
-def of_channels(
+def bias_change_basis(
     effect: BiasChange, grid: Sequence[tuple[Mapping[str, float], int]]
 ) -> Course:
-    """Courses of an effect that does the same to every output, by shape and origin."""
+    """Courses of an effect that adds one function to every output, by grid point."""
 
     def of(view: RowView) -> Array:
         courses = []
         for shape, origin in grid:
-            seen = view.counting_from(origin)
+            seen = view.with_origin(origin)
             courses.append(effect.course(seen, shape or NO_SHAPE))
         return np.stack(courses, axis=1)
 
     return Course(effect.id, of, len(grid), True)
 
 
-def of_courses(
+def separable_basis(
     effect: Separable, grid: Sequence[tuple[Mapping[str, float], int]]
 ) -> General:
-    """Columns of a pattern times each of several courses, point by point."""
+    """Columns of a separable effect: pattern times course, for each grid point."""
 
     def of(view: RowView) -> Array:
         parts = []
         for origin, some in groupby(grid, key=itemgetter(1)):
-            seen = view.counting_from(origin)
+            seen = view.with_origin(origin)
             pattern = effect.pattern(seen)
             courses = [effect.course(seen, shape or NO_SHAPE) for shape, _ in some]
             each = pattern[:, :, None] * np.stack(courses, axis=1)[:, None, :, None]
@@ -173,13 +175,13 @@ def of_courses(
     return General(effect.id, of)
 
 
-def _of_sides(sides: Sides) -> Callable[[RowView], Array]:
-    """Columns as central differences of what is experienced."""
+def _central_differences(sides: Sides) -> Callable[[RowView], Array]:
+    """Columns as central differences over the inputs."""
 
     def of(view: RowView) -> Array:
         columns = [
             _difference(up, down, step, view.state)
-            for up, down, step in sides(view.plain, view.state)
+            for up, down, step in sides(view.nominal, view.state)
         ]
         return np.stack(columns, axis=2)
 
@@ -187,7 +189,7 @@ def _of_sides(sides: Sides) -> Callable[[RowView], Array]:
 
 
 def _difference(up: Experience, down: Experience, step: float, state: State) -> Array:
-    """Difference of the outputs of two states of what is experienced, per step."""
+    """Central difference of the outputs (n, 6) for two sets of inputs."""
     change: Array = np.hstack([up.f - down.f, up.w - down.w]) * state.scale
     for term in state.terms:
         if isinstance(term.effect, Sensor):
@@ -198,8 +200,10 @@ def _difference(up: Experience, down: Experience, step: float, state: State) -> 
     return change / (2 * step)
 
 
-def _with(plain: Experience, state: State, effect: Effect, more: Array) -> Experience:
-    """What is experienced with an effect's parameters changed."""
+def _with_changed_parameters(
+    plain: Experience, state: State, effect: Effect, more: Array
+) -> Experience:
+    """Inputs with the parameters of a motion effect changed by `more`."""
     there = [t.values for t in state.terms if t.effect is effect]
     rest = tuple(t for t in state.terms if t.effect is not effect)
     term = Term(effect, sum(there, np.zeros(len(more))) + more)
@@ -207,23 +211,23 @@ def _with(plain: Experience, state: State, effect: Effect, more: Array) -> Exper
 
 
 def bias(view: RowView) -> Array:
-    """One on each output's own bias."""
+    """Derivative of the outputs by the six biases, (n, 6, 6)."""
     return np.broadcast_to(np.eye(6), (len(view.x), 6, 6))
 
 
 def scale(view: RowView) -> Array:
-    """Force and rate along each output's own axis."""
+    """Derivative of the outputs by the six scale factors, (n, 6, 6)."""
     return np.eye(6) * np.hstack([view.x.f, view.x.w])[:, :, None]
 
 
 def gravity(view: RowView) -> Array:
-    """What more of all gravity brings about, of its relative size, (n, 6, 1)."""
+    """Derivative of the outputs by a relative change of gravity, (n, 6, 1)."""
     out: Array = view.state.scale * np.hstack([view.x.f, np.zeros_like(view.x.w)])
     return out[:, :, None]
 
 
 def speed(known: Array) -> Callable[[RowView], Array]:
-    """What more of each speed (k,) of a table brings about, of its size, (n, 6, k)."""
+    """Derivatives by relative changes of the speeds (k,) of a rate table, (n, 6, k)."""
 
     def of(view: RowView) -> Array:
         table = view.state.scale * np.hstack([np.zeros_like(view.x.f), view.x.w])
@@ -235,7 +239,7 @@ def speed(known: Array) -> Callable[[RowView], Array]:
 
 
 def earth_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
-    """The rate of the base about each of its axes, rad/s."""
+    """Inputs for a change of the base's rate about each of its axes, rad/s."""
     for axis in np.eye(3):
         up, down = (
             replace(state, earth=state.earth + sign * EARTH_RATE * axis).experienced(
@@ -246,17 +250,18 @@ def earth_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         yield up, down, EARTH_RATE
 
 
-earth = _of_sides(earth_sides)
+earth = _central_differences(earth_sides)
 
 
-def earth_anyhow(view: RowView) -> Array:
-    """Rates in device axes and along the force, where nobody knows the orientation.
+def earth_rate_unoriented(view: RowView) -> Array:
+    """Columns of the Earth's rate in unknown orientations, (n, 6, 4), rad/s.
 
-    Turned about one level axis by hand, a device has the Earth's rate along it in every
-    position and on the way; and however it lies, its upright part along the force. Not
-    where gyroscopes show which way it points. (n, 6, 4), rad/s.
+    Three constant rates in device axes: a device that is turned by hand about one level
+    axis has the Earth's rate along that axis in every position and during turns. One
+    rate along the force: the vertical part of the Earth's rate. Zero in rows whose
+    gyroscopes show the direction of the Earth's rate.
     """
-    free = view.plain.earth_unseen
+    free = view.nominal.earth_unseen
     f = view.x.f
     up = f / np.maximum(np.linalg.norm(f, axis=1), 1e-12)[:, None]
     along = np.hstack([np.zeros_like(up), up])[:, :, None]
@@ -265,31 +270,32 @@ def earth_anyhow(view: RowView) -> Array:
     return out * free[:, None, None]
 
 
-def earth_aside(view: RowView) -> Array:
-    """Two small turns of the Earth's rate that is shown, position by position, rad.
+def earth_rate_direction(view: RowView) -> Array:
+    """Columns of small rotations of a measured Earth's rate, (n, 6, 2 p), rad.
 
-    About axes across it, (n, 6, 2 p): its length is all that is known.
+    Two for each position, about axes perpendicular to the rate: only its length is
+    known.
     """
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
-    seen = np.flatnonzero(view.plain.earth_seen)
-    for k, side in enumerate(across(view.x.w[seen])):
-        at = 2 * view.plain.position[seen] + k
+    seen = np.flatnonzero(view.nominal.earth_seen)
+    for k, side in enumerate(perpendicular_vectors(view.x.w[seen])):
+        at = 2 * view.nominal.position[seen] + k
         out[seen[:, None], [3, 4, 5], at[:, None]] = view.state.scale[3:] * side
     return out
 
 
 def attitude(view: RowView) -> Array:
-    """Small turns of each position about x, y and z of the base, rad, (n, 6, 3 p).
+    """Columns of errors of measured attitudes, (n, 6, 3 p), rad.
 
-    What a measured attitude is off by: beside it the force and the Earth's rate lie
-    elsewhere. Turns between two positions are off by both.
+    Small rotations of each position about x, y and z of the base. They rotate the force
+    and the Earth's rate in device axes. A turn depends on the errors at both ends.
     """
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 3 * places))
-    held = np.flatnonzero(view.plain.position >= 0)
+    held = np.flatnonzero(view.nominal.position >= 0)
     axes = np.swapaxes(view.x.to_device[held], 1, 2)  # of the base, in device axes
-    at = 3 * view.plain.position[held]
+    at = 3 * view.nominal.position[held]
     for i in range(3):
         off = [np.cross(v[held], axes[:, i]) for v in (view.x.f, view.x.w)]
         out[held, :, at + i] = view.state.scale * np.nan_to_num(np.hstack(off))
@@ -297,7 +303,7 @@ def attitude(view: RowView) -> Array:
 
 
 def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
-    """The same, where turns meet the positions."""
+    """Inputs for a change of the measured attitudes about each base axis, rad."""
     known = state.attitude
     if not known.any():
         known = np.zeros((len(state.small_rotation), 3))
@@ -310,7 +316,7 @@ def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifferenc
 def small_rotation_sides(
     plain: Experience, state: State
 ) -> Iterator[CentralDifference]:
-    """Two small turns of every position, rad."""
+    """Inputs for two small rotations of every position, rad."""
     small = state.small_rotation
     for off in SMALL * np.eye(2):
         ends = (replace(state, small_rotation=small + s * off) for s in (1.0, -1.0))
@@ -319,19 +325,19 @@ def small_rotation_sides(
 
 
 def small_rotation(view: RowView) -> Array:
-    """The same as columns (n, 6, 2 p), those of a position together."""
+    """Columns of two small rotations of every position, (n, 6, 2 p); cached."""
     if not view.rotations:
         view.rotations.append(_small_rotation(view))
     return view.rotations[0]
 
 
 def _small_rotation(view: RowView) -> Array:
-    """The same, not asked for yet."""
+    """Calculate the columns of `small_rotation`."""
     places = len(view.state.small_rotation)
     out = np.zeros((len(view.x), 6, 2 * places))
-    at = view.plain.position
+    at = view.nominal.position
     held = np.flatnonzero(at >= 0)
-    sides = small_rotation_sides(view.plain, view.state)
+    sides = small_rotation_sides(view.nominal, view.state)
     for joint, (up, down, step) in enumerate(sides):
         change = _difference(up, down, step, view.state)
         out[held, :, 2 * at[held] + joint] = change[held]

@@ -34,7 +34,7 @@ class Detent:
 
 
 def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
-    """Every angle of positions `oriented`, also those that are set once."""
+    """Every angle set in the positions `oriented`, including angles set only once."""
     for joint, angle in enumerate((x.alpha, x.beta)):
         first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
         for value in sorted(set(np.round(first, 9))):
@@ -43,7 +43,7 @@ def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
             yield Detent(joint, float(value), same)
 
 
-def together(some: Sequence[Detent], places: int) -> Array:
+def detent_rotations(some: Sequence[Detent], places: int) -> Array:
     """Rotations of the positions by each detent, (2 p, m): 1 where its angle is set."""
     out = np.zeros((2 * places, len(some)))
     for k, one in enumerate(some):
@@ -51,9 +51,9 @@ def together(some: Sequence[Detent], places: int) -> Array:
     return out
 
 
-def columns_of(table: ColumnTable, some: Sequence[Detent]) -> Index:
-    """Columns of the errors of detents, rad, appended to a table, (m,)."""
-    shared = together(some, table.places)
+def detent_columns(table: ColumnTable, some: Sequence[Detent]) -> Index:
+    """Append columns of the detents' errors, rad, to a table; their indices, (m,)."""
+    shared = detent_rotations(some, table.position_count)
 
     def sides(plain: Experience, state: State) -> Iterator[columns.CentralDifference]:
         """Central differences at both ends of a turn."""

@@ -21,28 +21,28 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
-from fieldcal.model.causes.cause import CLOSURE, FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import CLOSURE, MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import Course, General
-from fieldcal.model.causes.effect_causes import at_points, of_effects
+from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known import KnownRows
-from fieldcal.model.causes.random_causes import flicker_of_few, of_chance
-from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.random_causes import random_causes, series_flicker
+from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
 
 
 @dataclass(frozen=True, slots=True)
-class AlikeGroups:
-    """Groups that are alike in width, by the columns that they are offered by.
+class EqualWidthGroups:
+    """Groups with equally many leading columns, stacked for joint calculation.
 
     Attributes
     ----------
-    blocks : (b, k) columns, each block once, as several groups may be made of it
-    block : (m,) the block of each group
-    typical : (m, k) sizes
-    cause, variant : (m,) their numbers
+    blocks : (b, k) distinct sets of columns; several groups may share one
+    block : (m,) index of each group's set of columns
+    typical : (m, k) typical sizes
+    cause, variant : (m,) indices of each group's cause and variant
 
     """
 
@@ -53,11 +53,11 @@ class AlikeGroups:
     variant: Index
 
     @classmethod
-    def of(cls, some: Sequence[tuple[int, int, Group]]) -> AlikeGroups:
-        """Of groups with the numbers of their causes and variants."""
-        columns = np.array([g.columns[g.foremost] for _, _, g in some])
+    def of(cls, some: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
+        """Stack groups; each is given with the indices of its cause and variant."""
+        columns = np.array([g.columns[g.leading_columns] for _, _, g in some])
         blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([g.typical[g.foremost] for _, _, g in some])
+        typical = np.array([g.typical[g.leading_columns] for _, _, g in some])
         cause, variant = np.array([(i, j) for i, j, _ in some]).T
         return cls(blocks, block.ravel(), typical, cause, variant)
 
@@ -68,18 +68,22 @@ class Dictionary(ColumnTable):
     Parameters
     ----------
     x : rows of the windows
-    used : (n, 6) rows that say something, by channel
+    used : (n, 6) rows with information, by channel
     since : (o, n) s since the turn, by origin
     common : (p, 6) standard deviation of an error that all rows of a window share
     unit : (6,) outputs per SI unit
-    turns : whether the way between positions is seen
+    turns : whether the turns between positions were recorded
     wander : how the biases wander inside windows
+    alike : (6,) standard deviation of an error that all windows share
 
     Attributes
     ----------
-    known : what is known of columns from elsewhere; None where nothing is
-    unfitted : effects, each named by `part`, that may be in the device although a set
-        has them not: numbers are less certain for them
+    known : prior knowledge of columns from another source; None if there is none
+    unfitted : groups of effects, each named by `part`, that the device may have
+        although a set does not contain them; they widen the uncertainties
+    unoriented : (p,) windows whose orientation or axis of rotation is not known
+    typical_instability : (7,) typical size of the instability of each channel and of
+        the closures; 0 where there is none
 
     """
 
@@ -98,69 +102,73 @@ class Dictionary(ColumnTable):
         alike: Array | None = None,
     ) -> None:
         super().__init__(x, used, since, unit, wander)
-        self.common, self.turns = common, turns
+        self.window_error, self.turns = common, turns
         self.earth = self.attitude = -1
         self.always: list[Group] = [
             *self._calibration(), *self._gravity(), *self._unoriented_earth(),
-            *self._attitudes(), *self._speeds(), *self._filters(), *self._alike(alike),
+            *self._attitudes(), *self._speeds(), *self._filters(),
+            *self._shared_rounding(alike),
         ]  # fmt: skip
-        self.free = np.array([self._is_free(p) for p in self.held])
+        self.unoriented = np.array(
+            [self._is_unoriented(p) for p in self.window_positions]
+        )
         self._instability()
         if wander.series is not None:
-            self.always += flicker_of_few(self, wander.series)
+            self.always += series_flicker(self, wander.series)
         self.causes: list[Cause] = list(self._causes())
 
-    def plain(self) -> Dictionary:
-        """The same with what a simulation has only, bias and scale factor being free.
+    def calibration_only(self) -> Dictionary:
+        """A copy whose permanent groups are bias and scale factor, without prior limit.
 
-        There is no Earth's rate beside its own, and nothing random: that predicts.
+        It contains no random group and no unknown part of the Earth's rate, as a
+        simulation contains none.
         """
         out = copy(self)
         known = (g for g in self.always if g.in_state and g.cause != "earth")
         free = float(priors.SIZES[-1])
-        out.always = [replace(g, fixed=free) for g in known]
+        out.always = [replace(g, fixed_size=free) for g in known]
         return out
 
-    def apart(self) -> Self:
-        """The same, of which columns that are added are its own."""
+    def independent_copy(self) -> Self:
+        """A copy to which columns can be added without changing this one."""
         out = copy(self)
         out.bases = list(self.bases)
         return out
 
-    def like(
+    def match_members(
         self, members: Iterable[tuple[Cause, Group]]
     ) -> tuple[tuple[Cause, Group], ...]:
-        """Causes of another dictionary as they are here, each at its nearest variant.
+        """Members of another dictionary's set, as members of this one.
 
-        Those that are not here, or of which nothing tells which variant is meant, are
-        left out.
+        Each is matched to the cause of the same key and the variant of nearest shape.
+        Members without a counterpart are omitted.
         """
         here = {cause.key: cause for cause in self.causes}
         found = {}
         for cause, group in members:
             same = here.get(cause.key)
-            some = [] if same is None else group.alike(same.variants)
+            some = [] if same is None else group.with_same_parameters(same.variants)
             if same is not None and some:
-                found[same.key] = (same, min(some, key=group.apart))
+                found[same.key] = (same, min(some, key=group.shape_distance))
         return tuple(found.values())
 
     @property
     def filters(self) -> Group | None:
-        """What filters of the sensors make of turns; None where no turn is used."""
+        """Group of the sensors' filters during turns; None if no turn is used."""
         return next((g for g in self.always if g.part == FILTERED), None)
 
     @cached_property
-    def by_width(self) -> list[AlikeGroups]:
-        """Groups of causes, those alike in width together."""
+    def groups_by_width(self) -> list[EqualWidthGroups]:
+        """All groups of all causes, stacked by their number of leading columns."""
         found: dict[int, list[tuple[int, int, Group]]] = {}
         for i, cause in enumerate(self.causes):
             for j, group in enumerate(cause.variants):
-                found.setdefault(len(group.foremost), []).append((i, j, group))
-        return [AlikeGroups.of(some) for some in found.values()]
+                found.setdefault(len(group.leading_columns), []).append((i, j, group))
+        return [EqualWidthGroups.of(some) for some in found.values()]
 
     @cached_property
-    def chances(self) -> Array:
-        """Of each variant of every cause, ln."""
+    def log_chances(self) -> Array:
+        """Log prior probability of each variant of every cause."""
         return np.array([np.log(c.chance / len(c.variants)) for c in self.causes])
 
     @cached_property
@@ -174,17 +182,17 @@ class Dictionary(ColumnTable):
 
     @cached_property
     def shown(self) -> NDArray[np.bool_]:
-        """Columns that windows show; filled in by the first linearisation."""
+        """Columns that are visible in windows; set by the first linearisation."""
         return np.zeros(self.width, dtype=bool)
 
     def _causes(self) -> Iterator[Cause]:
-        """Everything that may be there."""
-        yield from of_effects(self)
-        yield from of_chance(self)
-        yield from of_no_effect(self)
+        """All causes of the session."""
+        yield from effect_causes(self)
+        yield from random_causes(self)
+        yield from unknown_causes(self)
 
     def _calibration(self) -> Iterator[Group]:
-        """Bias, scale factor, Earth's rate."""
+        """Groups of bias, scale factor and Earth's rate."""
         sizes = np.repeat([priors.BIAS_ACC, priors.BIAS_GYR], 3) * self.unit
         for part, channels in TRIADS:
             at = np.intersect1d(channels, self.observed)
@@ -196,7 +204,7 @@ class Dictionary(ColumnTable):
             if len(at) and (part == "acc" or rated):
                 yield Group(
                     "scale", part, self.scale + at, priors.SCALE * self.unit[at],
-                    in_state=True, in_step=True,
+                    in_state=True, changes_together=True,
                 )  # fmt: skip
         gyro = bool(len(np.intersect1d(self.observed, (3, 4, 5))))
         if gyro and self.x.oriented.any() and not self.x.base_rate.any():
@@ -204,34 +212,34 @@ class Dictionary(ColumnTable):
             self.earth = self.add(earth, 3)
             size = np.full(3, EARTH_RATE)
             at = self.earth + np.arange(3)
-            yield Group("earth", "", at, size, fixed=1.0, in_state=True)
+            yield Group("earth", "", at, size, fixed_size=1.0, in_state=True)
 
     def _gravity(self) -> Iterator[Group]:
-        """What is not known of gravity: all accelerometers are measured by it."""
+        """Group of the uncertainty of gravity, which all accelerometers share."""
         if self.x.gravity_sigma and np.isin(self.observed, (0, 1, 2)).any():
             at = self.add(General("gravity", columns.gravity), 1)
             size = np.array([self.x.gravity_sigma / self.x.gravity])
-            yield Group("gravity", "acc", np.array([at]), size, fixed=1.0)
+            yield Group("gravity", "acc", np.array([at]), size, fixed_size=1.0)
 
     def _attitudes(self) -> Iterator[Group]:
-        """What attitudes are off by whose uncertainty is stated for each."""
+        """Group of the errors of attitudes that have a stated uncertainty."""
         sigma = np.array([self.x.attitude_sigma[self.x.position == p][0]
-                          for p in self.held])  # fmt: skip
+                          for p in self.window_positions])  # fmt: skip
         if not np.isfinite(sigma).any():
             return
         sides = columns.attitude_sides
-        basis = General("attitude", columns.attitude, sides=sides, each=True)
-        self.attitude = self.add(basis, 3 * self.places)
+        basis = General("attitude", columns.attitude, sides=sides, per_position=True)
+        self.attitude = self.add(basis, 3 * self.position_count)
         known = np.isfinite(sigma)
-        at = self.attitude + 3 * self.held[known][:, None] + np.arange(3)
+        at = self.attitude + 3 * self.window_positions[known][:, None] + np.arange(3)
         wide = np.repeat(sigma[known], 3)
-        yield Group("attitude", "", at.ravel(), wide, fixed=1.0, in_state=True)
+        yield Group("attitude", "", at.ravel(), wide, fixed_size=1.0, in_state=True)
 
     def _speeds(self) -> Iterator[Group]:
-        """What the rate about an axis that nobody knows is off by, alike at each speed.
+        """Group of the errors of a rate table's speeds, if its axis is not known.
 
-        The Earth adds what of it lies along the axis, which is the same wherever the
-        device stands on the table.
+        One error for each speed. It contains the Earth's rate along the axis, which is
+        the same for all orientations of the device on the table.
         """
         known = np.unique(self.x.speed[self.x.speed > 0])
         if not len(known) or not np.isin(self.observed, (3, 4, 5)).any():
@@ -239,101 +247,108 @@ class Dictionary(ColumnTable):
         at = self.add(General("speed", columns.speed(known)), len(known))
         off = np.array([self.x.speed_sigma[self.x.speed == v].max() for v in known])
         wide = np.hypot(off, EARTH_RATE / 3**0.5) / known
-        yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed=1.0)
+        yield Group("speed", "gyr", at + np.arange(len(known)), wide, fixed_size=1.0)
 
     def _filters(self) -> Iterator[Group]:
-        """What filters of the sensors make of turns."""
+        """Group of the sensors' filters during turns."""
         if self.turns and np.isin(self.observed, (3, 4, 5)).any():
             yield filtered_turns(self)
 
     def _unoriented_earth(self) -> Iterator[Group]:
-        """What the Earth may add wherever nobody knows the orientation.
+        """Groups of the Earth's rate in positions of unknown orientation.
 
-        One position alone has it in its bias.
+        In a session of one position it is part of the bias.
         """
-        if not np.isin(self.observed, (3, 4, 5)).any() or len(self.held) < 2:
+        if (
+            not np.isin(self.observed, (3, 4, 5)).any()
+            or len(self.window_positions) < 2
+        ):
             return
         shown = self.x.earth_seen
         if shown.any():
-            basis = General("earth aside", columns.earth_aside)
+            basis = General("earth aside", columns.earth_rate_direction)
             held = np.unique(self.x.position[shown])
             own = (2 * held[:, None] + [0, 1]).ravel()
             wide = np.full(len(own), 1 / priors.FREE)
-            own = self.add(basis, 2 * self.places) + own
-            yield Group("earth aside", "gyr", own, wide, fixed=priors.FREE)
+            own = self.add(basis, 2 * self.position_count) + own
+            yield Group("earth aside", "gyr", own, wide, fixed_size=priors.FREE)
         if self.x.earth_unseen.any():
-            at = self.add(General("earth anyhow", columns.earth_anyhow), 4)
+            at = self.add(General("earth anyhow", columns.earth_rate_unoriented), 4)
             size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
-            yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed=1.0)
+            yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed_size=1.0)
 
-    def _alike(self, sizes: Array | None) -> Iterator[Group]:
-        """What rounding makes of all windows; where outputs change it averages out."""
+    def _shared_rounding(self, sizes: Array | None) -> Iterator[Group]:
+        """Group of the rounding errors that all windows share.
+
+        They act while an output keeps its value; where outputs change they average out.
+        """
         if sizes is None or not len(some := np.flatnonzero(sizes)):
             return
-        even = Course("rounding", lambda v: np.ones((len(v.x.t), 1)), 1, standing=True)
+        even = Course(
+            "rounding", lambda v: np.ones((len(v.x.t), 1)), 1, while_output_stands=True
+        )
         at = self.add(even, 6)
-        yield Group("rounding", "", at + some, sizes[some], fixed=1.0, random=True)
+        yield Group("rounding", "", at + some, sizes[some], fixed_size=1.0, random=True)
 
-    def _is_free(self, p: int) -> bool:
-        """Whether nobody knows where the force of a position points, or its axis."""
+    def _is_unoriented(self, p: int) -> bool:
+        """Whether the direction of a position's force, or of its rate, is not known."""
         there = self.x.position == p
         spun = self.used[there, 3:].any() and self.x.speed[there].any()
         force = self.used[there, :3].any() and not self.x.oriented[there].all()
         return bool(spun or force)
 
     def _instability(self) -> None:
-        """What each window is off by for itself, by channel."""
-        self.unstable = np.zeros(7)
-        if len(self.held) >= FEW:
+        """Set the typical instability of windows, by channel, and of closures."""
+        self.typical_instability = np.zeros(7)
+        if len(self.window_positions) >= MIN_WINDOWS:
             typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3)
-            self.unstable[:6] = typical * self.unit * self.used.any(axis=0)
-            self.unstable[CLOSURE] = priors.CLOSURE * self.turns
+            self.typical_instability[:6] = typical * self.unit * self.used.any(axis=0)
+            self.typical_instability[CLOSURE] = priors.CLOSURE * self.turns
 
-    def refined(
+    def add_shape_values(
         self, cause: Cause, group: Group, values: Sequence[float]
     ) -> tuple[Cause, list[Group]]:
-        """A cause with more variants, those of one group with its shape elsewhere.
+        """Add variants of a group at other values of its shape; the cause and these.
 
         `group` is one of an effect with an equation.
         """
         (name,) = group.shape
-        new = at_points(self, group, [({name: float(v)}, group.origin) for v in values])
-        return self.exchanged(cause, (*cause.variants, *new)), new
+        new = groups_at_points(
+            self, group, [({name: float(v)}, group.origin) for v in values]
+        )
+        return self.replace_variants(cause, (*cause.variants, *new)), new
 
-    def tried_at(self, instants: Sequence[float]) -> None:
-        """Have effects that begin at an instant begin at these as well."""
+    def add_instants(self, instants: Sequence[float]) -> None:
+        """Add variants that begin at these instants, s, to effects that do so."""
         for cause in self.causes:
-            begin = {g.params: g for g in cause.variants if g.begins}
+            begin = {g.params: g for g in cause.variants if g.begins_at_instant}
             for group in begin.values():
-                cause, _ = self.refined(cause, group, instants)
+                cause, _ = self.add_shape_values(cause, group, instants)
 
-    def expected_within(self, spans: Sequence[tuple[float, float]]) -> None:
-        """Have effects that begin at an instant be likelier within these, s.
+    def expect_within(self, spans: Sequence[tuple[float, float]]) -> None:
+        """Make effects that begin within these spans, s, likelier (`expected`)."""
+        self.causes = [c.expecting_within(spans) for c in self.causes]
+        self._clear_caches()
 
-        There they are as large as is typical, and in all axes of a triad.
-        """
-        self.causes = [c.expecting(spans) for c in self.causes]
-        self._changed()
-
-    def exchanged(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
-        """A cause with other variants, in the place of the one that was."""
+    def replace_variants(self, cause: Cause, variants: tuple[Group, ...]) -> Cause:
+        """Replace a cause by one with other variants; returns the new cause."""
         more = replace(cause, variants=variants)
         self.causes = [more if c is cause else c for c in self.causes]
-        self._changed()
+        self._clear_caches()
         return more
 
-    def joined(self, causes: Iterable[Cause]) -> None:
-        """Take in causes that are made of what others leave."""
+    def add_causes(self, causes: Iterable[Cause]) -> None:
+        """Add causes."""
         self.causes = [*self.causes, *causes]
-        self._changed()
+        self._clear_caches()
 
-    def chosen(self, causes: Iterable[Cause]) -> None:
-        """Leave only some of its causes."""
+    def keep_causes(self, causes: Iterable[Cause]) -> None:
+        """Keep only these causes."""
         self.causes = list(causes)
-        self._changed()
+        self._clear_caches()
 
-    def _changed(self) -> None:
-        """Forget what was made of the causes as they were."""
+    def _clear_caches(self) -> None:
+        """Discard cached values that depend on the causes."""
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
-        for cached in ("by_width", "chances", "typical"):
+        for cached in ("groups_by_width", "log_chances", "typical"):
             self.__dict__.pop(cached, None)

@@ -25,39 +25,41 @@ from fieldcal.physics.effect import (
 )
 from fieldcal.physics.experience import Experience
 
-NOWHERE: Point = (NO_SHAPE, 0)
-"""The only point of an effect that has no shape."""
+NO_POINT: Point = (NO_SHAPE, 0)
+"""The only grid point of an effect without shape parameters."""
 
 
-def of_effects(table: ColumnTable) -> Iterator[Cause]:
-    """Every effect of the catalogue that has columns here."""
+def effect_causes(table: ColumnTable) -> Iterator[Cause]:
+    """Causes of every effect of the catalogue that applies to the session."""
     for effect in catalogue().values():
         if not isinstance(effect, Motion | Sensor) or not effect.params:
             continue
-        if effect.applies(table.x) and (grid := list(points(table, effect))):
-            yield from _of_effect(table, effect, grid)
+        if effect.applies(table.x) and (grid := list(shape_points(table, effect))):
+            yield from _causes_of_effect(table, effect, grid)
 
 
-def _of_effect(
+def _causes_of_effect(
     table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> Iterator[Cause]:
-    """The causes that an effect is: one, or one a triad."""
+    """Causes of an effect: one, or one for each triad."""
     places = effect_columns(table, effect, grid)
-    for part, at in parts(table, effect):
+    for part, at in parameter_groups(table, effect):
         variants = tuple(
             _group(table, effect, part, some, point, columns)
-            for some in _axes(table, effect, at)
+            for some in _parameter_subsets(table, effect, at)
             for point, columns in zip(grid, places, strict=True)
         )
         if variants:
             yield Cause(effect.id, part, effect.chance(table.x), variants)
 
 
-def whole(table: ColumnTable, name: str, turned: bool, point: Point = NOWHERE) -> Group:
-    """An effect of the catalogue with its parameters, of typical size.
+def effect_group(
+    table: ColumnTable, name: str, turned: bool, point: Point = NO_POINT
+) -> Group:
+    """Group of an effect of the catalogue with all its parameters, of typical size.
 
-    Those that a turn of the whole device makes of others are left out if it is `turned`
-    as nobody knows. `point` is its shape, if it has one.
+    If the device is `turned` by an unknown rotation, parameters that such a rotation
+    makes of others are omitted. `point` is its shape, if it has one.
 
     Raises
     ------
@@ -76,24 +78,26 @@ def whole(table: ColumnTable, name: str, turned: bool, point: Point = NOWHERE) -
     return Group(name, "", at, size, effect, *point, params=tuple(some), in_state=True)
 
 
-def of_size(
+def factory_group(
     table: ColumnTable,
     name: str,
     size: Array,
     turned: bool,
-    point: Point = NOWHERE,
+    point: Point = NO_POINT,
 ) -> Group:
-    """The same as what a factory left, whose coefficients have a known size, SI."""
-    one = whole(table, name, turned, point)
+    """Group of an effect that the factory left, with coefficients of known size, SI."""
+    one = effect_group(table, name, turned, point)
     wide = (size * units_of(table, catalogue()[name]))[list(one.params)]
-    return replace(one, cause="factory", part=name, typical=wide, fixed=1.0)
+    return replace(one, cause="factory", part=name, typical=wide, fixed_size=1.0)
 
 
-def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Group]:
-    """What a factory left of errors that are not estimated.
+def factory_groups(
+    table: ColumnTable, left: FactoryErrors, turned: bool
+) -> list[Group]:
+    """Groups of the errors that the factory left and that are not estimated.
 
-    Biases follow a thermometer if one shows a change, and the warm-up of a package
-    otherwise.
+    Biases follow the temperature if a thermometer shows a change, and the warm-up of
+    the package otherwise.
     """
     if not table.x.f.any():
         return []
@@ -101,22 +105,24 @@ def of_factory(table: ColumnTable, left: FactoryErrors, turned: bool) -> list[Gr
     return [
         hysteresis(table, float(size[0]))
         if name == "hysteresis"
-        else of_size(table, name, size, turned, (shapes.get(name, {}), 0))
+        else factory_group(table, name, size, turned, (shapes.get(name, {}), 0))
         for name, size in factory_sizes(table.x, left).items()
         if size.any()
     ]
 
 
 def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
-    """One sigma of each effect that a factory left, SI: one for all, or (6,)."""
+    """Standard deviation of each effect that a factory left, SI: one value, or (6,)."""
     sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
     sizes["hysteresis"] = np.array([left.hysteresis])
     name, per_k = left.warming(x.warms)
     return sizes | {name: np.array(per_k)}
 
 
-def at_points(table: ColumnTable, group: Group, grid: Sequence[Point]) -> list[Group]:
-    """The group of an effect at other points of its shape, with columns of its own."""
+def groups_at_points(
+    table: ColumnTable, group: Group, grid: Sequence[Point]
+) -> list[Group]:
+    """A group at other grid points of its shape, with new columns."""
     effect = group.effect
     if not isinstance(effect, Motion | Sensor) or not grid:
         return []
@@ -134,7 +140,7 @@ def _group(
     point: Point,
     at: Index,
 ) -> Group:
-    """Some parameters of an effect at one point of its grid."""
+    """Group of some parameters of an effect at one grid point."""
     every = np.array([p.typical for p in effect.params]) * units_of(table, effect)
     shape, origin = point
     return Group(
@@ -146,24 +152,26 @@ def _group(
 def effect_columns(
     table: ColumnTable, effect: Motion | Sensor, grid: Sequence[Point]
 ) -> list[Index]:
-    """Append the columns of an effect: those of its parameters, for each point."""
+    """Append the columns of an effect; indices (k,) for each grid point."""
     count = len(effect.params)
     if isinstance(effect, BiasChange):
-        course = columns.of_channels(effect, grid)
+        course = columns.bias_change_basis(effect, grid)
         start = table.add(course, 6 * len(grid))
         channel = np.array([CHANNELS.index(p.name) for p in effect.params])
         return [start + channel * len(grid) + i for i in range(len(grid))]
     if isinstance(effect, Separable):
-        start = table.add(columns.of_courses(effect, grid), count * len(grid))
+        start = table.add(columns.separable_basis(effect, grid), count * len(grid))
         return [start + i * count + np.arange(count) for i in range(len(grid))]
     return [
-        table.add(columns.of_effect(effect, *point), count) + np.arange(count)
+        table.add(columns.effect_basis(effect, *point), count) + np.arange(count)
         for point in grid
     ]
 
 
-def parts(table: ColumnTable, effect: Effect) -> list[tuple[str, tuple[int, ...]]]:
-    """Parameters that go together: those of a triad, where they are by channel."""
+def parameter_groups(
+    table: ColumnTable, effect: Effect
+) -> list[tuple[str, tuple[int, ...]]]:
+    """Parts and parameter indices of an effect: by triad if it has one per channel."""
     names = [p.name for p in effect.params]
     if not set(names) <= set(CHANNELS):
         return [("", tuple(range(len(names))))]
@@ -175,13 +183,13 @@ def parts(table: ColumnTable, effect: Effect) -> list[tuple[str, tuple[int, ...]
     ]  # fmt: skip
 
 
-def _axes(
+def _parameter_subsets(
     table: ColumnTable, effect: Motion | Sensor, at: tuple[int, ...]
 ) -> list[tuple[int, ...]]:
-    """Parameters that go together: all, or those of one output or of two alone."""
+    """Subsets of parameters that form variants: all, or those of one or two outputs."""
     if isinstance(effect, Motion) or not at:
         return [at] if at else []
-    reach = np.abs(effect.design(table.x, _any(effect))).max(axis=0)[:, at]
+    reach = np.abs(effect.design(table.x, _any_shape(effect))).max(axis=0)[:, at]
     own = [tuple(np.array(at)[reach[c] > 0].tolist()) for c in range(6)]
     own = [o for o in own if o and o != at]
     two = [tuple(sorted(set(o + p))) for o, p in combinations(own, 2)]
@@ -190,7 +198,7 @@ def _axes(
 
 
 def units_of(table: ColumnTable, effect: Effect) -> Array:
-    """Outputs per SI unit for each parameter, (k,), of what adds to outputs."""
+    """Outputs per SI unit for each parameter, (k,); 1 for motion effects."""
     if isinstance(effect, Motion):
         return np.ones(len(effect.params))
     gyro = [p.unit.startswith(("rad", "(rad")) for p in effect.params]
@@ -198,8 +206,8 @@ def units_of(table: ColumnTable, effect: Effect) -> Array:
     return out
 
 
-def points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
-    """Values of the shape parameters to try, with the origin of times."""
+def shape_points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
+    """Grid points of an effect: shape parameters, with the origin of times."""
     if not effect.shapes:
         yield {}, 0
     for shape in effect.shapes:
@@ -207,8 +215,8 @@ def points(table: ColumnTable, effect: Effect) -> Iterator[Point]:
             yield {shape.name: value}, origin
 
 
-def _any(effect: Effect) -> dict[str, float]:
-    """Some shape, where only which output has a column is asked."""
+def _any_shape(effect: Effect) -> dict[str, float]:
+    """An arbitrary shape, to find the outputs that an effect changes."""
     return {
         s.name: max(s.low, 1.0) if np.isfinite(s.low) else 0.0 for s in effect.shapes
     }

@@ -29,19 +29,19 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
 
 FILTERED = "bandwidth"
-"""Name of the group: the effect of the catalogue that a filter is."""
+"""Name of the group, which is that of the filter's effect in the catalogue."""
 
 
 def filtered_turns(table: ColumnTable) -> Group:
-    """Columns of v of accelerometers and of gyroscopes, then of c, then of r."""
-    at = table.add(General(FILTERED, _bent, along=True), 6) + np.arange(6)
+    """Group with columns of v, c and r, each of accelerometers and of gyroscopes."""
+    at = table.add(General(FILTERED, _bent, needs_whole_turn=True), 6) + np.arange(6)
     tau = priors.FILTERED_S
     size = np.repeat([tau**2, 2 * tau**3, 3 * tau**4], 2)
-    return Group("device", FILTERED, at, size, fixed=1.0)
+    return Group("device", FILTERED, at, size, fixed_size=1.0)
 
 
 def _bent(view: RowView) -> Array:
-    """By v, c and r at the edges of a turn, (n, 6, 6), (1); nothing at rest."""
+    """Derivatives by v, c and r at the edges of a turn, (n, 6, 6), (1); 0 at rest."""
     x, out = view.x, np.zeros((len(view.x), 6, 6))
     if not x.w_dot.any() or np.any(x.position >= 0):
         return out

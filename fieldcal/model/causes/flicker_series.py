@@ -30,7 +30,7 @@ FEWEST, MOST = 40, 80
 """Terms of a series, half as many as there are rows."""
 
 UNKNOWN = 1e3
-"""Noise of a row that was not measured, in that of the noisiest: it says nothing."""
+"""Noise assumed for a missing row, as a multiple of the noisiest row's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class FlickerSeries:
 
     @classmethod
     def of(cls, t: Array, length: Array) -> FlickerSeries:
-        """Of means about instants t over some lengths, (n,) s each."""
+        """Series for means about instants t over some lengths, (n,) s each."""
         whole = _covariance(t - length / 2, t + length / 2)
         whole = whole - whole.mean(axis=0)
         whole = whole - whole.mean(axis=1)[:, None]
@@ -69,11 +69,11 @@ class FlickerSeries:
         )  # fmt: skip
 
     def at(self, t: Array) -> Array:
-        """The terms at other instants (m,) as well, (m, k)."""
+        """The terms interpolated at other instants (m,), (m, k)."""
         return np.column_stack([np.interp(t, self.t, one) for one in self.terms.T])
 
-    def left(self, y: Array, sd: Array, typical: Array) -> Array:
-        """Variance that the terms leave of each row of some channels, (n, c).
+    def residual_variance(self, y: Array, sd: Array, typical: Array) -> Array:
+        """Variance of each row that the terms do not describe, (n, c).
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class FlickerSeries:
         return np.outer(unit, (size * typical) ** 2)
 
     def _size(self, y: Array, sd: Array, typical: float) -> float:
-        """The likeliest of `priors.SIZES` and 0 of what adds to white noise, by (2)."""
+        """Most probable size of flicker beside white noise, by (2)."""
         half = np.linalg.cholesky(self.others.T @ (self.others * sd[:, None] ** 2))
         white = np.linalg.solve(half, np.diag(typical * np.sqrt(self.variances)))
         flicker, axes = np.linalg.eigh(white @ white.T)

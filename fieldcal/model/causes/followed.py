@@ -1,9 +1,9 @@
-"""Causes of a device in motion, whose motion a reference follows moment by moment.
+"""Causes of a device in motion that is compared with a reference.
 
 Always included are bias and scale factor of both triads, the difference of the two
 clocks, the rotation between the two sets of axes, and free values for channels that the
-reference lacks. Effects that move positions do not exist here, and coloured noise is in
-the weights of the rows.
+reference lacks. Effects that change positions do not apply. Coloured noise is in the
+weights of the rows.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.effect_causes import of_effects
-from fieldcal.model.causes.unknown_causes import of_no_effect
+from fieldcal.model.causes.effect_causes import effect_causes
+from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.physics.effect import Motion
 
 
-class Place:
-    """Where the recording stands beside its reference now, for all columns.
+class CurrentAlignment:
+    """Rows at the current alignment with the reference, as all columns use them.
 
     Attributes
     ----------
     rows : at that alignment
-    change : (n, 6) of what the device goes through, per second
+    change : (n, 6) time derivative of force and rate, per second
 
     """
 
     def __init__(self, rows: MotionRows) -> None:
-        self.moved(rows)
+        self.realign(rows)
 
-    def moved(self, rows: MotionRows) -> None:
+    def realign(self, rows: MotionRows) -> None:
         """Take the same rows at another alignment."""
         self.rows = rows
         self.change = rows.motion(rows.gyr, 1)
@@ -55,33 +55,34 @@ class MotionDictionary(Dictionary):
 
     Attributes
     ----------
-    place : where the recording stands beside its reference
-    later : the inputs of the gyroscopes, where these are known to follow otherwise
-    lost : channels that the reference lacks
-    clock, turn, unseen : first column of delay and drift, of the turn about three axes,
-        and of what is constant in the lost channels
+    current : rows at the current alignment
+    gyro_inputs : inputs of the gyroscopes; those of the accelerometers unless the
+        responses of the two triads differ
+    missing_channels : channels that the reference lacks
+    clock, turn, unseen : first column of delay and drift, of the rotation about three
+        axes, and of the constant values of missing channels
 
     """
 
     def __init__(self, rows: MotionRows, unit: Array) -> None:
-        self.place = Place(rows)
-        self.later = x = rows.experience(rows.acc)
+        self.current = CurrentAlignment(rows)
+        self.gyro_inputs = x = rows.experience(rows.acc)
         since = np.full((1, len(x)), np.inf)
         common = np.zeros((len(np.unique(x.position)), 6))
         super().__init__(x, rows.used, since, common, unit, False, Wander.none())
 
-    def moved(self, rows: MotionRows) -> None:
+    def realign(self, rows: MotionRows) -> None:
         """Take the same rows at another alignment; causes stay as they are."""
-        self.place.moved(rows)
-        self.x = self.later = rows.experience(rows.acc)
+        self.current.realign(rows)
+        self.x = self.gyro_inputs = rows.experience(rows.acc)
         if rows.gyr is not rows.acc:
-            self.later = rows.experience(rows.gyr)
+            self.gyro_inputs = rows.experience(rows.gyr)
 
     def _calibration(self) -> Iterator[Group]:
-        """Bias and scale factor, and where the two stand beside each other."""
+        """Groups of bias, scale factor, clocks, rotation and missing channels."""
         yield from super()._calibration()
-        place, free = self.place, priors.FREE
-        self.lost = lost = place.rows.reference.lost
+        place, free = self.current, priors.FREE
+        self.missing_channels = lost = place.rows.reference.missing_channels
 
         def clock(view: RowView) -> Array:
             change = place.change
@@ -108,33 +109,33 @@ class MotionDictionary(Dictionary):
 
         self.clock = self.add(General("clock", clock), 2)
         sizes = np.array([priors.CLOCK_S, priors.CLOCK_RATE])
-        yield Group("clock", "", self.clock + np.arange(2), sizes, fixed=free)
+        yield Group("clock", "", self.clock + np.arange(2), sizes, fixed_size=free)
         self.turn = self.add(General("turn", turn), 3)
         at = self.turn + np.arange(3)
-        yield Group("turn", "", at, np.full(3, priors.AXES_TURNED), fixed=free)
+        yield Group("turn", "", at, np.full(3, priors.AXES_TURNED), fixed_size=free)
         if len(lost):
             self.unseen = self.add(General("unseen", unseen), len(lost))
             at = self.unseen + np.arange(len(lost))
             wide = priors.UNSEEN.copy()
-            wide[np.flatnonzero(place.rows.alignment.unseen)] = priors.UPRIGHT
-            yield Group("unseen", "", at, wide[lost], fixed=1.0)
+            wide[np.flatnonzero(place.rows.alignment.unseen_gravity)] = priors.UPRIGHT
+            yield Group("unseen", "", at, wide[lost], fixed_size=1.0)
 
     def _causes(self) -> Iterator[Cause]:
         """Effects that do not move positions, and functions without physics."""
-        for cause in of_effects(self):
+        for cause in effect_causes(self):
             effect = cause.variants[0].effect
             if not isinstance(effect, Motion) or effect.on_the_way:
                 yield cause
-        yield from of_no_effect(self)
+        yield from unknown_causes(self)
 
     def _unoriented_earth(self) -> Iterator[Group]:
-        """The reference says whether it feels the Earth turn."""
+        """None: the reference contains the Earth's rate if it measures it."""
         yield from ()
 
-    def _is_free(self, p: int) -> bool:
-        """The reference says where the force points."""
+    def _is_unoriented(self, p: int) -> bool:
+        """False: the reference gives the direction of the force."""
         return False
 
     def _instability(self) -> None:
-        """What a stretch is off by is in the power of its slowest coefficients."""
-        self.unstable = np.zeros(7)
+        """None: offsets of stretches are in the noise of the slowest coefficients."""
+        self.typical_instability = np.zeros(7)

@@ -36,4 +36,4 @@ def hysteresis(table: ColumnTable, size: float) -> Group:
 
     at = table.add(General("hysteresis", columns), 3) + np.arange(3)
     wide = size * np.abs(table.unit[:3])
-    return Group("factory", "hysteresis", at, wide, fixed=1.0)
+    return Group("factory", "hysteresis", at, wide, fixed_size=1.0)

@@ -17,7 +17,7 @@ from fieldcal.core.samples import Array, Index
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownRows:
-    """Rows (1), divided by what each is uncertain by.
+    """Rows (1), divided by their standard deviations.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class KnownRows:
 
     @classmethod
     def of(cls, design: Array, off: Array, covariance: Array) -> KnownRows:
-        """Rows (r, all) with values (r,) of some covariance (r, r)."""
+        """Rows of a design (r, all) with values (r,) and covariance (r, r)."""
         columns = np.flatnonzero(design.any(axis=0))
         root = np.linalg.cholesky(covariance)
         return cls(
@@ -42,8 +42,8 @@ class KnownRows:
         )  # fmt: skip
 
     @classmethod
-    def joined(cls, some: Sequence[KnownRows]) -> KnownRows:
-        """Rows of several, which are independent."""
+    def concatenated(cls, some: Sequence[KnownRows]) -> KnownRows:
+        """Concatenate several sets of rows, which are independent."""
         columns = np.unique(np.concatenate([one.columns for one in some]))
         design = []
         for one in some:

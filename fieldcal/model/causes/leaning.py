@@ -25,11 +25,11 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.state import across
+from fieldcal.model.state import perpendicular_vectors
 
 
 def leaning(table: ColumnTable) -> Group | None:
-    """The columns of all stops that have rows enough; None if there are none."""
+    """Group of all stops with enough rows; None if there are none."""
     held = np.flatnonzero(table.wander.leans)
     if not len(held):
         return None
@@ -42,11 +42,11 @@ def leaning(table: ColumnTable) -> Group | None:
         out = np.zeros((len(view.x), 6, first[-1]))
         each = zip(first[:-1], held, waves, ends, strict=True)
         for at, p, count, (begin, end) in each:
-            rows = np.flatnonzero((view.x.position == p) & ~view.plain.oriented)
+            rows = np.flatnonzero((view.x.position == p) & ~view.nominal.oriented)
             f, k = view.x.f[rows], np.arange(1, count + 1)
             phase = np.pi * np.outer((view.x.t[rows] - begin) / (end - begin), k)
             speed = -np.pi * k / (end - begin) * np.sin(phase)
-            for axis, side in enumerate(across(f)):
+            for axis, side in enumerate(perpendicular_vectors(f)):
                 about = np.cross(side, f) / (f**2).sum(axis=1, keepdims=True)
                 turned = [side[:, :, None] * np.cos(phase)[:, None],
                           about[:, :, None] * speed[:, None]]  # fmt: skip
@@ -63,12 +63,12 @@ def leaning(table: ColumnTable) -> Group | None:
 
 
 def _share(leans: Index) -> float:
-    """The part of the cosines that is taken: a session has no more than a walk."""
+    """Part of the cosines that is used, so that their number stays limited."""
     return min(1.0, priors.MOST_WAVES / int(leans.sum()))
 
 
 def _ends(table: ColumnTable, p: int) -> tuple[float, float]:
-    """When a stop began and when it ended, s."""
+    """Instants at which a stop began and ended, s."""
     x = table.x
     rows = x.position == p
     half = x.lasts[rows] / 2

@@ -28,7 +28,7 @@ FEW = 3
 
 def lost_ways(table: ColumnTable) -> Iterator[Cause]:
     """One cause for each way between two windows, of three columns."""
-    x, held = table.x, table.held
+    x, held = table.x, table.window_positions
     middle = np.array([x.t[x.position == p].mean() for p in held])
     first = np.array([(x.t + x.lasts / 2)[x.position == p].max() for p in held[:-1]])
     last = np.array([(x.t - x.lasts / 2)[x.position == p].min() for p in held[1:]])
@@ -54,5 +54,5 @@ def lost_ways(table: ColumnTable) -> Iterator[Cause]:
         size = priors.LOST_RAD / long[k] * np.abs(table.unit[3:])
         ends = (int(held[k]), int(held[k + 1]))
         own = at + 3 * i + np.arange(3)
-        group = Group(f"way {k}", "gyr", own, size, together=ends, random=True)
+        group = Group(f"way {k}", "gyr", own, size, moved_positions=ends, random=True)
         yield Cause(group.cause, "gyr", chance, (group,), "noise")

@@ -22,32 +22,34 @@ from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.physics.experience import Experience
 
-PLAIN = tuple(f"acc_{group}.{axis}" for group in ("bias", "scale") for axis in "xyz")
-"""Parameters that every device has."""
+ACC_CALIBRATION = tuple(
+    f"acc_{group}.{axis}" for group in ("bias", "scale") for axis in "xyz"
+)
+"""Full names of bias and scale factor of the accelerometers."""
 
 
 def parameters(*groups: str) -> tuple[str, ...]:
-    """Full names of bias and scale factor, and of some effects of the catalogue.
+    """Full names of bias and scale factor, and of the parameters of some effects.
 
     >>> parameters("base_tilt")[-2:]
     ('base_tilt.about_x_deg', 'base_tilt.about_z_deg')
     """
     more = (f"{g}.{p.name}" for g in groups for p in catalogue()[g].params)
-    return (*PLAIN, *more)
+    return (*ACC_CALIBRATION, *more)
 
 
-def predicted(
+def predict_outputs(
     names: Sequence[str],
     values: Array,
     positions: Sequence[Position],
     gravity: float,
     mounting: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Means of the accelerometers, and their derivatives.
+    """Predicted means of the accelerometers, and their derivatives.
 
     Parameters
     ----------
-    names, values : (k,) full names of parameters; what is not among them is perfect
+    names, values : (k,) full names of parameters; others have their ideal values
     positions : n, with known angles
     gravity : m/s^2
     mounting : (3, 3), procedure = mounting @ device
@@ -67,13 +69,13 @@ def predicted(
     view = RowView.of(x, np.zeros((1, len(x))), state)
     parts = {"acc_bias": columns.bias(view), "acc_scale": columns.scale(view)}
     for term in state.terms:
-        parts[term.effect.id] = columns.of_effect(term.effect, {}, 0).of(view)
+        parts[term.effect.id] = columns.effect_basis(term.effect, {}, 0).evaluate(view)
     slope = np.stack([_column(parts, n)[:, :3] for n in names], axis=2)
     return state.output(view.x, view.since)[:, :3], slope
 
 
-def late(x: Experience, alpha: Array, beta: Array) -> Experience:
-    """Rows in further positions, (n,) rad, as late in the session as its last row."""
+def rows_at_session_end(x: Experience, alpha: Array, beta: Array) -> Experience:
+    """Rows in further positions, (n,) rad, at the time of the session's last row."""
     last = np.full(len(alpha), len(x) - 1)
     force: Array = turn(alpha, beta) @ x.base_force @ x.mounting
     return Experience.at_rest(
@@ -92,8 +94,8 @@ def state_of(
 ) -> State:
     """The state of a device with given parameters, full names and (k,) values.
 
-    What is not among them is perfect, or as `nominal` has bias and scale factor (6,);
-    groups that are no effect of the rows play no part.
+    Other parameters have their ideal values; bias and scale factor (6,) those of
+    `nominal`, if given. Groups that are no effect of the rows are ignored.
     """
     known = dict(zip(names, values, strict=True))
     bias, scale = nominal or (np.zeros(6), np.ones(6))
@@ -111,15 +113,15 @@ def state_of(
     return State(bias, scale, np.zeros((0, 2)), np.zeros(3), tuple(terms))
 
 
-def design(
+def design_matrix(
     names: Sequence[str],
     positions: Sequence[Position],
     gravity: float,
     mounting: Array | None = None,
 ) -> Array:
-    """Derivatives about a perfect device, (n, 3, k)."""
+    """Derivatives of the accelerometers about an ideal device, (n, 3, k)."""
     perfect = np.array([float(group_of(n) == "acc_scale") for n in names])
-    return predicted(names, perfect, positions, gravity, mounting)[1]
+    return predict_outputs(names, perfect, positions, gravity, mounting)[1]
 
 
 def _column(parts: dict[str, Array], name: str) -> Array:

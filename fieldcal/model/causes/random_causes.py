@@ -9,9 +9,9 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.detents import columns_of, detents
+from fieldcal.model.causes.detents import detent_columns, detents
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.lost_way import lost_ways
@@ -19,16 +19,19 @@ from fieldcal.model.causes.sinking import sinking
 from fieldcal.physics.effect import CHANCE, Scatter
 
 
-def of_chance(table: ColumnTable) -> Iterator[Cause]:
-    """Every random effect of the catalogue, and angles that are not the stated ones."""
-    oriented = table.held[
-        [bool(table.x.oriented[table.x.position == p].all()) for p in table.held]
+def random_causes(table: ColumnTable) -> Iterator[Cause]:
+    """Causes of random effects, of noise that devices have, and of wrong angles."""
+    oriented = table.window_positions[
+        [
+            bool(table.x.oriented[table.x.position == p].all())
+            for p in table.window_positions
+        ]
     ]
     for effect in catalogue().values():
         if isinstance(effect, Scatter) and effect.applies(table.x):
-            yield from _of_scatter(table, effect, oriented)
-    if len(table.held) >= FEW:  # of fewer, it is always there
-        for group in _flicker(table):
+            yield from _causes_of_scatter(table, effect, oriented)
+    if len(table.window_positions) >= MIN_WINDOWS:  # of fewer, it is always there
+        for group in _cosine_flicker(table):
             yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
     if (leans := leaning(table)) is not None:
         yield Cause(leans.cause, leans.part, priors.LEANS, (leans,), "noise")
@@ -36,15 +39,15 @@ def of_chance(table: ColumnTable) -> Iterator[Cause]:
         yield Cause(sinks.cause, sinks.part, priors.SINKS, (sinks,), "noise")
     if table.turns:
         yield from lost_ways(table)
-    if len(table.held) > 3 and len(oriented):
+    if len(table.window_positions) > 3 and len(oriented):
         yield from _wrong_angles(table, oriented)
 
 
 def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
-    """A position set at other angles, and an angle that is wrong wherever it is set.
+    """Causes of a position set at wrong angles, and of an angle with a repeated error.
 
-    Only positions with known angles can have either; the others help to show them. A
-    fixture with one worn detent may have others as worn, even where rows show only one.
+    Only positions with known angles have either. A fixture with one worn detent may
+    have others, so one variant contains all of them.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
     groups = tuple(
@@ -59,29 +62,28 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     if not several:
         return
     wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
-    at = columns_of(table, several)
+    at = detent_columns(table, several)
     groups = tuple(
         Group("repeated_angle", "", at[i : i + 1], wide, params=(one.joint,),
-              together=one.positions)
+              moved_positions=one.positions)
         for i, one in enumerate(several)
     )  # fmt: skip
     if len(several) > 1:
         some = tuple(sorted({p for one in several for p in one.positions}))
         every = np.repeat(wide, len(several))
-        groups += (Group("repeated_angle", "", at, every, together=some),)
+        groups += (Group("repeated_angle", "", at, every, moved_positions=some),)
     yield Cause("repeated_angle", "", CHANCE, groups, "position")
 
 
-def _of_scatter(
+def _causes_of_scatter(
     table: ColumnTable, effect: Scatter, oriented: Index
 ) -> Iterator[Cause]:
-    """A random effect by the kind of its parameters.
+    """Causes of a random effect: of the positions' angles, or of the outputs.
 
-    Angles scatter where they are set, in positions `oriented`; others bear witness. An
-    angle of one position alone is one that is set wrongly.
+    Angles scatter in the positions `oriented`, whose angles are known.
     """
     if not {p.name for p in effect.params} <= set(CHANNELS):  # of the positions' angles
-        if len(table.held) < 3 or len(oriented) < 2:
+        if len(table.window_positions) < 3 or len(oriented) < 2:
             return
         at = table.rotations_of(oriented)
         size = np.full(len(at), np.deg2rad(effect.params[0].typical))
@@ -103,12 +105,12 @@ def _walks(
     sets: Sequence[Sequence[int]],
     share: float,
 ) -> Cause:
-    """Random walks of some channels together, or of single ones."""
+    """Cause of random walks, with a variant for each set of channels."""
     shape, modes = table.span.walk(), table.wander.modes
     groups = tuple(
         Group(
             effect.id, "".join(CHANNELS[c] for c in some),
-            np.concatenate([table.wave(c, modes[c]) for c in some]),
+            np.concatenate([table.cosine_columns(c, modes[c]) for c in some]),
             np.concatenate([
                 shape[: modes[c]] * effect.params[c].typical * table.unit[c]
                 for c in some
@@ -121,36 +123,36 @@ def _walks(
     return Cause(effect.id, part, share * effect.chance(table.x), groups, "random")
 
 
-def _flicker(table: ColumnTable) -> Iterator[Group]:
+def _cosine_flicker(table: ColumnTable) -> Iterator[Group]:
     """Flicker of each triad: bias noise with equal power in every octave.
 
     The variance of cosine k is proportional to 1/k.
     """
     modes = table.wander.modes
-    cosines = [table.wave(c, modes[c]) for c in range(6)]
+    cosines = [table.cosine_columns(c, modes[c]) for c in range(6)]
     shape = 1 / np.sqrt(np.arange(1, modes.max() + 1))
     sizes = priors.FLICKER_ACC, priors.FLICKER_GYR
-    yield from _of_triads(table, cosines, shape, sizes)
+    yield from _flicker_groups(table, cosines, shape, sizes)
 
 
-def flicker_of_few(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
-    """The same of few windows, which have no other instability."""
+def series_flicker(table: ColumnTable, series: FlickerSeries) -> Iterator[Group]:
+    """Flicker of each triad as a series, for few windows without other instability."""
     many = len(series.sizes)
-    first = table.course("flicker", lambda x: series.at(x.t), many, True)
+    first = table.add_course("flicker", lambda x: series.at(x.t), many, True)
     at = first + np.arange(6 * many).reshape(6, many)
     sizes = priors.INSTABILITY_ACC, priors.INSTABILITY_GYR
-    yield from _of_triads(table, list(at), series.sizes, sizes)
+    yield from _flicker_groups(table, list(at), series.sizes, sizes)
 
 
-def _of_triads(
+def _flicker_groups(
     table: ColumnTable,
     terms: Sequence[Index],
     shape: Array,
     sizes: tuple[float, float],
 ) -> Iterator[Group]:
-    """Flicker of each triad by the columns of each channel and the shape of its power.
+    """Group of each triad's flicker, from each channel's columns and their sizes.
 
-    `sizes` is what is typical of accelerometers and gyroscopes, SI.
+    `sizes` are the typical sizes of accelerometers and gyroscopes, SI.
     """
     for part, channels in TRIADS:
         at = [c for c in channels if c in table.observed]

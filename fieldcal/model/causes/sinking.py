@@ -22,8 +22,8 @@ from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.column_table import ColumnTable
-from fieldcal.model.causes.columns import General, RowView, of_effect
-from fieldcal.model.turns.turn import only
+from fieldcal.model.causes.columns import General, RowView, effect_basis
+from fieldcal.model.turns.turn import select_rows
 
 NAME = "sinking"
 
@@ -35,24 +35,26 @@ FEWEST = 4
 
 
 def sinking(table: ColumnTable) -> Group | None:
-    """The columns of all positions whose angles are known; None of too few."""
+    """Group of all positions with known angles; None if there are too few."""
     x = table.x
     known = x.oriented & (x.position >= 0)
     if len(np.unique(x.position[known])) < FEWEST:
         return None
-    tilt = of_effect(catalogue()["base_tilt"], {}, 0)
+    tilt = effect_basis(catalogue()["base_tilt"], {}, 0)
     begin, end = float(x.t[known].min()), float(x.t[known].max())
 
     def columns(view: RowView) -> Array:
         out = np.zeros((len(view.x), 6, 2 * TERMS))
-        rows = np.flatnonzero(view.plain.oriented & (view.plain.position >= 0))
+        rows = np.flatnonzero(view.nominal.oriented & (view.nominal.position >= 0))
         if not len(rows):
             return out
         some = RowView(
-            only(view.plain, rows.tolist()), only(view.x, rows.tolist()),
-            view.since[:, rows], view.state,
+            select_rows(view.nominal, rows.tolist()),
+            select_rows(view.x, rows.tolist()),
+            view.since[:, rows],
+            view.state,
         )  # fmt: skip
-        by = tilt.of(some)  # of one degree
+        by = tilt.evaluate(some)  # of one degree
         u = 2 * (view.x.t[rows] - begin) / (end - begin) - 1
         course = legvander(u, TERMS)[:, 1:]
         out[rows] = (by[..., None] * course[:, None, None]).reshape(len(rows), 6, -1)

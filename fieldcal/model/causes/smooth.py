@@ -25,7 +25,7 @@ SPANS = (1.5, 4.0, 9.0, 20.0)
 """Half waves of a smooth course over the session, from slow to fast."""
 
 FAINT = 1e-3
-"""Part of the slowest cosine's size below which one is left out of a course."""
+"""Relative size below which a cosine is omitted from a course."""
 
 HARMONICS = 4
 SLOW = 4
@@ -33,7 +33,7 @@ LONG_S = 1e4
 
 
 class CourseSpan:
-    """The stretch of time that a session's courses are drawn over.
+    """Time span of a session, and the functions of time over it.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ class CourseSpan:
         return sizes
 
 
-def smooth(span: float) -> Array:
-    """Standard deviation of each cosine in a course of some half waves, (k,)."""
+def smooth_course_sizes(span: float) -> Array:
+    """Standard deviation of each cosine of a course of `span` half waves, (k,)."""
     k = np.arange(1, WAVES + 1)
     sizes: Array = np.exp(-0.5 * (k / span) ** 2)
     sizes = sizes[sizes > FAINT]
@@ -79,23 +79,23 @@ def smooth(span: float) -> Array:
     return even
 
 
-def along(axis: int) -> slice:
-    """Which columns of `Span.fading` are of the force along one axis."""
+def force_time_columns(axis: int) -> slice:
+    """Columns of `CourseSpan.fading` that contain the force along one axis."""
     return slice(axis * SLOW, (axis + 1) * SLOW)
 
 
 def alpha(x: Experience) -> Array:
-    """Harmonics of the first joint."""
+    """Harmonics of the angle of the first joint."""
     return _angle(x.alpha)
 
 
 def beta(x: Experience) -> Array:
-    """Harmonics of the second joint."""
+    """Harmonics of the angle of the second joint."""
     return _angle(x.beta)
 
 
 def joints(x: Experience) -> Array:
-    """Products of harmonics of both."""
+    """Products of harmonics of both joints' angles."""
     one, two = (_angle(a)[:, [0, 1, 4, 5]] for a in (x.alpha, x.beta))
     out: Array = (one[:, :, None] * two[:, None, :]).reshape(len(x), -1)
     return out
@@ -127,7 +127,7 @@ def since_turn(x: Experience) -> Array:
 
 
 def covariates(span: CourseSpan) -> Mapping[str, Callable[[Experience], Array]]:
-    """Functions of what is known of a row beside the time, by name."""
+    """Functions of a row's covariates other than time, by name."""
     return {
         "alpha": alpha,
         "beta": beta,

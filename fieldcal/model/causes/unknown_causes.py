@@ -9,16 +9,16 @@ import numpy as np
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 
 FORCES = 3
-"""Channels that feel a force, those of the accelerometers."""
+"""Number of accelerometer channels."""
 
 
-def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
-    """Functions that no effect makes, on each channel."""
-    sizes = typical(table)
+def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
+    """Causes without physics: functions on single channels and on triads."""
+    sizes = typical_unknown_sizes(table)
     for c in table.observed.tolist():
         if _has_times(table):
             groups = [
@@ -26,37 +26,37 @@ def of_no_effect(table: ColumnTable) -> Iterator[Cause]:
                 for span in smooth.SPANS
             ]
             yield _cause("time", CHANNELS[c], groups)
-        at = table.window(c)
-        if len(table.held) > 3:
+        at = table.window_columns(c)
+        if len(table.window_positions) > 3:
             groups = [
                 Group("window", CHANNELS[c], at[i : i + 1], sizes[c : c + 1],
                       position=int(p))
-                for i, p in enumerate(table.held)
+                for i, p in enumerate(table.window_positions)
             ]  # fmt: skip
             yield _cause("window", CHANNELS[c], groups)
-        if len(table.held) > FEW:
+        if len(table.window_positions) > MIN_WINDOWS:
             wide = np.full(len(at), sizes[c])
             yield _cause(
                 "position", CHANNELS[c], [Group("position", CHANNELS[c], at, wide)]
             )
     if _has_times(table):
-        yield from _together(table, sizes)
-    yield from _of_covariates(table, sizes)
+        yield from _triad_courses(table, sizes)
+    yield from _covariate_causes(table, sizes)
 
 
 def _has_times(table: ColumnTable) -> bool:
-    """Whether rows have times: without, a course is a constant, as a bias is."""
+    """Whether rows have times. Without, a course in time is constant, as a bias is."""
     return bool(np.ptp(table.x.t) > 0)
 
 
-def typical(table: ColumnTable) -> Array:
-    """Size of what no effect makes on each channel, (6,)."""
+def typical_unknown_sizes(table: ColumnTable) -> Array:
+    """Typical size of functions without physics on each channel, (6,)."""
     out: Array = np.repeat([priors.UNKNOWN_ACC, priors.UNKNOWN_GYR], 3) * table.unit
     return out
 
 
-def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
-    """The same on all axes of a triad: one cause, not one for each of them."""
+def _triad_courses(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
+    """Causes of a course in time on all axes of a triad at once."""
     for part, channels in TRIADS:
         some = [c for c in channels if c in table.observed]
         if len(some) < 2:
@@ -70,25 +70,27 @@ def _together(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
 def _smooth_course(
     table: ColumnTable, part: str, channels: Sequence[int], sizes: Array, span: float
 ) -> Group:
-    """A smooth course in time on some channels."""
-    shape = smooth.smooth(span)
-    waves = np.concatenate([table.wave(c, len(shape)) for c in channels])
+    """Group of a smooth course in time on some channels."""
+    shape = smooth.smooth_course_sizes(span)
+    waves = np.concatenate([table.cosine_columns(c, len(shape)) for c in channels])
     size = np.outer(sizes[channels], shape).ravel()
     return Group("time", part, waves, size, shape={"waves": span})
 
 
-def _of_covariates(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
-    """Functions of what is known of a row beside the time."""
+def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
+    """Causes of functions of a row's covariates other than time."""
     for covariate, of in smooth.covariates(table.span).items():
         if not _covers(table, covariate):
             continue
         width = of(table.x).shape[1]
-        first = table.course(covariate, of, width, False)
+        first = table.add_course(covariate, of, width, False)
         for c in table.observed.tolist():
             at = first + c * width + np.arange(width)
             parts = [at]
             if covariate == "force and time" and c < FORCES:
-                parts.append(at[smooth.along(c)])  # a scale factor that changes
+                parts.append(
+                    at[smooth.force_time_columns(c)]
+                )  # a scale factor that changes
             groups = [Group(covariate, CHANNELS[c], some, np.full(len(some), sizes[c]))
                       for some in parts]  # fmt: skip
             yield _cause(covariate, CHANNELS[c], groups)
@@ -101,11 +103,11 @@ def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
 def _covers(table: ColumnTable, covariate: str) -> bool:
     x = table.x
     if covariate in ("alpha", "beta", "joints"):
-        return bool(x.oriented.all()) and len(table.held) > 3
+        return bool(x.oriented.all()) and len(table.window_positions) > 3
     if covariate == "temperature":
         return x.warms
     if covariate == "force and time":
-        return len(table.held) > FEW and _has_times(table)
+        return len(table.window_positions) > MIN_WINDOWS and _has_times(table)
     if covariate == "since turn":
         return bool(np.isfinite(x.since_turn).all())
-    return len(table.held) > 3
+    return len(table.window_positions) > 3

@@ -35,17 +35,17 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes import smooth
-from fieldcal.model.causes.cause import FEW
+from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.flicker_series import FlickerSeries
-from fieldcal.model.causes.wander_sizes import sizes
+from fieldcal.model.causes.wander_sizes import wander_sizes
 from fieldcal.model.rows.lean_modes import lean_modes
 from fieldcal.model.rows.reduce import Rows
 
 MORE = 2.0
-"""Times as many cosines as are each beyond the noise of the rows."""
+"""Number of cosines used, in those that each exceed the noise of the rows."""
 
 NEAR = 1e-12
-"""Least phase between two means: at none, flicker would be without bound."""
+"""Least phase between two means; flicker diverges at zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,19 +54,19 @@ class Wander:
 
     Attributes
     ----------
-    speed : (6,) of each output, per sqrt(s), if it walks
-    flicker : (6,) a of each output, if it flickers
-    share : (6,) probability that it is flicker if it is either
-    modes : (6,) cosines of it that rows see, at least those of a smooth course
-    length : s that these are drawn over
-    series : flicker of few windows, where it is always there; None of more
-    unseen : (n, 6) variance that this leaves of each row
-    leans : (p,) cosines by which the force is seen to turn in each position; none where
-        its angles are set
+    walk_rate : (6,) random walk q of each output, per sqrt(s), given that it walks
+    flicker : (6,) flicker a of each output, given that it has flicker
+    share : (6,) probability of flicker, given that it has either of the two
+    modes : (6,) number of cosines fitted, at least those of a smooth course
+    length : s, span of the cosines
+    series : series of flicker for few windows; None for more
+    unseen : (n, 6) variance of each row that the series does not describe
+    leans : (p,) number of cosines of the force's rotation in each position; 0 where the
+        angles are set
 
     """
 
-    speed: Array
+    walk_rate: Array
     flicker: Array
     share: Array
     modes: Index
@@ -77,8 +77,11 @@ class Wander:
 
     @classmethod
     def of(cls, rows: Rows, unit: Array) -> Wander:
-        """Measure it in rows; `unit` (6,) are outputs per SI unit."""
-        length, (speed, flicker, share) = float(np.ptp(rows.x.t)), sizes(rows, unit)
+        """Estimate it from rows; `unit` (6,) are outputs per SI unit."""
+        length, (speed, flicker, share) = (
+            float(np.ptp(rows.x.t)),
+            wander_sizes(rows, unit),
+        )
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)
@@ -87,25 +90,29 @@ class Wander:
         )
         leans = lean_modes(rows)
         out = cls(speed, flicker, share, modes, length, leans=leans)
-        if not len(np.unique(rows.x.position)) < FEW < len(rows.x):
+        if not len(np.unique(rows.x.position)) < MIN_WINDOWS < len(rows.x):
             return out
         series = FlickerSeries.of(rows.x.t, rows.length)
         typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3) * unit
-        return replace(out, series=series, unseen=series.left(rows.y, rows.sd, typical))
+        return replace(
+            out,
+            series=series,
+            unseen=series.residual_variance(rows.y, rows.sd, typical),
+        )
 
     @classmethod
     def none(cls) -> Wander:
-        """Of rows that are as white as their samples."""
+        """No random walk and no flicker."""
         nothing = np.zeros(6)
         return cls(nothing, nothing, nothing, np.full(6, smooth.WAVES), 0.0)
 
-    def left_of_rows(self, length: Array, channel: int) -> Array:
-        """Variance that cosines and series leave of all rows of the windows, (n,)."""
-        out = self.left(length, channel)
+    def residual_variance_of_rows(self, length: Array, channel: int) -> Array:
+        """Variance of all rows that neither cosines nor series describe, (n,)."""
+        out = self.residual_variance(length, channel)
         return out if self.unseen is None else out + self.unseen[:, channel]
 
-    def left(self, length: Array, channel: int) -> Array:
-        """Variance that its cosines leave of means over some lengths, (n,)."""
+    def residual_variance(self, length: Array, channel: int) -> Array:
+        """Variance of means over some lengths beyond its cosines, (n,)."""
         q, a, count = self._of_channel(channel)
         if not (q or a):
             return np.zeros(len(length))
@@ -115,13 +122,13 @@ class Wander:
         out: Array = (walks + a**2 * _left_of_flicker(self.length, few, count))[at]
         return out
 
-    def apart(self, t: Array, length: Array) -> Array:
-        """Covariance that they leave of means about some instants, (6, n, n)."""
+    def residual_covariance(self, t: Array, length: Array) -> Array:
+        """Covariance of means about some instants beyond the cosines, (6, n, n)."""
         y = np.pi * np.abs(np.subtract.outer(t, t)) / max(self.length, 1e-9)
         out, diagonal = np.zeros((6, *y.shape)), np.s_[:: len(t) + 1]
         for c in range(6):
             q, a, count = self._of_channel(c)
-            alone = self.left(length, c)
+            alone = self.residual_variance(length, c)
             if not alone.any():
                 continue
             k = np.arange(1, count + 1)
@@ -135,9 +142,9 @@ class Wander:
         return out
 
     def _of_channel(self, channel: int) -> tuple[float, float, int]:
-        """Walk and flicker of a channel as likely as each is, and its cosines."""
+        """Probable walk and flicker of a channel, and its number of cosines."""
         share = float(self.share[channel])
-        q = float(self.speed[channel]) * (1 - share) ** 0.5
+        q = float(self.walk_rate[channel]) * (1 - share) ** 0.5
         return q, float(self.flicker[channel]) * share**0.5, int(self.modes[channel])
 
 

@@ -30,7 +30,7 @@ from fieldcal.core.chances import of_odds
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import FEW, TRIADS
+from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Scatter
 
@@ -38,7 +38,7 @@ CHI2_MEDIAN, SCATTERS = 0.4549, 2.7
 """Of chi squared with one degree of freedom: median; scatter of the median's ln."""
 
 FINER = 4
-"""Values of v to one of those of groups: this one is taken as it is."""
+"""Values of v for each value of `priors.SIZES`."""
 
 SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], FINER * 32 + 1)
 
@@ -48,24 +48,24 @@ DENSITY: Array = (
 """Probability of each."""
 
 LAGS = (1, 3, 9)
-"""Rows from one to the next of three."""
+"""Distances of the three means of a difference, in rows."""
 
 FEWEST = 8
-"""Differences below which they tell nothing."""
+"""Least number of differences from which a size is estimated."""
 
 TINY = 1e-12
 """Of ratios, where a channel repeats one value."""
 
 
 class Differences(NamedTuple):
-    """Of three means of one channel each, the middle one and the others' mean.
+    """Second differences of the means of one channel.
 
     Attributes
     ----------
-    squares : (n,) of each
-    white : (n,) variance by the noise of all
-    walks, flickers : (n,) variance besides where q, or a, is 1
-    alone : how many of them do not overlap
+    squares : (n,) squares of the differences
+    white : (n,) variance from white noise
+    walks, flickers : (n,) further variance if q, or a, is 1
+    alone : number of differences that do not overlap
 
     """
 
@@ -76,49 +76,50 @@ class Differences(NamedTuple):
     alone: float
 
     def scores(self, grown: Array, squares: Array) -> Array:
-        """Ln of likelihood of some sizes squared, (v,), by what grows with them."""
+        """Log likelihood of squared sizes (v,); `grown` (n,) is variance at size 1."""
         known = self.squares / (self.white + np.multiply.outer(squares, grown))
         ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, TINY)
         out: Array = -self.alone / 2 * (np.log(ratio) / SCATTERS) ** 2
         return out
 
 
-def sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
-    """How fast each output walks if it does, per sqrt(s), or flickers if it does, (6,).
+def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
+    """Sizes of random walk, per sqrt(s), and flicker of each output, (6,) each.
 
-    Root mean squares over all sizes and none, by their probabilities: nothing, where
-    rows show none. Then how likely it is flicker, (6,), if it is either of the two: of
-    few windows it is always there by itself. `unit` (6,) are outputs per SI unit.
+    Root mean squares over all sizes, including zero, weighted by their probabilities.
+    The third result is the probability of flicker, (6,), given that an output has
+    either. Few windows have flicker as a permanent group, so here it is zero.
+    `unit` (6,) are outputs per SI unit.
     """
     walk, chance = _walk(rows)
     flicker = np.repeat([priors.FLICKER_ACC, priors.FLICKER_GYR], 3)
     out, evidence = np.zeros((2, 6)), np.zeros((2, 6))
-    few = len(np.unique(rows.x.position)) < FEW
+    few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
         at = list(triad)
         seen = [[d for lag in LAGS for d in _differences(rows, c, lag)] for c in at]
-        by = Hypotheses(walk[at] * unit[at], chance, priors.ALONE)
+        by = WanderHypotheses(walk[at] * unit[at], chance, priors.ALONE)
         out[0, at], evidence[0, at] = by.sizes(
             [[(d, d.walks) for d in some] for some in seen]
         )
         if few:
             evidence[1, at] = -np.inf
             continue
-        by = Hypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
+        by = WanderHypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
     return out[0], out[1], of_odds(evidence[1] - evidence[0])
 
 
-class Hypotheses(NamedTuple):
-    """That a triad wanders, or one of its axes alone, or nothing.
+class WanderHypotheses(NamedTuple):
+    """Hypotheses: all axes of a triad wander, one axis alone, or none.
 
     Attributes
     ----------
     typical : (3,) size of each axis at v = 1
-    chance : that the axes wander, which are made alike
-    alone : part of it that only one of them does
+    chance : prior probability that axes wander
+    alone : part of it that only one axis does
 
     """
 
@@ -129,9 +130,9 @@ class Hypotheses(NamedTuple):
     def sizes(
         self, seen: Sequence[Sequence[tuple[Differences, Array]]]
     ) -> tuple[Array, float]:
-        """Root mean square size of each axis, by its differences and what grows.
+        """Root mean square size of each axis, and log evidence that it is not zero.
 
-        Then ln of the evidence that it is not nothing.
+        `seen` has, for each axis, differences with their variance at size 1.
         """
         square = np.append(0.0, SIZES) ** 2
         every = np.zeros((3, len(square)))
@@ -152,7 +153,7 @@ class Hypotheses(NamedTuple):
 
 
 def _walk(rows: Rows) -> tuple[Array, float]:
-    """Typical walk of each channel, (6,), and the chance of one; from the catalogue."""
+    """Typical walk of each channel, (6,), and its prior, by the catalogue."""
     (effect,) = (
         e
         for e in catalogue().values()
@@ -162,7 +163,7 @@ def _walk(rows: Rows) -> tuple[Array, float]:
 
 
 def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
-    """Of one channel in the later halves of the windows; nothing of too few."""
+    """Differences of one channel in the later halves of windows; none if too few."""
     at = _later_half(rows, 2 * lag)
     y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
     known = rows.used[:, c]

@@ -34,15 +34,15 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.priors import SIZES
 
 ROUNDED = 1e-9
-"""Part of a column's square that eliminating others leaves of it by rounding."""
+"""Relative size of an eigenvalue below which it is a rounding error."""
 
 SMALL = 64
-"""Rows of a matrix up to which halving it saves nothing."""
+"""Largest matrix that is inverted without division into halves."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gram:
-    """What the rows say of all columns.
+    """Normal equations of all columns, with the means of windows kept separate.
 
     Attributes
     ----------
@@ -53,11 +53,11 @@ class Gram:
     means : (p, 6, k) columns' means in each window
     off : (p, 6) mean of y - h
     info : (p, 6) information on each mean, 0 where nothing was measured
-    shared : (p, 6) standard deviation of what windows certainly share
-    loose : (p, 6, 2) A_p
+    shared : (p, 6) standard deviation of known errors that all rows of a window share
+    loose : (p, 6, 2) A_p, derivative of the means by free rotations
     kind : (p, 6) index of the instability of each mean; turns' closures have their own
-    bent : (p, 6, 6) by what a closure is off for an instability of one, by channel
-    index : (all,) where each column of the dictionary stands here, -1 where it does not
+    bent : (p, 6, 6) error of a closure for an instability of one, by channel
+    index : (all,) place of each column of the dictionary here, -1 if absent
 
     """
 
@@ -74,8 +74,8 @@ class Gram:
     bent: Array
     index: Index
 
-    def only(self, columns: Index) -> Gram:
-        """Some columns of the dictionary."""
+    def select_columns(self, columns: Index) -> Gram:
+        """The Gram matrix of some columns of the dictionary."""
         kept = np.unique(columns)
         at = self.index[kept]
         index = np.full(len(self.index), -1, dtype=np.intp)
@@ -89,23 +89,23 @@ class Gram:
         )
 
     def blocks(self, columns: Sequence[Index]) -> list[Array]:
-        """The part of blocks of columns that no instability weighs."""
+        """Blocks of `within`, which do not depend on the instability."""
         local = [self.index[at] for at in columns]
         return [self.within[at[:, :, None], at[:, None, :]] for at in local]
 
-    def at(self, windows: NDArray[np.bool_], info: Array) -> Gram:
+    def select_windows(self, windows: NDArray[np.bool_], info: Array) -> Gram:
         """Some windows, with other information on their means."""
         parts = ("means", "off", "shared", "loose", "kind", "bent")
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 
-    def weighed(self, tau: Array) -> Weighed:
-        """With instabilities by kind, (7,)."""
+    def with_instability(self, tau: Array) -> WeightedGram:
+        """Weight the means with instabilities by kind, (7,)."""
         known = self.info > 0
         if self.loose.any():
             full, log_det = self.whitening(tau)
             own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
-            return Weighed(
+            return WeightedGram(
                 self, (full @ self.means)[known],
                 (full @ self.off[:, :, None])[known, 0], own, full, float(log_det),
             )  # fmt: skip
@@ -115,7 +115,7 @@ class Gram:
         root = np.sqrt(weight[known])
         white: Array = self.means[known] * root[:, None]
         off: Array = self.off[known] * root
-        return Weighed(self, white, off, weight, np.zeros(0), float(log_det))
+        return WeightedGram(self, white, off, weight, np.zeros(0), float(log_det))
 
     def _spread(self, tau: Array) -> Array:
         """Variance of the means beside white noise, by channel, (..., p, 6)."""
@@ -125,9 +125,9 @@ class Gram:
         return out
 
     def whitening(self, tau: Array) -> tuple[Array, Array]:
-        """W of the means at instabilities, (..., 7) -> (..., p, 6, 6), and ln |R|.
+        """Whitening W of the means at instabilities, (..., p, 6, 6), and ln |R|.
 
-        Channels of a window go together where it is turned freely.
+        `tau` is (..., 7). Free rotations of a window correlate its channels.
         """
         known = self.info > 0
         both = known[:, :, None] & known[:, None, :]
@@ -142,16 +142,16 @@ class Gram:
 
 
 @dataclass(frozen=True, slots=True)
-class Weighed:
+class WeightedGram:
     """A Gram matrix at some instabilities.
 
     Attributes
     ----------
-    gram : what it was made of
-    white : (r, k) whitened means of the columns, of those that were measured
-    off : (r,) of y - h
+    gram : the matrix without instability
+    white : (r, k) whitened means of the columns, for measured channels
+    off : (r,) whitened means of y - h
     weight : (p, 6) information on each mean given the rest of its window
-    root : (p, 6, 6) whitening of the means, empty where each is for itself
+    root : (p, 6, 6) whitening of the means; empty if they are uncorrelated
     log_det : ln |R| beyond that of white noise
 
     """
@@ -164,7 +164,7 @@ class Weighed:
     log_det: float
 
     def matrix(self, one: Index, other: Index | None) -> Array:
-        """Phi^T R^-1 Phi of some columns, or of some and all."""
+        """Phi^T R^-1 Phi of columns `one` and `other`; all columns if that is None."""
         rows = self.gram.index[one]
         some = self.white[:, rows]
         if other is None:
@@ -198,7 +198,7 @@ class Weighed:
         return self.gram.square + float(self.off @ self.off)
 
     def shared(self, kind: int) -> Array:
-        """Whitened columns of each mean of a kind by itself, (r, m)."""
+        """Whitened columns of the offsets of single means of a kind, (r, m)."""
         gram = self.gram
         size = (gram.kind == kind).astype(float)
         if kind < 6:
@@ -215,34 +215,34 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Eliminated:
-    """A set of columns with their sizes, eliminated.
+    """A set of columns with their prior sizes, eliminated: its posterior.
 
     Attributes
     ----------
-    rows : what was eliminated in
-    columns : (a,) of the Gram matrix; one may stand there twice
-    sizes : (a,) standard deviation of each before the rows are seen
-    half : (a, a) a root H of the covariance after, H^T H
-    estimate : (a,) mean after
+    rows : weighted Gram matrix
+    columns : (a,) of the dictionary; a column may occur twice
+    prior_sigma : (a,) prior standard deviation of each
+    half : (a, a) root H of the posterior covariance H^T H
+    estimate : (a,) posterior mean
     score : ln Z, (2)
 
     """
 
-    rows: Weighed
+    rows: WeightedGram
     columns: Index
-    sizes: Array
+    prior_sigma: Array
     half: Array
     estimate: Array
     score: float
 
     @classmethod
-    def of(cls, rows: Weighed, columns: Index, sizes: Array) -> Eliminated:
-        """Eliminate columns of some sizes."""
+    def of(cls, rows: WeightedGram, columns: Index, sizes: Array) -> Eliminated:
+        """Eliminate columns with prior standard deviations `sizes`."""
         scaled = rows.matrix(columns, columns) * sizes
         scaled *= sizes[:, None]
         scaled.flat[:: len(columns) + 1] += 1.0
-        root = root_of(scaled)
-        half = inverse_of(root) * sizes
+        root = cholesky_root(scaled)
+        half = triangular_inverse(root) * sizes
         seen = half @ rows.pull(columns)
         score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (2)
@@ -250,12 +250,12 @@ class Eliminated:
 
     @cached_property
     def inverse(self) -> Array:
-        """S (I + S G S)^-1 S, the covariance after, (a, a)."""
+        """Posterior covariance S (I + S G S)^-1 S, (a, a)."""
         out: Array = self.half.T @ self.half
         return out
 
-    def rest(self, columns: Index, typical: Array) -> tuple[Array, Array]:
-        """M and T b' of further columns, in units of what is typical."""
+    def schur_complement(self, columns: Index, typical: Array) -> tuple[Array, Array]:
+        """M and T b' of further columns after elimination, in typical sizes."""
         shared = self.rows.matrix(self.columns, columns)
         inner = self.rows.matrix(columns, columns)
         taken = self.half @ shared
@@ -263,8 +263,10 @@ class Eliminated:
         pull = self.rows.pull(columns) - shared.T @ self.estimate
         return inner * typical * typical[:, None], pull * typical
 
-    def of_means(self, kind: int, typical: float) -> tuple[Array, Array]:
-        """The same of what each mean of a kind is off by."""
+    def schur_complement_of_means(
+        self, kind: int, typical: float
+    ) -> tuple[Array, Array]:
+        """The same for offsets of single means of one kind of instability."""
         white = self.rows.shared(kind) * typical
         ours = self.rows.white[:, self.rows.gram.index[self.columns]]
         shared = ours.T @ white
@@ -273,14 +275,14 @@ class Eliminated:
         return inner, white.T @ self.rows.off - shared.T @ self.estimate
 
 
-def root_of(scaled: Array) -> Array:
-    """Lower triangular root of I + S G S, (..., k, k), no eigenvalue of it below 1.
+def cholesky_root(scaled: Array) -> Array:
+    """Lower triangular root of I + S G S, (..., k, k), with no eigenvalue below 1.
 
-    By rounding some may be, where what the rows say of columns differs by as much as
-    numbers have digits: of windows of hours, which show slow cosines a million times
+    If Cholesky's decomposition fails by rounding, eigenvalues below 1 are set to 1.
+    This happens for windows of hours, which determine slow cosines a million times
     better than quick ones.
 
-    >>> root_of(np.array([[1e20, 1e20], [1e20, 1e20]]))[1, 1] >= 1
+    >>> cholesky_root(np.array([[1e20, 1e20], [1e20, 1e20]]))[1, 1] >= 1
     np.True_
     """
     try:
@@ -294,10 +296,10 @@ def root_of(scaled: Array) -> Array:
     return out
 
 
-def inverse_of(root: Array) -> Array:
-    """Inverse of lower triangular matrices, in halves: general ones cost six times.
+def triangular_inverse(root: Array) -> Array:
+    """Inverse of lower triangular matrices, by halves; faster than in general.
 
-    >>> (inverse_of(np.tri(200)) @ np.tri(200) == np.eye(200)).all()
+    >>> (triangular_inverse(np.tri(200)) @ np.tri(200) == np.eye(200)).all()
     np.True_
     """
     width = root.shape[-1]
@@ -306,14 +308,14 @@ def inverse_of(root: Array) -> Array:
         return out
     k = width // 2
     out = np.zeros(root.shape)
-    out[..., :k, :k] = first = inverse_of(root[..., :k, :k])
-    out[..., k:, k:] = last = inverse_of(root[..., k:, k:])
+    out[..., :k, :k] = first = triangular_inverse(root[..., :k, :k])
+    out[..., k:, k:] = last = triangular_inverse(root[..., k:, k:])
     out[..., k:, :k] = -last @ (root[..., k:, :k] @ first)
     return out
 
 
-def gains(inner: Array, pull: Array, own: Array | float) -> Array:
-    """Gain (3) over `SIZES` of groups alike in width: (..., k, k), (..., k).
+def evidence_gains(inner: Array, pull: Array, own: Array | float) -> Array:
+    """Gain (3) at each of `SIZES` for groups of equal width: (..., k, k), (..., k).
 
     `own` (...) is the largest diagonal element of T G T before the elimination.
     """
@@ -324,11 +326,13 @@ def gains(inner: Array, pull: Array, own: Array | float) -> Array:
         power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
     seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
     strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
-    return gained(strength, power)
+    return gains_from_eigenvalues(strength, power)
 
 
-def gained(strength: Array, power: Array, sizes: Array = SIZES) -> Array:
-    """Gain (3) over some sizes of lambda and q^2, (..., k) each."""
+def gains_from_eigenvalues(
+    strength: Array, power: Array, sizes: Array = SIZES
+) -> Array:
+    """Gain (3) at some sizes, from lambda and q^2, (..., k) each."""
     square = sizes**2
     # sizes last: sums along an axis of three cost more than what is summed
     one = strength[..., None] * square

@@ -1,7 +1,7 @@
-"""A set beside many instabilities, all at once.
+"""The evidence of a set at many instabilities, calculated together.
 
 Instability of some kinds is in the noise of the means that are of these kinds; all
-other rows say the same beside each. With W the whitening of those means at one
+other rows have the same information at each. With W the whitening of those means at one
 instability, and X the set's columns, further ones and last the rows themselves in them,
 
     T = T_0 + X^T W^T W X                                                           (1)
@@ -27,23 +27,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.gram import Gram, Weighed, inverse_of, root_of
+from fieldcal.model.evidence.gram import (
+    Gram,
+    WeightedGram,
+    cholesky_root,
+    triangular_inverse,
+)
 
-AT_ONCE = 4_000_000
-"""Numbers of the tables that are solved at once: 30 MB."""
+MAX_NUMBERS = 4_000_000
+"""Largest number of table elements that are calculated at once: 30 MB."""
 
 
 @dataclass(frozen=True, slots=True)
-class Levels:
-    """A set beside some instabilities.
+class InstabilityScan:
+    """A set, eliminated at each of n instabilities.
 
     Attributes
     ----------
     score : (n,) ln Z, (3)
     sizes, root, seen : (n, a), (n, a, a), (n, a) S, L and l
-    inner, pull : (n, w, k, k), (n, w, k) what the rows say of blocks of further
-        columns, (4)
-    alone : (n, w, k) the squares of these columns, whatever the set takes off them
+    inner, pull : (n, w, k, k), (n, w, k) M' and c' of blocks of further columns, (4)
+    alone : (n, w, k) squares of these columns before the set is eliminated
 
     """
 
@@ -57,50 +61,54 @@ class Levels:
 
     def posterior(self) -> tuple[Array, Array]:
         """Mean (n, a) and covariance (n, a, a) of the set's columns."""
-        half = inverse_of(self.root) * self.sizes[:, None]
+        half = triangular_inverse(self.root) * self.sizes[:, None]
         turned = np.swapaxes(half, 1, 2)
         return (turned @ self.seen[..., None])[..., 0], turned @ half
 
 
-def levels(
+def scan_instabilities(
     gram: Gram, columns: Index, sizes: Array, taus: Array, further: Index
-) -> Levels:
-    """A set beside some instabilities.
+) -> InstabilityScan:
+    """Eliminate a set at each of some instabilities.
 
     Parameters
     ----------
-    gram : what the rows say
+    gram : Gram matrix of the rows
     columns : (a,) of the set
-    sizes : (a,) or, beside each instability others, (n, a)
+    sizes : (a,) prior standard deviations; (n, a) if they differ by instability
     taus : (n, 7) instabilities by kind
-    further : (w, k) blocks of columns that the set may be given
+    further : (w, k) blocks of columns that may be added to the set
 
     """
     sizes = np.broadcast_to(sizes, (len(taus), len(columns)))
     every = np.concatenate([columns, further.ravel()])
-    moved = _moved(gram, np.flatnonzero(np.ptp(taus, axis=0)))
-    still = replace(gram, info=np.where(moved, 0.0, gram.info)).weighed(taus[0])
-    common = _products(still, every)
+    moved = _affected_means(gram, np.flatnonzero(np.ptp(taus, axis=0)))
+    still = replace(gram, info=np.where(moved, 0.0, gram.info)).with_instability(
+        taus[0]
+    )
+    common = _joint_gram(still, every)
     windows: NDArray[np.bool_] = np.any(moved, axis=1)
-    some = gram.at(windows, np.where(moved, gram.info, 0.0))
+    some = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
     table = np.append(some.means[:, :, some.index[every]], some.off[..., None], axis=2)
     rows, width = int(moved.sum()), len(common)
-    step = max(1, AT_ONCE // (width * (rows + width)))
+    step = max(1, MAX_NUMBERS // (width * (rows + width)))
     parts = []
     for first in range(0, len(taus), step):
         part = slice(first, first + step)
         root, log_det = some.whitening(taus[part])
         white = (root @ table)[:, moved[windows]]
         total = common + np.swapaxes(white, 1, 2) @ white  # (1)
-        found = _eliminated(total, sizes[part], further.shape)
+        found = _eliminate(total, sizes[part], further.shape)
         score = found.score - 0.5 * (log_det + still.log_det)
         parts.append(replace(found, score=score))
-    names = Levels.__slots__
-    return Levels(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+    names = InstabilityScan.__slots__
+    return InstabilityScan(
+        *(np.concatenate([getattr(p, n) for p in parts]) for n in names)
+    )
 
 
-def _moved(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
-    """Means whose noise, or that of what goes with them, is of some kinds, (p, 6)."""
+def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
+    """Means whose noise depends on instabilities of some kinds, (p, 6)."""
     own = np.isin(gram.kind, kinds)
     if bent := [k for k in kinds if k < gram.bent.shape[2]]:
         own |= gram.bent[:, :, bent].any(axis=2)
@@ -110,7 +118,7 @@ def _moved(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
     return out
 
 
-def _products(rows: Weighed, columns: Index) -> Array:
+def _joint_gram(rows: WeightedGram, columns: Index) -> Array:
     """T of rows and columns (c,), (c + 1, c + 1)."""
     out = np.empty((len(columns) + 1, len(columns) + 1))
     out[:-1, :-1] = rows.matrix(columns, columns)
@@ -119,14 +127,14 @@ def _products(rows: Weighed, columns: Index) -> Array:
     return out
 
 
-def _eliminated(total: Array, sizes: Array, shape: tuple[int, ...]) -> Levels:
+def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> InstabilityScan:
     """(2) to (4) of T, (n, c + 1, c + 1), whose first columns have sizes (n, a)."""
     n, a = sizes.shape
     known = [*range(a), -1]
     wide = np.append(sizes, np.ones((n, 1)), axis=1)
     scaled = total[:, known][:, :, known] * wide[:, :, None] * wide[:, None, :]
     scaled[:, range(a + 1), range(a + 1)] += 1.0
-    both = root_of(scaled)
+    both = cholesky_root(scaled)
     root, seen = both[:, :-1, :-1], both[:, -1, :-1]
     score = 0.5 * (1 - both[:, -1, -1] ** 2)
     score -= np.log(np.diagonal(root, 0, 1, 2)).sum(axis=1)
@@ -139,4 +147,4 @@ def _eliminated(total: Array, sizes: Array, shape: tuple[int, ...]) -> Levels:
         turned = np.swapaxes(taken, 2, 3)
         own = own - turned @ taken
         pull = pull - (turned @ seen[:, None, :, None])[..., 0]
-    return Levels(score, sizes, root, seen, own, pull, alone)
+    return InstabilityScan(score, sizes, root, seen, own, pull, alone)

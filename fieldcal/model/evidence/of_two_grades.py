@@ -21,11 +21,11 @@ from fieldcal.core.factory import WARMING, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated, gained
-from fieldcal.model.evidence.sizing import told_of
+from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
+from fieldcal.model.evidence.sizing import gain_terms
 
 STRAIGHT = ("quadratic", "scale_asymmetry", "cubic")
-"""Effects whose sizes are one of `FactoryErrors`: a curve of unknown shape."""
+"""Effects that share one size of `FactoryErrors`: a curve of unknown shape."""
 
 
 def chances_of_coarser(
@@ -38,9 +38,9 @@ def chances_of_coarser(
 
     Parameters
     ----------
-    state : a set with the groups in it, as large as the coarser grade has them
-    groups : what the factory left, each named by `part`
-    coarser, stated : sizes by the two grades; those that are alike are left out
+    state : a set that contains the groups with the sizes of the coarser grade
+    groups : errors that the factory left, each named by `part`
+    coarser, stated : sizes by the two grades; equal sizes are omitted
 
     """
     chances = {}
@@ -62,14 +62,16 @@ def _kinds(groups: Sequence[Group]) -> Iterator[tuple[str, Index]]:
 
 
 def _of_biases(group: Group, kind: str) -> Index:
-    """The columns of what warms up that one temperature coefficient is the size of."""
+    """Columns of a warm-up group whose size is one temperature coefficient."""
     triads = {"acc_per_k": CHANNELS[:3], "gyr_per_k": CHANNELS[3:]}
     at = [i for i, p in enumerate(group.params) if CHANNELS[p] in triads.get(kind, ())]
     return group.columns[at]
 
 
 def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
-    """Probability that columns are as large as in a set, and not a part of that."""
-    gain = gained(*told_of(state, at, 1.0), np.array([part, 1.0]))  # (1)
+    """Probability that columns have the set's size, and not `part` of it, (1)."""
+    gain = gains_from_eigenvalues(
+        *gain_terms(state, at, 1.0), np.array([part, 1.0])
+    )  # (1)
     ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
     return float(of_odds(ahead))

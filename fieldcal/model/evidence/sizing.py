@@ -20,32 +20,32 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Eliminated, Gram, gained
+from fieldcal.model.evidence.gram import Eliminated, Gram, gains_from_eigenvalues
 
-DENSITY = np.log(priors.density())
-UNSTEADY = np.log(priors.density(priors.STEEP))
-"""The same of instabilities."""
+LOG_DENSITY = np.log(priors.density())
+INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.STEEP))
+"""Log prior of the sizes of instabilities."""
 
-EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
+UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
 """Index of v = 1."""
 
 STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
-"""From one size to the next, ln."""
+"""Step of ln v between neighbouring sizes."""
 
 FINER = 129
-"""Sizes that are tried between one size's neighbours, once it is to be told."""
+"""Number of sizes that are tried between the neighbours of a size."""
 
 PRIOR_INFO = 0.1
-"""Information on ln v that there is at least."""
+"""Least information on ln v."""
 
 ROUNDS = 5
-"""Times that every size is sought beside the others."""
+"""Largest number of passes over all sizes."""
 
 LEAST = 1e-14
-"""Part of its variance before the rows that rounding leaves of a column."""
+"""Least ratio of posterior to prior variance; smaller ones are rounding errors."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
-"""Kinds of instability that are alike: those of a triad's axes; the turns' closures."""
+"""Instabilities with similar sizes: those of a triad's axes, and that of closures."""
 
 Member = tuple[Cause, Group]
 
@@ -63,24 +63,26 @@ class Sizes:
     members: tuple[int, ...] = ()
 
 
-def alike(
-    instability: Sequence[int] | Array, unstable: Array, density: Array = UNSTEADY
+def instability_log_prior(
+    instability: Sequence[int] | Array,
+    unstable: Array,
+    density: Array = INSTABILITY_LOG_DENSITY,
 ) -> Any:
-    """Log prior of instabilities (..., 7): those of a triad's axes are alike.
+    """Log prior of instabilities (..., 7): those of a triad's axes are similar.
 
-    `unstable` (7,) is their typical size, 0 where there is none; `density` is ln of how
-    likely each of `priors.SIZES` is.
+    `instability` are indices in `priors.SIZES`. `unstable` (7,) is the typical size, 0
+    where there is none; `density` the log prior of each of `priors.SIZES`.
     """
     sizes = np.asarray(instability, dtype=float)
     total = np.zeros(sizes.shape[:-1])
     for triad in TRIADS:
         if on := [c for c in triad if unstable[c] > 0]:
-            total = total + alike_in(sizes[..., on], density)
+            total = total + triad_log_prior(sizes[..., on], density)
     return total if total.ndim else float(total)
 
 
-def alike_in(some: Array, density: Array = UNSTEADY) -> Array:
-    """How likely instabilities (..., n) of a triad are, ln, (...)."""
+def triad_log_prior(some: Array, density: Array = INSTABILITY_LOG_DENSITY) -> Array:
+    """Log prior of the instabilities (..., n) of the axes of one triad, (...)."""
     middle = some.sum(axis=-1) / some.shape[-1]
     apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
     likely = np.interp(middle, np.arange(len(density)), density)
@@ -88,9 +90,12 @@ def alike_in(some: Array, density: Array = UNSTEADY) -> Array:
     return out
 
 
-def told_of(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Array]:
-    """What (3) needs of groups alike in width, columns (..., k) of a set, of size v."""
-    wide, size = state.sizes[at], np.asarray(v)[..., None]
+def gain_terms(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Array]:
+    """Eigenvalues lambda and q^2 of (3) for groups in a set, (..., k) each.
+
+    `at` (..., k) are their indices in the state, `v` their sizes in it.
+    """
+    wide, size = state.prior_sigma[at], np.asarray(v)[..., None]
     cov = state.inverse[at[..., :, None], at[..., None, :]]
     part, axes = np.linalg.eigh(cov / wide[..., :, None] / wide[..., None, :])
     part = np.clip(part, LEAST, 1.0)
@@ -98,31 +103,33 @@ def told_of(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, Arra
     return (1 / part - 1) / size**2, (along / (part * size)) ** 2
 
 
-def likeliest(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
-    """The likeliest size of a group between those tried, and what ln v is uncertain by.
+def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
+    """Most probable size of a group, and standard uncertainty of its logarithm.
 
     The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
     """
-    strength, power = told_of(state, at, v)
+    strength, power = gain_terms(state, at, v)
     near = v * np.exp(np.linspace(-STEP, STEP, FINER))
-    before = np.interp(np.log(near), np.log(priors.SIZES), DENSITY)
-    best = float(near[np.argmax(gained(strength, power, near) + before)])
+    before = np.interp(np.log(near), np.log(priors.SIZES), LOG_DENSITY)
+    best = float(
+        near[np.argmax(gains_from_eigenvalues(strength, power, near) + before)]
+    )
     share = best**2 * strength / (1 + best**2 * strength)
     return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
 
 
-def likeliest_of_axis(
+def most_probable_axis_size(
     state: Eliminated, at: Index, v: float, triad: tuple[float, float]
 ) -> tuple[float, float]:
-    """The same of one axis of a group, whose size is v in a set.
+    """The same for one axis of a group, whose size is v in a set.
 
-    The axes are alike within `UNLIKE`; `triad` is what was found of all of them.
+    The axes are similar within `UNLIKE`; `triad` is the result for all of them.
     """
-    strength, power = told_of(state, at, v)
+    strength, power = gain_terms(state, at, v)
     middle, part = triad
     apart = np.linspace(-4.0, 4.0, FINER)
     near = middle * np.exp(priors.UNLIKE * apart)
-    top = int(np.argmax(gained(strength, power, near) - 0.5 * apart**2))
+    top = int(np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * apart**2))
     best = float(near[top])
     share = best**2 * strength / (1 + best**2 * strength)
     alike = priors.UNLIKE**-2
@@ -131,22 +138,22 @@ def likeliest_of_axis(
 
 
 ROUNDED = 1e-6
-"""Part of F that rounding makes, ln."""
+"""Rounding error of F, ln."""
 
 
 class Sizing:
-    """The sizes of one set.
+    """Finds the most probable sizes of one set.
 
     Parameters
     ----------
-    dictionary, gram : what the rows say
-    unstable : (7,) typical instability, 0 where there is none
+    dictionary, gram : columns, and their Gram matrix
+    typical_instability : (7,) typical instability, 0 where there is none
     members : of the set
     start : sizes to begin with
 
     Attributes
     ----------
-    every : (a,) columns of all groups, of the dictionary
+    columns : (a,) columns of all groups, of the dictionary
 
     """
 
@@ -159,24 +166,27 @@ class Sizing:
         start: Sizes | None,
     ) -> None:
         self.groups: list[Group] = [*dictionary.always, *(g for _, g in members)]
-        self.count, self.unstable = len(dictionary.always), unstable
+        self.count, self.typical_instability = len(dictionary.always), unstable
         begin = start or Sizes(
-            (EVEN,) * self.count, (EVEN,) * 7, (EVEN,) * len(members)
+            (UNIT_INDEX,) * self.count, (UNIT_INDEX,) * 7, (UNIT_INDEX,) * len(members)
         )
         self.sizes = [*begin.calibration, *begin.members]
         self.instability = list(begin.instability)
         none = np.empty(0, dtype=np.intp)
-        self.every = np.concatenate([none, *(g.columns for g in self.groups)])
+        self.columns = np.concatenate([none, *(g.columns for g in self.groups)])
         widths = np.cumsum([0, *(len(g.columns) for g in self.groups)]).tolist()
         self.places = [slice(a, b) for a, b in pairwise(widths)]
-        self.gram = gram.only(self.every)
+        self.gram = gram.select_columns(self.columns)
         self._states: dict[tuple[int, ...], Eliminated] = {}
         self._gained: dict[tuple[int, ...], Array] = {}
 
     def run(self) -> tuple[Sizes, float, Array]:
-        """Seek sizes until they stay: sizes, ln Z summed over them, all columns'."""
-        free = [i for i, g in enumerate(self.groups) if g.fixed is None]
-        channels = np.flatnonzero(self.unstable > 0).tolist()
+        """Iterate until no size changes.
+
+        Returns the sizes, ln Z summed over them, and the columns' standard deviations.
+        """
+        free = [i for i, g in enumerate(self.groups) if g.fixed_size is None]
+        channels = np.flatnonzero(self.typical_instability > 0).tolist()
         profiles: list[Array] = []
         for _ in range(ROUNDS):
             before = (*self.sizes, *self.instability)
@@ -187,8 +197,8 @@ class Sizing:
             if (*self.sizes, *self.instability) == before:
                 break
         score = self.eliminated().score
-        score += sum(DENSITY[self.sizes[i]] for i in free)
-        score += alike(self.instability, self.unstable)
+        score += sum(LOG_DENSITY[self.sizes[i]] for i in free)
+        score += instability_log_prior(self.instability, self.typical_instability)
         for profile in profiles:
             score += float(np.logaddexp.reduce(profile - profile.max()))
         k = self.count
@@ -198,39 +208,43 @@ class Sizing:
         return found, score, self._wide()
 
     def eliminated(self) -> Eliminated:
-        """The set at the sizes as they are."""
+        """The set eliminated at the current sizes; cached."""
         key = (*self.sizes, *self.instability)
         if key not in self._states:
-            tau = priors.SIZES[self.instability] * self.unstable
-            rows = self.gram.weighed(tau)
-            self._states[key] = Eliminated.of(rows, self.every, self._wide())
+            tau = priors.SIZES[self.instability] * self.typical_instability
+            rows = self.gram.with_instability(tau)
+            self._states[key] = Eliminated.of(rows, self.columns, self._wide())
         return self._states[key]
 
     def _wide(self) -> Array:
         parts = []
         for group, size in zip(self.groups, self.sizes, strict=True):
             free = float(priors.SIZES[size])
-            parts.append(group.sizes(free if group.fixed is None else group.fixed))
+            parts.append(
+                group.prior_sigma(
+                    free if group.fixed_size is None else group.fixed_size
+                )
+            )
         return np.concatenate([np.empty(0), *parts])
 
     def _groups(self, free: Sequence[int]) -> list[Array]:
-        """F over the sizes of each of some groups, and their sizes at the top.
+        """F over the sizes of each of some groups; each size is set to the maximum.
 
-        Each is sought beside the others as they are then; until one of them changes,
-        what is told of all at once holds.
+        Each is sought with the others at their current sizes. Gains calculated for all
+        groups at once are used until a size changes.
         """
         start, profiles = self.eliminated(), []
         gains = self._gains(start, free)
         for i in free:
             state = self.eliminated()
             gain = gains[i] if state is start else self._gains(state, [i])[i]
-            profile: Array = state.score + gain - gain[self.sizes[i]] + DENSITY
+            profile: Array = state.score + gain - gain[self.sizes[i]] + LOG_DENSITY
             self.sizes[i] = int(np.argmax(profile))
             profiles.append(profile)
         return profiles
 
     def _gains(self, state: Eliminated, some: Sequence[int]) -> dict[int, Array]:
-        """Gain over the sizes of each of some groups, those of one width at once."""
+        """Gain over the sizes of each of some groups, calculated by width."""
         by_width: dict[int, list[int]] = {}
         for i in some:
             place = self.places[i]
@@ -240,43 +254,53 @@ class Sizing:
             first = np.array([self.places[i].start for i in alike])
             at = first[:, None] + np.arange(width)
             v = priors.SIZES[[self.sizes[i] for i in alike]]
-            out.update(zip(alike, gained(*told_of(state, at, v)), strict=True))
+            out.update(
+                zip(
+                    alike,
+                    gains_from_eigenvalues(*gain_terms(state, at, v)),
+                    strict=True,
+                )
+            )
         return out
 
     def _triad(self, channels: Sequence[int]) -> list[Array]:
-        """F over the instabilities of each of some channels that are much alike.
+        """F over the instabilities of some channels of a triad; sets them.
 
-        They are set together: one by one none could leave the others behind. Where
-        several scatter what one of them could as well, as of a position of unknown
-        orientation, each alone would fall, and all together leave it unexplained:
-        then they are set one by one.
+        They are set together, since their prior keeps a single one near the others. If
+        this lowers F, they are set one by one: in positions of unknown orientation
+        several instabilities may explain the same scatter, so each alone could be
+        small, but not all of them.
         """
         before, state = list(self.instability), self.eliminated()
         profiles = self._together(channels)
         if self.instability == before or self._level() >= (
-            state.score + float(alike(before, self.unstable)) - ROUNDED
+            state.score
+            + float(instability_log_prior(before, self.typical_instability))
+            - ROUNDED
         ):
             return profiles
         self.instability = before
         return [self._one(c, channels) for c in channels]
 
     def _level(self) -> float:
-        """F at the sizes as they are, but for what is known of groups' sizes."""
-        return self.eliminated().score + float(alike(self.instability, self.unstable))
+        """F at the current sizes, without the priors of the groups' sizes."""
+        return self.eliminated().score + float(
+            instability_log_prior(self.instability, self.typical_instability)
+        )
 
     def _one(self, c: int, channels: Sequence[int]) -> Array:
-        """F over the instabilities of one channel, and its own at the top."""
+        """F over the instabilities of one channel; sets it to the maximum."""
         profile = self._beside(c, channels, self._channel(c))
         self.instability[c] = int(np.argmax(profile))
         return profile
 
     def _together(self, channels: Sequence[int]) -> list[Array]:
-        """F over the instabilities of each channel, all at the top of their sum."""
+        """F over the instabilities of each channel; sets all to the joint maximum."""
         alone = [self._channel(c) for c in channels]
-        index = np.arange(len(DENSITY))
+        index = np.arange(len(LOG_DENSITY))
         apart = np.subtract.outer(index, index) * STEP / priors.UNLIKE
         best = [gain - 0.5 * apart**2 for gain in alone]  # by middle, size
-        total = sum(b.max(axis=1) for b in best) + UNSTEADY
+        total = sum(b.max(axis=1) for b in best) + INSTABILITY_LOG_DENSITY
         middle = int(np.argmax(total))
         for c, one in zip(channels, best, strict=True):
             self.instability[c] = int(np.argmax(one[middle]))
@@ -286,28 +310,28 @@ class Sizing:
         ]
 
     def _beside(self, c: int, channels: Sequence[int], gain: Array) -> Array:
-        """F over the sizes of one channel, of its gain, but for a constant.
+        """F over the instabilities of channel c, except for a constant.
 
-        Some channels are alike, it among them; the others of them stay.
+        `gain` is its gain. The others among `channels`, which are similar, are fixed.
         """
         every = np.tile([float(self.instability[i]) for i in channels], (len(gain), 1))
         every[:, channels.index(c)] = np.arange(len(gain))
-        return gain + alike_in(every)
+        return gain + triad_log_prior(every)
 
     def _channel(self, c: int) -> Array:
-        """Gain over the instabilities of one channel, the others as they are."""
+        """Gain over the instabilities of one channel, the others fixed; cached."""
         key = (c, *self.sizes, *self.instability)
         if key not in self._gained:
             self._gained[key] = self._gained_by(c)
         return self._gained[key]
 
     def _gained_by(self, c: int) -> Array:
-        """The same, not known yet."""
-        inner, pull = self.eliminated().of_means(c, 1.0)
-        tau = float(priors.SIZES[self.instability[c]] * self.unstable[c])
+        """Calculate the gain over the instabilities of one channel."""
+        inner, pull = self.eliminated().schur_complement_of_means(c, 1.0)
+        tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
         told, axes = np.linalg.eigh(inner)
         told = np.clip(told, 0.0, (1 - LEAST) / tau**2)
         left = 1 - tau**2 * told
-        size = float(self.unstable[c])
+        size = float(self.typical_instability[c])
         power = (axes.T @ pull / left * size) ** 2
-        return gained(told / left * size**2, power)
+        return gains_from_eigenvalues(told / left * size**2, power)

@@ -15,50 +15,50 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import FEW
+from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.fitted import Fitted, whole
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.fitted import FittedSet, estimates_by_column
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 
 FOLDS = 12
-"""Parts left out at most, one position or several far apart in each."""
+"""Largest number of parts that are held out; each is one or several positions."""
 
 STRETCHES = 24
-"""Parts of each window where there are too few windows: as short as that, since what is
-random predicts for a short time only."""
+"""Number of parts of each window if there are too few windows. They are short, since
+random processes predict for a short time only."""
 
 IN_QUESTION, BEHIND = 6, 20.0
-"""Sets among which is chosen again, and how far they are behind the best at most, ln:
-further ones no position can bring back."""
+"""Largest number of sets that are compared again without a part, and their largest
+distance from the best, ln."""
 
 
 class HeldOut:
-    """The rows of a session without each of its parts.
+    """Predicts each part of a session from the others.
 
     Parameters
     ----------
     fitted : the best set
-    sets : of whose columns use is made
+    sets : sets whose columns are used
 
     """
 
-    def __init__(self, fitted: Fitted, sets: Sequence[Set]) -> None:
+    def __init__(self, fitted: FittedSet, sets: Sequence[Set]) -> None:
         self.fitted, self.dictionary = fitted, fitted.dictionary
         self.fold = folds(fitted.dictionary)
         columns = _columns(self.dictionary, sets) | (fitted.values != 0)
         self.columns = np.flatnonzero(columns)
-        self.linear = [_narrowed(part, columns) for part in fitted.linear]
+        self.linear = [_select_columns(part, columns) for part in fitted.linear]
         self._rest: dict[int, Search | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
-        """Residuals of rows predicted from the others, (n, 6); nan where none can be.
+        """Held-out residuals of all rows, (n, 6); nan where there is no prediction.
 
-        `sets` are those in question; of them one is chosen anew for every part.
+        For every part the best of `sets` is chosen again without it.
         """
         d, out = self.dictionary, np.full(self.fitted.rows.y.shape, np.nan)
         for i in np.unique(self.fold) if self.fold.max() else ():
@@ -66,21 +66,26 @@ class HeldOut:
                 continue
             left = self.fold == i
             chosen = max(
-                (search.evaluated(s.members, s.sizes) for s in sets),
+                (search.evaluate(s.members, s.sizes) for s in sets),
                 key=lambda s: s.score,
             )
-            step = self.fitted.values - whole(chosen.state, d) + _wander(chosen, d)
-            places = d.held[np.isin(d.held, d.x.position[left])]
-            if len(d.held) >= FEW:
+            step = (
+                self.fitted.values
+                - estimates_by_column(chosen.state, d)
+                + _random_estimate(chosen, d)
+            )
+            places = d.window_positions[np.isin(d.window_positions, d.x.position[left])]
+            if len(d.window_positions) >= MIN_WINDOWS:
                 step[d.rotations_of(places)] = 0.0
-            rows = [_rows(p, left[p.rows]) for p in self.linear]
+            rows = [_select_rows(p, left[p.rows]) for p in self.linear]
             _predict(out, rows, step, chosen, d)
         return out
 
     def density(self, one: Set) -> float:
-        """How likely a set has each part, given the others, ln; nan where none can be.
+        """Log probability density of each part given the others, summed over the parts.
 
-        With its sizes as the others show them, and but for a constant of the rows.
+        The sizes are estimated from the others. A constant of the rows is omitted; nan
+        where there is no prediction.
         """
         parts = list(self._parts(one))
         return (
@@ -88,7 +93,7 @@ class HeldOut:
         )
 
     def squares(self, one: Set) -> tuple[float, int]:
-        """Whitened squares of each part as the others predict it, and their number.
+        """Sum of the whitened squares of the parts' predictions, and number of rows.
 
         The prediction's own uncertainty is counted,
 
@@ -105,25 +110,32 @@ class HeldOut:
         return total, sum(len(part.white) for part in self.linear)
 
     def _parts(self, one: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
-        """A set in all rows and without each part, with its sizes as these show them.
+        """A set in all rows and without each part, at the sizes estimated without it.
 
-        Nothing where a part has no others.
+        Empty if a part cannot be predicted.
         """
         every = gram(self.linear, self.dictionary, self.fitted.values, (), self.columns)
         searches = [self._without(int(i)) for i in np.unique(self.fold)]
         if not self.fold.max() or None in searches:
             return
         for search in filter(None, searches):
-            found = search.evaluated(one.members, one.sizes)
-            tau = priors.SIZES[list(found.sizes.instability)] * search.unstable
+            found = search.evaluate(one.members, one.sizes)
+            tau = (
+                priors.SIZES[list(found.sizes.instability)] * search.typical_instability
+            )
             rest = found.state
-            yield Eliminated.of(every.weighed(tau), rest.columns, rest.sizes), rest
+            yield (
+                Eliminated.of(
+                    every.with_instability(tau), rest.columns, rest.prior_sigma
+                ),
+                rest,
+            )
 
     def _without(self, i: int) -> Search | None:
-        """What the rows say without a part; None where a channel has no others."""
+        """Search over the rows without a part; None if a channel has no others."""
         if i not in self._rest:
             left = self.fold == i
-            rest = [_rows(part, ~left[part.rows]) for part in self.linear]
+            rest = [_select_rows(part, ~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
             determined = all(len(part.white) for part in rest)
             rows = gram(rest, d, values, (), self.columns) if determined else None
@@ -131,30 +143,30 @@ class HeldOut:
         return self._rest[i]
 
 
-def held_out(fitted: Fitted, sets: Sequence[Set]) -> Array:
-    """Residuals of rows predicted from the others by sets in question, (n, 6)."""
+def held_out_residuals(fitted: FittedSet, sets: Sequence[Set]) -> Array:
+    """Held-out residuals of all rows, by the best of some sets, (n, 6)."""
     return HeldOut(fitted, sets).residual(sets)
 
 
-def in_question(best: Set, visited: Sequence[Set]) -> list[Set]:
-    """Sets that may turn out better without a part: those near, and the empty one."""
+def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
+    """Sets that may be the best without a part: those near the best, and the empty."""
     ranked = sorted(visited, key=lambda s: -s.score)
     near = [s for s in ranked if s.score > best.score - BEHIND]
     none = [s for s in ranked if not s.members]
     return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
 
 
-def turns_held_out(fitted: Fitted, turns: Sequence[TurnRows]) -> Array:
-    """Whitened residuals of turns, each predicted from windows and the other turns."""
+def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Array:
+    """Held-out residuals of turns, whitened: each predicted from windows and others."""
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
-    linear = [_narrowed(part, columns) for part in fitted.linear]
+    linear = [_select_columns(part, columns) for part in fitted.linear]
     for i in range(min(len(turns), FOLDS)):
         left = turns[i::FOLDS]
         kept = [t for t in turns if all(t is not one for one in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
-        chosen = Search(d, rows).evaluated(fitted.set.members, fitted.set.sizes)
-        out += [turn_residual(t, whole(chosen.state, d)) for t in left]
+        chosen = Search(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
+        out += [turn_residual(t, estimates_by_column(chosen.state, d)) for t in left]
     return np.concatenate(out) if out else np.zeros(0)
 
 
@@ -167,12 +179,12 @@ def turn_residual(turn: TurnRows, estimate: Array) -> Array:
 
 def folds(d: Dictionary) -> NDArray[np.intp]:
     """Number of the part that each row is left out in, (n,)."""
-    index = np.searchsorted(d.held, d.x.position)
-    if len(d.held) >= FEW:
+    index = np.searchsorted(d.window_positions, d.x.position)
+    if len(d.window_positions) >= MIN_WINDOWS:
         out: NDArray[np.intp] = (index % FOLDS).astype(np.intp)
         return out
     out = np.zeros(len(index), dtype=np.intp)
-    for p in d.held:
+    for p in d.window_positions:
         for i, part in enumerate(
             np.array_split(np.flatnonzero(d.x.position == p), STRETCHES)
         ):
@@ -194,25 +206,25 @@ def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     return out
 
 
-def _narrowed(part: Linear, columns: NDArray[np.bool_]) -> Linear:
+def _select_columns(part: LinearRows, columns: NDArray[np.bool_]) -> LinearRows:
     kept = columns[part.columns]
-    return Linear(
+    return LinearRows(
         part.channel, part.rows, part.window, part.weight,
         part.columns[kept], part.design[:, kept], part.white,
     )  # fmt: skip
 
 
-def _rows(part: Linear, kept: NDArray[np.bool_]) -> Linear:
-    return Linear(
+def _select_rows(part: LinearRows, kept: NDArray[np.bool_]) -> LinearRows:
+    return LinearRows(
         part.channel, part.rows[kept], part.window[kept], part.weight[kept],
         part.columns, part.design[kept], part.white[kept],
     )  # fmt: skip
 
 
 def _predict(
-    out: Array, left: Sequence[Linear], step: Array, chosen: Set, d: Dictionary
+    out: Array, left: Sequence[LinearRows], step: Array, chosen: Set, d: Dictionary
 ) -> None:
-    """Residuals of the rows left out, each position's own angles sought in it."""
+    """Residuals of held-out rows, with each position's own angles estimated in it."""
     white = {p.channel: p.white + p.design @ step[p.columns] for p in left}
     wide = _angle_variances(chosen, d)
     for j, at in _angles(left, d):
@@ -236,8 +248,8 @@ def _predict(
         out[part.rows, part.channel] = white[part.channel] / part.weight
 
 
-def _wander(chosen: Set, d: Dictionary) -> Array:
-    """What the instability within windows is estimated at: it predicts nothing."""
+def _random_estimate(chosen: Set, d: Dictionary) -> Array:
+    """Estimates of permanent random groups, by column; not used in predictions."""
     out, first = np.zeros(d.width), 0
     for group in d.always:
         some = slice(first, first := first + len(group.columns))
@@ -249,16 +261,16 @@ def _wander(chosen: Set, d: Dictionary) -> Array:
 def _angle_variances(chosen: Set, d: Dictionary) -> Array:
     """Prior variances of the angles of each position, rad^2, by column."""
     out = np.zeros(d.width)
-    np.add.at(out, chosen.state.columns, chosen.state.sizes**2)
-    out[d.rotations_of(d.held[d.free])] += 1.0
+    np.add.at(out, chosen.state.columns, chosen.state.prior_sigma**2)
+    out[d.rotations_of(d.window_positions[d.unoriented])] += 1.0
     only = np.zeros(d.width)
     only[d.rotations] = np.sqrt(out[d.rotations])
     return only
 
 
 def _angles(
-    left: Sequence[Linear], d: Dictionary
+    left: Sequence[LinearRows], d: Dictionary
 ) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Windows left out by their number, with the columns of their turns."""
+    """Numbers of the held-out windows, with the columns of their rotations."""
     for j in np.unique(np.concatenate([p.window for p in left])).tolist():
-        yield j, d.rotations_of(d.held[j])
+        yield j, d.rotations_of(d.window_positions[j])

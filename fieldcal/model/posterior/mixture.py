@@ -23,38 +23,43 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import Gram, gains
-from fieldcal.model.evidence.levels import Levels, levels
+from fieldcal.model.evidence.gram import Gram, evidence_gains
+from fieldcal.model.evidence.levels import InstabilityScan, scan_instabilities
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import DENSITY, TRIADS, Sizing, alike
+from fieldcal.model.evidence.sizing import (
+    LOG_DENSITY,
+    TRIADS,
+    Sizing,
+    instability_log_prior,
+)
 
 KEPT = 4.0
 """Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
 
-UNSTEADY = np.log(priors.loosely())
-"""How likely each size of instability is, ln: with whatever else scatters windows."""
+GIVEN_SET_LOG_DENSITY = np.log(priors.instability_density_of_given_set())
+"""Log prior of instabilities if no causes were searched: others may scatter windows."""
 
-DEVICES = np.log(priors.density(priors.STEEP))
-"""The same where everything else is a cause of its own."""
+DEVICE_LOG_DENSITY = np.log(priors.density(priors.STEEP))
+"""Log prior of instabilities if every other scatter has a cause of its own."""
 
 NONE: Index = np.empty((0, 1), dtype=np.intp)
-"""Columns of no window."""
+"""No columns."""
 
 SHOWS = 0.2
-"""Part of a mean's noise from which what windows wander by beside it can be seen."""
+"""Instability below which it is not distinguishable, in the noise of a mean."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """Instabilities of the channels, and perhaps a bad window.
+    """Hypothesis: instabilities of the channels, and possibly a bad window.
 
     Attributes
     ----------
     sizes : (7,) indices in `priors.SIZES`
     window : number of the bad window, -1 for none
-    size : index of how much it is off by
-    chance : before the rows are seen, ln
-    score : ln of evidence times chance
+    size : index of the size of its error
+    chance : log prior probability
+    score : ln of evidence times prior probability
 
     """
 
@@ -66,18 +71,18 @@ class Hypothesis:
 
 
 Hypotheses = tuple[Hypothesis, ...]
-"""One of each triad."""
+"""One hypothesis for each triad."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mixture:
-    """The answer.
+    """The estimate, averaged over hypotheses.
 
     Attributes
     ----------
     columns : (k,) of the dictionary
     mean, covariance : (k,), (k, k)
-    sizes : (k,) standard deviation of each before the rows are seen
+    prior_sigma : (k,) standard deviation of each before the rows are seen
     bad : (p,) probability that a window is bad
     scatter : (7,) rms of what each channel wanders from window to window
     score : ln of the evidence of the set
@@ -87,23 +92,23 @@ class Mixture:
     columns: Index
     mean: Array
     covariance: Array
-    sizes: Array
+    prior_sigma: Array
     bad: Array
     scatter: Array
     score: float
 
 
 class Mixing:
-    """Hypotheses about a set.
+    """Averages the estimate of a set over hypotheses.
 
     Parameters
     ----------
-    dictionary, gram : what the rows say about the set's own state
-    there : the set, its sizes at their likeliest
-    unstable : (7,) typical instability, 0 where there is none
-    given : whether nobody looked for causes: then windows may be bad, or scattered by
-        more than the device
-    doubt : whether a window may be bad; not to be asked again where none is
+    dictionary, gram : columns, and their Gram matrix about the set's own state
+    there : the set at its most probable sizes
+    typical_instability : (7,) typical instability, 0 where there is none
+    given : whether the set is given and not found by a search: then windows may be bad,
+        or be scattered by unknown causes
+    doubt : whether windows may be bad; False if an earlier run found none
 
     """
 
@@ -116,24 +121,33 @@ class Mixing:
         given: bool = True,
         doubt: bool = True,
     ) -> None:
-        self.dictionary, self.there, self.unstable = dictionary, there, unstable
-        self.density = UNSTEADY if given else DEVICES
+        self.dictionary, self.there, self.typical_instability = (
+            dictionary,
+            there,
+            unstable,
+        )
+        self.density = GIVEN_SET_LOG_DENSITY if given else DEVICE_LOG_DENSITY
         sizing = Sizing(dictionary, gram, unstable, there.members, there.sizes)
-        self.columns, self.wide = sizing.every, there.state.sizes
+        self.columns, self.wide = sizing.columns, there.state.prior_sigma
         self.doubted = self._doubted() if given and doubt else []
         more = [at for _, at in self.doubted]
-        self.gram = gram.only(np.concatenate([self.columns, *more]))
-        self.bad = np.zeros(len(dictionary.held))
+        self.gram = gram.select_columns(np.concatenate([self.columns, *more]))
+        self.bad = np.zeros(len(dictionary.window_positions))
 
     def run(self) -> Mixture:
-        """Mix."""
+        """Average over all hypotheses that count."""
         lists = [self._of_triad(triad) for triad in TRIADS]
         best = sum(max(h.score for h in some) for some in lists)
         near = [parts for parts in product(*lists)
                 if sum(h.score for h in parts) > best - KEPT]  # fmt: skip
-        tau = priors.SIZES[[self._sizes_of(parts) for parts in near]] * self.unstable
+        tau = (
+            priors.SIZES[[self._sizes_of(parts) for parts in near]]
+            * self.typical_instability
+        )
         score, means, covariances = self._exactly(near, tau)
-        score += alike(self.there.sizes.instability, self.unstable, self.density)
+        score += instability_log_prior(
+            self.there.sizes.instability, self.typical_instability, self.density
+        )
         total = float(np.logaddexp.reduce(score))
         weight = np.exp(score - total)
         mean: Array = weight @ means
@@ -148,29 +162,29 @@ class Mixing:
         """Windows that may be bad by the accelerometers, with their columns."""
         d = self.dictionary
         seen = [c for c in d.observed if c < 3]
-        held = len(d.held)
+        held = len(d.window_positions)
         if held <= 2 or not seen:
             return []
         every = np.array(seen) * held + d.windows
         return [(i, (every + i).astype(np.intp)) for i in range(held)]
 
     def _of_triad(self, triad: Sequence[int]) -> list[Hypothesis]:
-        """Hypotheses about one triad, as likely as counts, the others as they are."""
+        """Hypotheses about one triad that count, the other triads fixed."""
         mode = self.there.sizes.instability
         first = Hypothesis(mode, -1, 0, 0.0, 0.0)
-        if not self.unstable[list(triad)].any():
+        if not self.typical_instability[list(triad)].any():
             return [first]
         sizes, known = self._shifted(triad)
         doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
-        taus = priors.SIZES[np.array(sizes)] * self.unstable
-        there = levels(self.gram, self.columns, self.wide, taus, doubted)
+        taus = priors.SIZES[np.array(sizes)] * self.typical_instability
+        there = scan_instabilities(self.gram, self.columns, self.wide, taus, doubted)
         alone = there.score + known
         found = [
             Hypothesis(s, -1, 0, k, v)
             for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
         ]
         if len(doubted):
-            chance = known[:, None] + float(np.log(priors.BAD)) + DENSITY  # (n, v)
+            chance = known[:, None] + float(np.log(priors.BAD)) + LOG_DENSITY  # (n, v)
             every = self._with_bad(there) + there.score[:, None, None] + chance[:, None]
             each = np.logaddexp.reduce(every, axis=(0, 2))
             self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
@@ -182,10 +196,10 @@ class Mixing:
         return [h for h in found if h.score > best - KEPT]
 
     def _shifted(self, triad: Sequence[int]) -> tuple[list[tuple[int, ...]], Array]:
-        """Instabilities of a triad that are larger or smaller together.
+        """Instabilities of a triad, all scaled together, with their log priors.
 
-        Those too small to show are one, the smallest that could; the chance of
-        each, ln, is that beside the likeliest.
+        Log priors are relative to the most probable instability. Those too small to be
+        distinguished are combined into one.
         """
         mode = self.there.sizes.instability
         middle = round(float(np.mean([mode[c] for c in triad])))
@@ -195,29 +209,31 @@ class Mixing:
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
-        chance: Array = alike(np.array(moved), self.unstable, self.density)
-        chance -= alike(mode, self.unstable, self.density)
+        chance: Array = instability_log_prior(
+            np.array(moved), self.typical_instability, self.density
+        )
+        chance -= instability_log_prior(mode, self.typical_instability, self.density)
         first = max(0, self._showing(triad) - 1)
         chance[first] = np.logaddexp.reduce(chance[: first + 1])
         return moved[first:], chance[first:]
 
     def _showing(self, triad: Sequence[int]) -> int:
-        """The smallest of `SIZES` at which what a triad wanders by can be seen."""
+        """Index of the smallest of `SIZES` at which a triad's instability shows."""
         seen = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
         noise = 1 / np.sqrt(self.gram.info[seen].max(initial=1e-300))
-        typical = float(self.unstable[list(triad)].max())
+        typical = float(self.typical_instability[list(triad)].max())
         return int(np.searchsorted(priors.SIZES * typical, SHOWS * noise))
 
     def _bad_columns(self) -> Index:
         """Columns of the windows that may be bad, (w, k)."""
         return np.array([at for _, at in self.doubted])
 
-    def _with_bad(self, there: Levels) -> Array:
-        """Gains of each window bad, by instability, window and size, (n, w, v)."""
+    def _with_bad(self, there: InstabilityScan) -> Array:
+        """Gains if a window is bad, by instability, window and size, (n, w, v)."""
         typical = self._typical(self.doubted[0][1])
         inner = there.inner * typical * typical[:, None]
         own = (there.alone * typical**2).max(axis=-1)
-        return gains(inner, there.pull * typical, own)
+        return evidence_gains(inner, there.pull * typical, own)
 
     def _sizes_of(self, parts: Hypotheses) -> list[int]:
         """Instabilities of hypotheses of each triad together, (7,)."""
@@ -230,7 +246,7 @@ class Mixing:
     def _exactly(
         self, near: Sequence[Hypotheses], tau: Array
     ) -> tuple[Array, Array, Array]:
-        """Scores (h,), means (h, k) and covariances (h, k, k) of hypotheses together.
+        """Scores (h,), means (h, k), covariances (h, k, k) of combined hypotheses.
 
         `near` are those of each triad, `tau` (h, 7) their instabilities.
         """
@@ -246,7 +262,7 @@ class Mixing:
                 off = priors.SIZES[[near[h][0].size for h in some.tolist()]]
                 columns = np.append(columns, at)
                 wide = np.hstack([wide, np.outer(off, self._typical(at))])
-            there = levels(self.gram, columns, wide, tau[some], NONE)
+            there = scan_instabilities(self.gram, columns, wide, tau[some], NONE)
             score[some] += there.score
             means, covariances = there.posterior()
             mean[some], covariance[some] = means[:, :k], covariances[:, :k, :k]

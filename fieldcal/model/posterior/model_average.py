@@ -28,12 +28,12 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import Eliminated, inverse_of, root_of
+from fieldcal.model.evidence.gram import Eliminated, cholesky_root, triangular_inverse
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.reported import average_over_sizes
 
 Places = Callable[[Set], Sequence[Index]]
 """Indices of some quantities in the state of a set. A quantity with several indices is
@@ -50,8 +50,8 @@ class ModelAverage:
     Parameters
     ----------
     posterior : sets and their probabilities
-    best : sets that the best of them stands for, each as likely as the others, as
-        numbers are taken from them
+    best : sets that replace the best one, with equal weights: its estimate averaged
+        over sizes, and at other time constants
 
     """
 
@@ -61,8 +61,8 @@ class ModelAverage:
 
     @cached_property
     def sets(self) -> list[tuple[Set, float]]:
-        """Sets that count, as numbers are taken from them, and their weights."""
-        every, out = self.posterior.at_points, list[tuple[Set, float]]()
+        """Sets with enough weight, averaged over sizes, and their weights."""
+        every, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
         least = np.exp(-KEPT) * max(w for _, w in every)
         for one, weight in every:
             if weight > least:
@@ -74,17 +74,18 @@ class ModelAverage:
         """The set with its estimate averaged over sizes; several for the best set."""
         if one is self.posterior.best:
             return self.best
-        return [reported(self.posterior.search, one)]
+        return [average_over_sizes(self.posterior.search, one)]
 
-    def of_member(self, member: Member) -> tuple[Array, Array]:
-        """Mean (k,) and covariance (k, k) of a member's parameters, if it is there.
+    def average_of_member(self, member: Member) -> tuple[Array, Array]:
+        """Mean (k,) and covariance (k, k) of a member's parameters, if it is present.
 
-        Where nobody knows the orientations, all axes may be turned, which makes k31 of
-        k13: a set that has other parameters has the same device in other axes.
+        If orientations are not known, the device may be described in rotated axes,
+        which makes k31 of k13: sets with other parameters of the cause are then
+        omitted.
         """
         cause, group = member
         there = [(s, w) for s, w in self.sets if cause.key in s.keys]
-        if self.posterior.search.dictionary.free.any():
+        if self.posterior.search.dictionary.unoriented.any():
             mine = set(group.params)
             there = [
                 (s, w) for s, w in there if set(_group_in(s, member).params) <= mine
@@ -98,17 +99,17 @@ class ModelAverage:
             wanted = [at.get(p, -1) for p in group.params or group.columns]
             return [np.flatnonzero(one.state.columns == c)[-1:] for c in wanted]
 
-        return averaged(there, places, self._estimate)
+        return average_over_sets(there, places, self._estimate)
 
-    def of_columns(self, columns: Index) -> tuple[Array, Array]:
+    def average_of_columns(self, columns: Index) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of columns."""
-        return averaged(self.sets, _places_of(columns), self._estimate)
+        return average_over_sets(self.sets, _places_of(columns), self._estimate)
 
     def _estimate(self, one: Set) -> Estimate:
-        """Of a set, with what it leaves out."""
+        """Estimate of a set, with the uncertainty of `unfitted` effects; cached."""
         if one not in self._known:
             left = self.posterior.search.dictionary.unfitted
-            self._known[one] = estimate_of(one, left)
+            self._known[one] = set_estimate(one, left)
         return self._known[one]
 
 
@@ -118,26 +119,28 @@ def _group_in(one: Set, member: Member) -> Group:
     return own
 
 
-def of_columns(
+def average_of_columns(
     sets: Sequence[tuple[Set, float]], columns: Index, unfitted: Sequence[Group] = ()
 ) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of columns over weighed sets."""
-    return averaged(sets, _places_of(columns), partial(estimate_of, unfitted=unfitted))
+    """Mean (k,) and covariance (k, k) of columns over weighted sets."""
+    return average_over_sets(
+        sets, _places_of(columns), partial(set_estimate, unfitted=unfitted)
+    )
 
 
 def _places_of(columns: Index) -> Places:
-    """Of columns of the dictionary."""
+    """Places of columns of the dictionary."""
     return lambda one: [np.flatnonzero(one.state.columns == c) for c in columns]
 
 
-def averaged(
+def average_over_sets(
     sets: Sequence[tuple[Set, float]],
     places: Places,
     estimate: Callable[[Set], Estimate] | None = None,
 ) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of quantities over weighed sets, (1).
+    """Mean (k,) and covariance (k, k) of quantities over weighted sets, (1).
 
-    `estimate` of each set, that of its state if not given.
+    `estimate` gives the estimate of each set; that of its state if None.
     """
     means, covs = [], []
     for one, _ in sets:
@@ -145,7 +148,7 @@ def averaged(
         pick = np.zeros((len(at), len(one.state.columns)))
         for row, some in zip(pick, at, strict=True):
             row[some] = 1.0
-        mean, root = (estimate or estimate_of)(one)
+        mean, root = (estimate or set_estimate)(one)
         picked = pick @ root
         means.append(pick @ mean)
         covs.append(picked @ picked.T)
@@ -156,17 +159,17 @@ def averaged(
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
-def with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
-    """A set's columns with those of further groups that it leaves out."""
+def eliminate_with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
+    """Eliminate a set's columns and those groups of `more` that it lacks."""
     names, told = {cause.name for cause, _ in one.members}, one.state
     left = [group for group in more if group.part not in names]
     columns = np.concatenate([told.columns, *(group.columns for group in left)])
-    sizes = np.concatenate([told.sizes, *(group.typical for group in left)])
+    sizes = np.concatenate([told.prior_sigma, *(group.typical for group in left)])
     return Eliminated.of(told.rows, columns, sizes)
 
 
-def estimate_of(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
-    """What a set says of its columns, with those of `unfitted` that it leaves out."""
+def set_estimate(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
+    """Estimate of a set's columns, with the groups of `unfitted` eliminated, (2)."""
     names = {cause.name for cause, _ in one.members}
     left = [group for group in unfitted if group.part not in names]
     told = one.state
@@ -174,10 +177,10 @@ def estimate_of(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
         return told.estimate, told.half.T
     columns = np.concatenate([group.columns for group in left])
     typical = np.concatenate([group.typical for group in left])
-    state = Eliminated.of(told.rows, told.columns, told.sizes)
-    inner, pull = state.rest(columns, typical)
+    state = Eliminated.of(told.rows, told.columns, told.prior_sigma)
+    inner, pull = state.schur_complement(columns, typical)
     inner.flat[:: len(columns) + 1] += 1.0
-    half = inverse_of(root_of(inner))
+    half = triangular_inverse(cholesky_root(inner))
     shared = state.rows.matrix(state.columns, columns) * typical
     moved = state.inverse @ shared @ half.T
     return told.estimate - moved @ (half @ pull), np.hstack([told.half.T, moved])  # (2)

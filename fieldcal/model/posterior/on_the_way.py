@@ -1,4 +1,4 @@
-"""What the accelerometers on the way say of some columns, all others eliminated.
+"""Information of the accelerometers during turns on some columns, others eliminated.
 
 Rows z = A u + B e + n are whitened; u are the columns wanted, e the others, of standard
 deviations S. With P = A^T A - A^T B (S^-2 + B^T B)^-1 B^T A, and b likewise of z, what
@@ -24,25 +24,25 @@ LEAST = 1e-6
 """Part of the largest eigenvalue of P below which rounding made one."""
 
 
-def remaining(
+def way_information(
     found: Set, turned: Sequence[TurnRows], wanted: Index
 ) -> tuple[Array, Array]:
     """Rows (1) of some columns.
 
     Parameters
     ----------
-    found : the set that says which columns there are, and of what sizes
-    turned : rows of the turns, (r,) on the way of all of them
+    found : set with the columns and their sizes
+    turned : rows of the turns
     wanted : (k,) columns
 
     Returns
     -------
-    (m, k) design and (m,) values, m <= k: none where the way says nothing
+    (m, k) design and (m,) values, m <= k: none if the turns have no information
 
     """
     columns, first = np.unique(found.state.columns, return_index=True)
-    sizes = found.state.sizes[first]
-    parts = [_placed(t, columns) for t in turned]
+    sizes = found.state.prior_sigma[first]
+    parts = [_way_design(t, columns) for t in turned]
     design = np.vstack([np.zeros((0, len(columns))), *parts])
     white = np.concatenate([np.zeros(0), *(t.way for t in turned)])
     ours = np.isin(columns, wanted)
@@ -62,7 +62,7 @@ def remaining(
     return out, off / wide
 
 
-def _placed(turn: TurnRows, columns: Index) -> Array:
+def _way_design(turn: TurnRows, columns: Index) -> Array:
     """Design of the way of a turn by all columns of a set, (r, all)."""
     out = np.zeros((len(turn.way), len(columns)))
     there = np.isin(turn.columns, columns)

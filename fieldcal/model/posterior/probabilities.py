@@ -1,4 +1,4 @@
-"""Probabilities: of each cause, of what may stand in its place, of a verdict.
+"""Probabilities of causes, and their aliases.
 
 The sets that were visited are weighted by evidence times chance. Another cause is an
 alias of one that was found when the best set with it instead has an evidence that is
@@ -22,19 +22,19 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT
 from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.selection import OTHERWISE, Search
+from fieldcal.model.search.selection import ALTERNATIVE_MARGIN, Search
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
-    """A cause of the best set.
+class ProbableCause:
+    """A cause of the best set that is likelier present than not.
 
     Attributes
     ----------
     name : of the effect or the unknown function
     members : of the best set with that name
-    probability : that it, or an alias of it, is there
-    aliases : names of what may stand in its place, the likeliest first
+    probability : that it, or an alias of it, is present
+    aliases : names of its aliases, the likeliest first
 
     """
 
@@ -45,23 +45,23 @@ class Standing:
 
     @property
     def triads(self) -> frozenset[str]:
-        """Those that it is on."""
+        """Triads that it acts on."""
         return frozenset[str]().union(*(triads_of(c.part) for c, _ in self.members))
 
     @property
     def kind(self) -> str:
-        """Of the cause."""
+        """Kind of the cause."""
         return self.members[0][0].kind
 
 
 class Posterior:
-    """What a search says of causes.
+    """Probabilities of causes, from the sets that a search visited.
 
     Parameters
     ----------
     search : with the sets that it visited
-    best : of them
-    refined : a set with the time constants of what others have not where they fit best
+    best : the best of them
+    refined : returns a set with refined time constants
 
     """
 
@@ -71,106 +71,115 @@ class Posterior:
         self.search, self.best, self._refined = search, best, refined
         self._nearer: list[tuple[Set, Set]] = []
         every = dict.fromkeys(c.name for c, _ in best.members)
-        instead = {name: self._instead(name) for name in every}
-        self.instead = {name: instead[name] for name in self.names(best)}
+        instead = {name: self._alternatives_to(name) for name in every}
+        self.alternatives = {name: instead[name] for name in self.cause_names(best)}
         for one in list(search.visited.values()) if best.members else ():
             if one.score > best.score - KEPT:
-                search.vary(one, best.score)
-        self._one_more()
+                search.visit_variations(one, best.score)
+        self._visit_likely_additions()
 
-    def _one_more(self) -> None:
-        """Visit the best set with each cause more that comes near.
+    def _visit_likely_additions(self) -> None:
+        """Visit the best set with each further cause that is likely enough.
 
-        A cause that is a little less likely there than not is not excluded: a drift
-        that nobody would name makes what a device starts with less certain. What no
-        row tells from the calibration is left to what is stated.
+        A cause that is a little less likely present than absent still widens the
+        uncertainty of the calibration. Causes that the rows do not distinguish from the
+        calibration are not visited.
         """
-        shown = self.search.shown_by(self.best)
+        shown = self.search.shown_beside(self.best)
         for offer in self.search.offers(self.best):
-            near = offer.score > self.best.score - OTHERWISE
+            near = offer.score > self.best.score - ALTERNATIVE_MARGIN
             if near and shown(offer.member[1]):
-                self.search.taken(self.best, offer)
+                self.search.accept(self.best, offer)
 
     @staticmethod
-    def names(some: Set) -> tuple[str, ...]:
-        """Names of the causes of a set that are told, each once."""
-        return tuple(dict.fromkeys(c.name for c, _ in some.members if c.told))
+    def cause_names(some: Set) -> tuple[str, ...]:
+        """Names of the reportable causes of a set, each once."""
+        return tuple(dict.fromkeys(c.name for c, _ in some.members if c.reportable))
 
     def without(self, name: str) -> Set:
         """The best set without a cause, on both triads."""
         kept = tuple(m for m in self.best.members if m[0].name != name)
-        return self.search.evaluated(kept, self.search.sizes_of(self.best, kept))
+        return self.search.evaluate(kept, self.search.sizes_of(self.best, kept))
 
-    def _instead(self, name: str) -> dict[str, Set]:
-        """Sets with other causes in the place of one, by their names."""
+    def _alternatives_to(self, name: str) -> dict[str, Set]:
+        """Sets with another cause instead of one, by the name of the other."""
         less, found = self.without(name), dict[str, Set]()
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
         offers = self.search.offers(less, self.best.sizes)
-        # what is predicted beside what is left is less than the whole: alike for all
+        # predictions are compared with that of the cause itself, not with a fit
         itself = [o for o in offers if o.member[0].name == name]
-        predicted = max((self._bare(less, o) for o in itself), default=own)
+        predicted = max(
+            (self._predicted_evidence(less, o) for o in itself), default=own
+        )
         likely = max((o.score for o in itself), default=np.inf)
         for offer in offers:
             cause = offer.member[0]
-            behind = predicted - self._bare(less, offer)
-            # by its evidence it is an alias, by its chance as well it counts
-            if cause.name == name or min(behind, likely - offer.score) > OTHERWISE:
+            behind = predicted - self._predicted_evidence(less, offer)
+            # kept if near by evidence alone (an alias), or with its prior (it counts)
+            if (
+                cause.name == name
+                or min(behind, likely - offer.score) > ALTERNATIVE_MARGIN
+            ):
                 continue
-            if (near := near + 1) > LOOKED_AT:
+            if (near := near + 1) > MAX_ALTERNATIVES:
                 break
-            there = self._whole(less, offer, parts, offers)
-            if not cause.told:  # it counts, and is no name for anything
+            there = self._with_both_triads(less, offer, parts, offers)
+            if not cause.reportable:  # its set counts, but noise is no alias
                 continue
-            if self._at_best(there, own) > own - thresholds.SAME:
+            if self._refined_evidence(there, own) > own - thresholds.SAME:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
 
-    def _at_best(self, there: Set, own: float) -> float:
-        """Evidence of a set, between the points of its grids if on them it is no alias.
+    def _refined_evidence(self, there: Set, own: float) -> float:
+        """Evidence of a set; with refined time constants if it is no alias without.
 
-        What was found has been refined: beside it a grid is too coarse.
+        The best set is refined, so a set on the grid would be at a disadvantage.
         """
         at_points = self.evidence(there)
         if self._refined is None or at_points > own - thresholds.SAME:
             return at_points
-        if not any(_fades(m[1]) for m in there.members if m not in self.best.members):
+        if not any(
+            _has_time_constant(m[1])
+            for m in there.members
+            if m not in self.best.members
+        ):
             return at_points
         nearer = self._refined(there)
         self._nearer.append((there, nearer))
         return max(at_points, self.evidence(nearer))
 
-    def _bare(self, less: Set, offer: Offer) -> float:
-        """Foretold evidence of a set with an offer, without the chances, ln."""
-        return offer.score - self.search.chance([*less.members, offer.member])
+    def _predicted_evidence(self, less: Set, offer: Offer) -> float:
+        """Predicted log evidence of a set with an offer, without priors."""
+        return offer.score - self.search.log_chance([*less.members, offer.member])
 
-    def _whole(
+    def _with_both_triads(
         self, less: Set, offer: Offer, parts: set[str], offers: Sequence[Offer]
     ) -> Set:
-        """A set with an offer, with its other triad where that is better."""
+        """A set with an offer, also on the other triad if that is better."""
         cause = offer.member[0]
-        there = self.search.taken(less, offer)
+        there = self.search.accept(less, offer)
         for other in offers:
             its = other.member[0]
             if its.name == cause.name and its.part != cause.part and its.part in parts:
-                both = self.search.taken(less, offer, other)
+                both = self.search.accept(less, offer, other)
                 there = max([there, both], key=lambda s: s.score)
         return there
 
     def evidence(self, there: Set) -> float:
-        """Of a set, ln, without the chances of its causes; variants count alike."""
+        """Log evidence of a set without the priors of its causes."""
         counts = sum(np.log(len(c.variants)) for c, _ in there.members)
-        return there.score - self.search.chance(there.members) - float(counts)
+        return there.score - self.search.log_chance(there.members) - float(counts)
 
     def _kind(self, name: str) -> str:
-        """Of a cause by its name."""
+        """Kind of a cause, by its name."""
         causes = self.search.dictionary.causes
         return next(c.kind for c in causes if c.name == name)
 
     @cached_property
     def weights(self) -> list[tuple[Set, float]]:
-        """Sets visited, with their probabilities."""
+        """Visited sets with their probabilities."""
         sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
         score: Array = np.array([s.score for s in sets])
         share = np.exp(score - score.max())
@@ -178,8 +187,11 @@ class Posterior:
         return list(zip(sets, share.tolist(), strict=True))
 
     @cached_property
-    def at_points(self) -> list[tuple[Set, float]]:
-        """The same at the points of the grids, whose columns the dictionary has."""
+    def weights_on_grid(self) -> list[tuple[Set, float]]:
+        """The same, with weights of refined sets added to those on the grid.
+
+        Columns of refined sets are not in the dictionary.
+        """
         kept = len(self.search.visited)
         out = dict(self.weights[:kept])
         for (there, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
@@ -187,23 +199,20 @@ class Posterior:
         return list(out.items())
 
     @property
-    def nothing(self) -> float:
-        """Probability that there is nothing but noise."""
-        return _total(w for s, w in self.weights if not self.names(s))
+    def probability_of_noise_alone(self) -> float:
+        """Probability that no cause but noise is present."""
+        return _sum_of_shares(w for s, w in self.weights if not self.cause_names(s))
 
-    def suspects(self) -> list[tuple[str, float]]:
+    def ranked_causes(self) -> list[tuple[str, float]]:
         """Every cause with its probability, the likeliest first."""
-        causes = dict.fromkeys(n for s, _ in self.weights for n in self.names(s))
+        causes = dict.fromkeys(n for s, _ in self.weights for n in self.cause_names(s))
         each = [(name, self.probability([name])) for name in causes]
         return sorted(each, key=lambda one: -one[1])
 
     def probability(self, names: Iterable[str], triads: frozenset[str] = BOTH) -> float:
-        """That one of some causes is there, on one of some triads.
-
-        What stands on the gyroscopes does not stand for what is on accelerometers.
-        """
+        """Probability that one of some causes is present on one of some triads."""
         wanted = set(names)
-        return _total(
+        return _sum_of_shares(
             w
             for s, w in self.weights
             if any(
@@ -211,32 +220,32 @@ class Posterior:
             )
         )
 
-    def standing(self) -> list[Standing]:
-        """Causes of the best set, as far as they are likelier there than not."""
+    def probable_causes(self) -> list[ProbableCause]:
+        """Causes of the best set that are likelier present than absent."""
         out = []
-        for name in self.names(self.best):
-            others = sorted(self.instead[name].items(), key=lambda i: -i[1].score)
+        for name in self.cause_names(self.best):
+            others = sorted(self.alternatives[name].items(), key=lambda i: -i[1].score)
             names = [n for n, _ in others]
             strange = self._kind(name) == "unknown"
             alike = [n for n in names if not strange or self._kind(n) == "unknown"]
             members = tuple(m for m in self.best.members if m[0].name == name)
-            one = Standing(name, members, np.nan, tuple(names))
+            one = ProbableCause(name, members, np.nan, tuple(names))
             probability = self.probability([name, *alike], one.triads)
             if probability >= thresholds.NAMED:
                 out.append(replace(one, probability=probability))
         return out
 
 
-def _total(shares: Iterable[float]) -> float:
-    """Sum of some shares, rounded to no more than all."""
+def _sum_of_shares(shares: Iterable[float]) -> float:
+    """Sum of probabilities, at most 1."""
     return min(fsum(shares), 1.0)
 
 
-def _fades(group: Group) -> bool:
+def _has_time_constant(group: Group) -> bool:
     """Whether a group has a time constant."""
     shapes = group.effect.shapes if group.effect else ()
     return any(s.kind in ("session", "turn", "joint") for s in shapes)
 
 
-LOOKED_AT = 8
-"""Causes that are tried in the place of one: further ones are worse."""
+MAX_ALTERNATIVES = 8
+"""Largest number of causes that are tried instead of one; further ones are worse."""

@@ -15,37 +15,37 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.reported import reported
-from fieldcal.model.search.inference import Inferred
+from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.search.inference import InferenceResult
 
 MOST = 1.0
 """Largest sigma of the logarithm of a time constant that is used."""
 
 
-def elsewhere(found: Inferred) -> list[Set]:
+def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
     """The best set at the 2 n other values of its time constants, (1).
 
     Empty if it has no time constant, or none with a known sigma.
     """
     some = [
-        (i, name, min(group.unsure / value, MOST))
+        (i, name, min(group.shape_sigma / value, MOST))
         for i, (_, group) in enumerate(found.best.members)
         for name, value in group.shape.items()
-        if np.isfinite(group.unsure)
+        if np.isfinite(group.shape_sigma)
     ]
     if not some:
         return []
     moved = []
-    inference = found.inference.copied(found)
+    inference = found.inference.independent_copy(found)
     for i, name, sigma in some:
         cause, group = found.best.members[i]
         steps = np.sqrt(len(some)) * sigma * np.array([-1.0, 1.0])
         values = group.shape[name] * np.exp(steps)  # (1)
-        cause, groups = inference.near(cause, group, values.tolist())
+        cause, groups = inference.variants_near(cause, group, values.tolist())
         for one in groups:
             members = list(found.best.members)
             members[i] = (cause, one)
             moved.append(tuple(members))
     search = inference.search_among(found.state, found.values, moved)
     sizes = found.best.sizes
-    return [reported(search, search.evaluated(one, sizes)) for one in moved]
+    return [average_over_sizes(search, search.evaluate(one, sizes)) for one in moved]

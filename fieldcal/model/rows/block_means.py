@@ -1,4 +1,4 @@
-"""Means of samples between bounds, whatever of them may not be used."""
+"""Means of samples between bounds, without unusable ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where samples are cut: bounds of each position's window, and of the blocks in it.
+"""Bounds of each position's window, and of the blocks in it, in samples.
 
 Blocks are a second long, and longer ones later in the window when there are many
 seconds: what happens after a turn happens at the start.
@@ -23,7 +23,7 @@ FEWEST, MOST = 8, 120
 FIRST_S = 1.0
 
 
-def spans(block: Block, about: Description) -> NDArray[np.intp]:
+def window_bounds(block: Block, about: Description) -> NDArray[np.intp]:
     """First and one past the last sample of each position's window, (p, 2).
 
     A session without positions is one window, the whole of it. A position without a
@@ -35,10 +35,10 @@ def spans(block: Block, about: Description) -> NDArray[np.intp]:
     return np.searchsorted(block.t, np.array(ends)).astype(np.intp)
 
 
-def edges(start: float, end: float, windows: int) -> Array:
+def block_edges(start: float, end: float, windows: int) -> Array:
     """Edges of the blocks of a window, s: a second each, later ones longer if need be.
 
-    >>> edges(0.0, 5.0, 9).tolist()
+    >>> block_edges(0.0, 5.0, 9).tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     """
     length = end - start
@@ -71,14 +71,14 @@ def block_bounds(
     span : first and one past the last sample of the window
     rate : samples a second
     windows : how many there are
-    without : what is no part of windows, s: a block ends before it, another follows it
+    without : spans excluded from windows, s: a block ends before, the next begins after
 
     """
     first, last = span
     start, end = float(t[first]), float(t[last - 1]) + 0.5 / rate
     gaps = np.array([gap for gap in without if start < gap[0] and gap[1] < end])
     gaps = gaps.reshape(-1, 2)
-    grid = np.union1d(edges(start, end, windows), gaps)
+    grid = np.union1d(block_edges(start, end, windows), gaps)
     at = first + np.searchsorted(t[first:last], grid)
     keep = np.diff(at) > 0
     for a, b in gaps:

@@ -50,7 +50,7 @@ class ForceTurn(NamedTuple):
     noise: float
 
 
-def turning(acc: Array, length: float) -> ForceTurn:
+def force_turn_rate(acc: Array, length: float) -> ForceTurn:
     """How the force turns in a window.
 
     Parameters
@@ -76,8 +76,8 @@ def turning(acc: Array, length: float) -> ForceTurn:
     )
 
 
-def drift(windows: list[ForceTurn], trembles: Array) -> float:
-    """Tell k of (1), TREMBLES at least, from some windows, (2).
+def drift_factor(windows: list[ForceTurn], trembles: Array) -> float:
+    """Factor k of (1), at least TREMBLES, estimated from some windows by (2).
 
     Parameters
     ----------

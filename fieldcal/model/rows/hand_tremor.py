@@ -42,11 +42,11 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import spans
-from fieldcal.model.rows.hand_drift import TREMBLES, drift, turning
+from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.hand_drift import TREMBLES, drift_factor, force_turn_rate
 from fieldcal.model.rows.means import median_sigma
-from fieldcal.model.rows.noise import grain_of
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce
+from fieldcal.model.rows.noise import rounding_noise
+from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
 WANDERS = 6.0
@@ -70,38 +70,43 @@ STILL = 3.0
 recordings 2 at most on a table, 4 to 60 in a hand."""
 
 
-def rows_of(source: RowSource) -> Rows:
+def rows_of_recording(source: RowSource) -> Rows:
     """Rows of a recording, one for each window in which the device is held by hand."""
-    rows = reduce(source)
+    rows = reduce_to_rows(source)
     held = np.unique(rows.x.position)
-    bound = spans(source.block, source.about)[held]
+    bound = window_bounds(source.block, source.about)[held]
     block = masked(source.block, source.usable)
     six = block.six
     pieces = [six[a:b] for a, b in bound]
-    angle, noise = wander(rows), _beside_tremor(rows, pieces, grain_of(block, bound))
+    angle, noise = (
+        force_wander_angle(rows),
+        _noise_beside_tremor(rows, pieces, rounding_noise(block, bound)),
+    )
     if angle or noise is not None:
-        one = _unsteady(source, reduce(source, whole=True, level=noise), angle)
+        one = _add_hand_motion(
+            source, reduce_to_rows(source, whole=True, level=noise), angle
+        )
         pushed = (rows.noise[:3] > PUSHED * one.noise[:3]).any()
-        return one if angle or pushed else _apart(source, one)
-    some = _tremble(rows, pieces, source.rate)
+        return one if angle or pushed else _separate_triads(source, one)
+    some = _trembling_windows(rows, pieces, source.rate)
     if not some.any():
         return rows
     still = rows.without(np.isin(rows.x.position, held[some]))
     level = still.sd * np.sqrt(rows.length * source.rate)[:, None]
-    one = reduce(source, whole=True, level=median_sigma(level))
-    unsteady = _unsteady(source, replace(one, noise=rows.noise), 0.0)
-    return _askew(source, unsteady, held[some])
+    one = reduce_to_rows(source, whole=True, level=median_sigma(level))
+    unsteady = _add_hand_motion(source, replace(one, noise=rows.noise), 0.0)
+    return _add_angle_errors(source, unsteady, held[some])
 
 
-def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
-    """Rows of whole windows with what a hand adds to their means.
+def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
+    """Add the errors of the means by a hand's motion to rows of whole windows.
 
-    `angle` is by how much it turns the force at least, rad.
+    `angle` is the least rms angle by which it turns the force, rad.
     """
     block = masked(source.block, source.usable)
     unit = np.abs(source.about.nominal["acc_scale"])
     turned, pushed, turns = np.zeros((len(rows.x), 3)), np.zeros(len(rows.x)), []
-    bound = spans(source.block, source.about)[rows.x.position]
+    bound = window_bounds(source.block, source.about)[rows.x.position]
     for i, (a, b) in enumerate(bound):
         white, lasts = rows.sd[i], float(rows.length[i])
         turned[i] = _tremor_rms(block.gyr[a:b], lasts, white[3:])
@@ -109,45 +114,45 @@ def _unsteady(source: RowSource, rows: Rows, angle: float) -> Rows:
         force = block.acc[a:b] / unit
         spread = np.array([np.linalg.norm(white[:3] / unit * up)])
         pushed[i] = _tremor_rms((force @ up)[:, None], lasts, spread)[0]
-        turns.append(turning(force, lasts))
+        turns.append(force_turn_rate(force, lasts))
     sd, length = rows.sd.copy(), rows.length[:, None]
-    # of an axis that nothing is told of, the others tell
+    # an axis without information has the mean of the others
     known = np.isfinite(turned)
     square = np.where(known, turned, 0.0) ** 2
     trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    k = drift(turns, trembles / rows.length**2)
+    k = drift_factor(turns, trembles / rows.length**2)
     slow = np.sqrt(TREMBLES * angle**2 + k * turned**2) / length  # (1)
     sd[:, 3:] = np.hypot(sd[:, 3:], slow)
     fast = np.sqrt(TREMBLES) * pushed[:, None] / length * unit  # (1)
     sd[:, :3] = np.hypot(sd[:, :3], fast)
-    # between its angle at the end of a rest and the mean there
+    # difference between the angle at the end of a rest and the mean angle
     some = np.where(known, square, trembles[:, None])
     most = np.sqrt(np.maximum(angle**2, k / TREMBLES * some))
-    return replace(rows, sd=sd, wander=most)
+    return replace(rows, sd=sd, hand_angle=most)
 
 
-def _apart(source: RowSource, one: Rows) -> Rows:
-    """Rows in which the accelerometers have blocks: what trembles turns no force.
+def _separate_triads(source: RowSource, one: Rows) -> Rows:
+    """Rows with blocks for the accelerometers, and whole windows for the gyroscopes.
 
-    The gyroscopes have those of `one`, of whole windows.
+    The latter are those of `one`. For a table that trembles without turning the force.
     """
-    rows = reduce(source, apart=True)
+    rows = reduce_to_rows(source, apart=True)
     count = np.unique(rows.x.position, return_counts=True)[1]
     ends, sd = np.cumsum(count) - 1, rows.sd.copy()
     sd[ends, 3:] = one.sd[:, 3:]
-    wander = np.repeat(one.wander, count, axis=0)
-    return replace(rows, sd=sd, noise=one.noise, wander=wander)
+    wander = np.repeat(one.hand_angle, count, axis=0)
+    return replace(rows, sd=sd, noise=one.noise, hand_angle=wander)
 
 
-def _askew(source: RowSource, rows: Rows, shaky: Index) -> Rows:
-    """Rows of which known angles are off by what a hand turns, in those positions."""
-    x, sd, wander = rows.x, rows.sd.copy(), rows.wander.copy()
+def _add_angle_errors(source: RowSource, rows: Rows, shaky: Index) -> Rows:
+    """Add the angle errors by a hand in positions `shaky` whose angles are known."""
+    x, sd, wander = rows.x, rows.sd.copy(), rows.hand_angle.copy()
     held = np.isin(x.position, shaky)
     wander[x.oriented & ~held] = 0.0
     for i in np.flatnonzero(x.oriented & held):
         off = np.sqrt(np.diag(turned_force(x.f[i], wander[i])))
         sd[i, :3] = np.hypot(sd[i, :3], off * np.abs(source.about.nominal["acc_scale"]))
-    return replace(rows, sd=sd, wander=wander)
+    return replace(rows, sd=sd, hand_angle=wander)
 
 
 def turned_force(force: Array, angle: Array) -> Array:
@@ -160,14 +165,16 @@ def turned_force(force: Array, angle: Array) -> Array:
     return out
 
 
-def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
-    """Windows in which a hand moves what lies still in the others, (k,).
+def _trembling_windows(
+    rows: Rows, pieces: list[Array], rate: float
+) -> NDArray[np.bool_]:
+    """Windows in which a hand moves the device, while it rests in others, (k,).
 
     `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
     """
     if len(pieces) < FEWEST:
         return np.zeros(len(pieces), dtype=bool)
-    shown = np.array([_unrest(piece[:, GYR], rate) for piece in pieces])
+    shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
     told = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
     if not told.any():
         return np.zeros(len(pieces), dtype=bool)
@@ -176,12 +183,12 @@ def _tremble(rows: Rows, pieces: list[Array], rate: float) -> NDArray[np.bool_]:
     return apart
 
 
-def _unrest(rates: Array, rate: float) -> Array:
-    """Variance (2) over a second in that of the quickest noise alone, (3,).
+def _relative_tremor(rates: Array, rate: float) -> Array:
+    """Variance (2) over a second, relative to that of white noise alone, (3,).
 
-    nan of an axis without noise, or with nothing that tells it.
+    nan for an axis without noise or without samples.
     """
-    noise = _quickest(rates)
+    noise = _high_frequency_noise(rates)
     some, unrest = np.isfinite(noise), np.full(3, np.nan)
     if not some.any():
         return unrest
@@ -196,10 +203,10 @@ def _unrest(rates: Array, rate: float) -> Array:
     return unrest
 
 
-def _quickest(rates: Array) -> Array:
-    """Deviation of one sample of a window beside what is slower, (3,).
+def _high_frequency_noise(rates: Array) -> Array:
+    """Standard deviation of the high-frequency noise of one sample, (3,).
 
-    nan of an axis of which nothing is known.
+    nan for an axis without samples.
     """
     out = np.full(3, np.nan)
     some = np.isfinite(np.diff(rates, 4, axis=0)).any(axis=0)
@@ -208,16 +215,18 @@ def _quickest(rates: Array) -> Array:
     return out
 
 
-def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
-    """Noise of one sample beside a tremor, (6,); None where nothing trembles.
+def _noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | None:
+    """Noise of one sample without the tremor, (6,); None if there is no tremor.
 
-    `pieces` are the (n_i, 6) samples of windows, `least` (6,) that of rounding.
+    `pieces` are the (n_i, 6) samples of windows, `least` (6,) the noise of rounding.
     """
     free = ~rows.x.oriented.any() and len(pieces) >= FEWEST
     if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
     # where a hand is quick, differences of samples show it as well
-    each = np.ma.masked_invalid([_quickest(piece[:, GYR]) for piece in pieces])
+    each = np.ma.masked_invalid(
+        [_high_frequency_noise(piece[:, GYR]) for piece in pieces]
+    )
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
     quiet = np.argsort(loud)[: max(round(QUIET * len(pieces)), 1)]
     beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
@@ -225,7 +234,7 @@ def _beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array | Non
 
 
 def _tremor_rms(values: Array, length: float, white: Array) -> Array:
-    """What trembles sums up to an angle or a speed: its rms about a line, (k,).
+    """Rms of the integrated outputs, an angle or a speed, about a line, (k,).
 
     Parameters
     ----------
@@ -246,10 +255,10 @@ def _tremor_rms(values: Array, length: float, white: Array) -> Array:
     return out
 
 
-def wander(rows: Rows) -> float:
+def force_wander_angle(rows: Rows) -> float:
     """Rms angle by which the force turns within windows, rad; 0 on a table.
 
-    A course that windows share is none of a hand: outputs settle like that.
+    A course that all windows share is subtracted: outputs that settle make one.
     """
     x, some = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
     held = [some & (x.position == p) for p in np.unique(x.position[some])]
@@ -258,7 +267,7 @@ def wander(rows: Rows) -> float:
         return 0.0
     offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
     along, across, dof, angle = 0.0, 0.0, 0.0, []
-    for at, off in zip(held, _less_shared(offs), strict=True):
+    for at, off in zip(held, _without_shared_course(offs), strict=True):
         up = x.f[at][0] / np.linalg.norm(x.f[at][0])
         sd = rows.sd[at, :3]
         part = np.outer(off @ up, up)
@@ -273,8 +282,8 @@ def wander(rows: Rows) -> float:
     return float(np.sqrt(np.mean(angle)))
 
 
-def _less_shared(offs: list[Array]) -> list[Array]:
-    """Courses within windows, (n, 3) each, less the one that most of them have."""
+def _without_shared_course(offs: list[Array]) -> list[Array]:
+    """Courses within windows, (n, 3) each, less their median course."""
     longest = max(map(len, offs))
     whole = np.full((len(offs), longest, 3), np.nan)
     for i, off in enumerate(offs):

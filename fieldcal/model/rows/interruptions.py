@@ -1,7 +1,7 @@
-"""Where samples are missing between two positions: the device may have been off.
+"""Gaps in the samples between two positions: the device may have restarted.
 
-What was switched on again has other biases than before. Between positions nobody
-looks at the samples but for the turn, so a restart shows as nothing but a gap.
+Biases after a restart differ from those before. Between positions, a restart shows only
+as a gap.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.samples import Block
 from fieldcal.core.sampling import rate_of
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.session.description import Description
 
 OFF_S, PERIODS = 0.5, 5.0
@@ -19,7 +19,7 @@ OFF_S, PERIODS = 0.5, 5.0
 
 def interruptions(block: Block, about: Description) -> list[tuple[float, float]]:
     """End of the position before and start of the one after each gap, s."""
-    bound = spans(block, about)
+    bound = window_bounds(block, about)
     held = bound[bound[:, 1] > bound[:, 0]]
     held = held[np.argsort(held[:, 0])]
     least = max(OFF_S, PERIODS / rate_of(block))

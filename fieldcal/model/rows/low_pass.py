@@ -45,44 +45,44 @@ the exponent from which on that has nothing left."""
 
 
 def first_order(spline: CubicSpline, tau: float) -> CubicSpline:
-    """What comes of a spline of k channels after (1), or after its inverse."""
-    even = _evenly(spline)
+    """A spline of k channels after low-pass (1), or after its inverse."""
+    even = _even_knots(spline)
     t, u = even.x, even(even.x)
     if tau < 0:
         return CubicSpline(t, u - tau * even(t, 1))  # (3)
-    return CubicSpline(t, _answer(even, u, -1 / tau) / tau)  # (4)
+    return CubicSpline(t, _filter_state(even, u, -1 / tau) / tau)  # (4)
 
 
 def second_order(spline: CubicSpline, tau: float) -> CubicSpline:
-    """What comes of a spline of k channels after (2), or after its inverse."""
-    even = _evenly(spline)
+    """A spline of k channels after low-pass (2), or after its inverse."""
+    even = _even_knots(spline)
     t, u = even.x, even(even.x)
     if tau < 0:
         change = even(t, 1)  # right to h^4 at the knots, its own bend only to h^2
         bend = CubicSpline(t, change)(t, 1)
         return CubicSpline(t, u - ROOT2 * tau * change + tau**2 * bend)  # (3)
     pole = (-1 + 1j) / (ROOT2 * tau)
-    return CubicSpline(t, ROOT2 / tau * _answer(even, u, pole).imag)  # (4)
+    return CubicSpline(t, ROOT2 / tau * _filter_state(even, u, pole).imag)  # (4)
 
 
 def first_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
-    """By how much less comes out for each second of tau, of an output, (5)."""
-    even, tau = _evenly(spline), abs(tau)
+    """Decrease of an output per second of tau, (5)."""
+    even, tau = _even_knots(spline), abs(tau)
     t, y = even.x, even(even.x)
-    return CubicSpline(t, (y - _answer(even, y, -1 / tau) / tau) / tau)
+    return CubicSpline(t, (y - _filter_state(even, y, -1 / tau) / tau) / tau)
 
 
 def second_order_slope(spline: CubicSpline, tau: float) -> CubicSpline:
     """The same of a low-pass of second order, (6); tau is not 0."""
-    even, tau = _evenly(spline), abs(tau)
+    even, tau = _even_knots(spline), abs(tau)
     t, y, pole = even.x, even(even.x), (-1 + 1j) / (ROOT2 * tau)
-    z = _answer(even, y, pole)
+    z = _filter_state(even, y, pole)
     slower, change = ROOT2 / tau * z.imag, ROOT2 / tau * (pole * z).imag
     return CubicSpline(t, 2 * (y - slower) / tau - ROOT2 * change)
 
 
-def _evenly(spline: CubicSpline) -> CubicSpline:
-    """The same with even knots, but for pauses."""
+def _even_knots(spline: CubicSpline) -> CubicSpline:
+    """The spline with evenly spaced knots, except for pauses."""
     t = spline.x
     step = float(np.median(np.diff(t)))
     if np.allclose(np.diff(t), step, rtol=1e-6, atol=0.0):
@@ -97,7 +97,7 @@ def _evenly(spline: CubicSpline) -> CubicSpline:
     return CubicSpline(knots, spline(knots))
 
 
-def _answer(even: CubicSpline, u: Array, pole: complex) -> Any:
+def _filter_state(even: CubicSpline, u: Array, pole: complex) -> Any:
     """Z of (4) at the knots, (n, k), from rest after every pause."""
     t = even.x
     change = even(t, 1)

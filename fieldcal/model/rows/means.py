@@ -13,8 +13,8 @@ import numpy as np
 
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.bounds import spans
-from fieldcal.model.rows.reduce import Rows, RowSource, averaged
+from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.reduce import Rows, RowSource, average_rows
 
 
 def median_sigma(sigma: Array) -> Array:
@@ -32,11 +32,11 @@ def rows_of_means(source: RowSource, sigma: Array) -> Rows:
     sigma : (p, 6) standard deviation of each position's means, m/s^2 and rad/s
 
     """
-    windows = spans(source.block, source.about)
+    windows = window_bounds(source.block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 0)
     level = median_sigma(sigma[held])
     still = np.zeros((len(held), 3))
-    out = averaged(source, windows[held], held, sigma[held], level, still)
+    out = average_rows(source, windows[held], held, sigma[held], level, still)
     x = out.x
     if not source.about.timed:
         same = np.zeros(len(held))
@@ -45,4 +45,4 @@ def rows_of_means(source: RowSource, sigma: Array) -> Rows:
     off = np.zeros_like(out.sd)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[~x.oriented & (len(held) > 1), 3:] = earth
-    return replace(out, x=x, common=off)
+    return replace(out, x=x, window_error=off)

@@ -45,7 +45,7 @@ PARTS = 8
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """Where a recording stands beside its reference, (1).
+    """Alignment of a recording with its reference, (1).
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Alignment:
     drift : by how much the reference's clock is the quicker one, 1
     middle : s of the recording's clock
     rotation : (3, 3) R, device = R reference
-    unseen : (6,) gravity along an upright axis that the reference lacks, m/s^2
+    unseen_gravity : (6,) gravity along an upright axis that the reference lacks, m/s^2
 
     """
 
@@ -61,7 +61,7 @@ class Alignment:
     drift: float
     middle: float
     rotation: Array = field(default_factory=lambda: np.eye(3))
-    unseen: Array = field(default_factory=lambda: np.zeros(6))
+    unseen_gravity: Array = field(default_factory=lambda: np.zeros(6))
 
     def reference_time(self, t: Array) -> Array:
         """Instants of the recording by the reference's clock, s."""
@@ -105,7 +105,7 @@ class MotionRows:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Rows that say something, by channel, (n, 6)."""
+        """Rows with a value, by channel, (n, 6)."""
         return np.isfinite(self.y)
 
     @property
@@ -138,7 +138,7 @@ class MotionRows:
         both: Array = out.reshape(values.shape)
         return both
 
-    def of_stretches(self, coefficients: Array, some: Index) -> Array:
+    def select_stretches(self, coefficients: Array, some: Index) -> Array:
         """Coefficients (m, k) of some stretches alone, of those (n, k) of all."""
         apart = coefficients.reshape(-1, self.length, coefficients.shape[1])
         means = idct(apart[:, 0], axis=0, norm="ortho")
@@ -147,10 +147,12 @@ class MotionRows:
         return out.reshape(-1, coefficients.shape[1])
 
     def motion(self, response: Response, order: int = 0) -> Array:
-        """What a triad took the motion for, or a derivative, (n, 6)."""
+        """The motion as a triad's response gives it, or a derivative, (n, 6)."""
         values = self._means_of(response.sensed, response.late, order)
         if order == 0:
-            values += np.hstack([self.alignment.unseen[p] @ self._turn for p in TRIADS])
+            values += np.hstack(
+                [self.alignment.unseen_gravity[p] @ self._turn for p in TRIADS]
+            )
         return values
 
     def experience(self, response: Response) -> Experience:
@@ -243,13 +245,13 @@ def rows_in_motion(
     temperature = block.temperature[at].mean(axis=1)
     ideal = Response.of(reference)
     return MotionRows(
-        block.t[at], _uneven(block.t, stretches).reshape(at.shape),
+        block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape),
         six[at].mean(axis=1), temperature, length,
         step * per_row, reference, alignment, ideal, ideal,
     )  # fmt: skip
 
 
-def _uneven(t: Array, stretches: Sequence[Index]) -> Array:
+def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
     """By how much stamps are off a line through those of their stretch, (k,) s.
 
     Samples of a stretch are counted, so what was lost in it makes it uneven.

@@ -32,15 +32,15 @@ def noise_of(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Channel
     )
 
 
-def grain_of(block: Block, windows: NDArray[np.intp]) -> Array:
-    """Deviation that rounding alone makes, from the least change, (6,)."""
-    return least_deviation(np.concatenate(steps_in(block, windows)))
+def rounding_noise(block: Block, windows: NDArray[np.intp]) -> Array:
+    """Standard deviation of rounding alone, from the least change, (6,)."""
+    return least_deviation(np.concatenate(quantisation_steps(block, windows)))
 
 
-def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
-    """How far off the mean of each window may be for outputs rounded, (w, 6)."""
+def rounding_sigma(block: Block, windows: NDArray[np.intp]) -> Array:
+    """Standard deviation of each window's mean by rounding of the outputs, (w, 6)."""
     off = []
-    steps = steps_in(block, windows)
+    steps = quantisation_steps(block, windows)
     for step, pieces in zip(steps, _pieces(block, windows), strict=True):
         differences = np.nan_to_num(
             [short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces]
@@ -55,14 +55,14 @@ def rounding(block: Block, windows: NDArray[np.intp]) -> Array:
     return deviation
 
 
-def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array:
-    """What the errors of `rounding`, (w, 6), have in common in all windows, (6,).
+def shared_rounding_sigma(block: Block, windows: NDArray[np.intp], off: Array) -> Array:
+    """Part of the errors `off` (w, 6) of `rounding_sigma` that all windows share, (6,).
 
-    A gyroscope at rest measures the same in each of them, and is off by the same if its
-    noise does not reach across a step.
+    A gyroscope at rest measures the same in each window. Its rounding error is the same
+    if its noise is smaller than a step.
     """
     out = np.zeros(6)
-    step = steps_in(block, windows)[1]
+    step = quantisation_steps(block, windows)[1]
     _, pieces = _pieces(block, windows)
     mean = np.array([_mean_of_known(piece) for piece in pieces])
     sampled = np.nan_to_num([short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces])
@@ -79,15 +79,18 @@ def rounding_alike(block: Block, windows: NDArray[np.intp], off: Array) -> Array
 
 
 def _mean_of_known(piece: Array) -> Array:
-    """Means of the samples (n, c) that there are; nan without any."""
+    """Means of the finite samples (n, c); nan without any."""
     known = np.isfinite(piece)
     total = np.where(known, piece, 0.0).sum(axis=0)
     mean: Array = total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
     return mean
 
 
-def steps_in(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Steps of both triads, (3,) each; of what stands in all windows, as on the way."""
+def quantisation_steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Quantisation steps of both triads, (3,) each.
+
+    Those of outputs that are constant in all windows are found in the whole recording.
+    """
     held = np.concatenate([smallest_steps(p) for p in _pieces(block, windows)])
     if not (held > 0).all():
         held = np.where(held > 0, held, grids_of(block))

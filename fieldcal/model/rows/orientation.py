@@ -1,4 +1,4 @@
-"""How the device lies in each row: angles that are known, or what it reads instead."""
+"""Orientation in each row: known angles, or else what the sensors measure."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fieldcal.core.positions import (
     third_angles,
 )
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.turntable import Readings
+from fieldcal.model.rows.turntable import GyroReadings
 from fieldcal.session.description import Description
 
 
 def known_angles(about: Description, position: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Both angles of each row, (n,) each, rad; nan where nobody knows them."""
+    """Both angles of each row, (n,) each, rad; nan where unknown."""
     if not about.positions:
         unknown = np.full(len(position), np.nan)
         return unknown, unknown
@@ -39,21 +39,25 @@ def known_attitudes(about: Description, position: NDArray[np.intp]) -> dict[str,
     }
 
 
-def readings(about: Description, position: NDArray[np.intp], gyr: Array) -> Readings:
-    """What gyroscopes read in each row, by their outputs (n, 3), nan where unknown."""
+def gyro_readings(
+    about: Description, position: NDArray[np.intp], gyr: Array
+) -> GyroReadings:
+    """Angular rates by the gyroscopes' outputs (n, 3), nominally calibrated."""
     w = (gyr - about.nominal["gyr_bias"]) / about.nominal["gyr_scale"]
     positions = about.positions or (Position("all of it"),) * (int(position.max()) + 1)
-    return Readings(positions, position, w, float(np.linalg.norm(about.base_rate)))
+    return GyroReadings(positions, position, w, float(np.linalg.norm(about.base_rate)))
 
 
-def force_read(about: Description, position: NDArray[np.intp], acc: Array) -> Array:
-    """Force along what accelerometers read, by their outputs (n, 3), m/s^2."""
+def force_from_outputs(
+    about: Description, position: NDArray[np.intp], acc: Array
+) -> Array:
+    """Force of length g along the mean of each position's outputs (n, 3), m/s^2."""
     apart = (acc - about.nominal["acc_bias"]) / about.nominal["acc_scale"]
-    return free_force(about.gravity, position, apart)
+    return force_along_mean(about.gravity, position, apart)
 
 
-def free_force(gravity: float, position: NDArray[np.intp], f: Array) -> Array:
-    """Force of length g along what is read in each position, (n, 3)."""
+def force_along_mean(gravity: float, position: NDArray[np.intp], f: Array) -> Array:
+    """Force of length g along the mean of each position's force `f`, (n, 3)."""
     out = np.zeros((len(position), 3))
     for p in np.unique(position):
         mean = np.nanmean(np.nan_to_num(f[position == p]), axis=0)

@@ -18,17 +18,17 @@ from fieldcal.core.positions import angles, attitude_sigmas, third_angles
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means, masked
-from fieldcal.model.rows.bounds import block_bounds, spans
-from fieldcal.model.rows.noise import rounding, rounding_alike
+from fieldcal.model.rows.bounds import block_bounds, window_bounds
+from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
 from fieldcal.model.rows.orientation import (
-    force_read,
+    force_from_outputs,
+    gyro_readings,
     known_angles,
     known_attitudes,
-    readings,
 )
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.rows.turntable import going_round
-from fieldcal.model.rows.vibration import Shaking, shaking
+from fieldcal.model.rows.turntable import fit_rotating_earth_rate
+from fieldcal.model.rows.vibration import WindowNoise, measure_window_noise
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.session.description import Description
@@ -37,32 +37,32 @@ from fieldcal.session.site_gravity import gravity_sigma
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Block means and what the device goes through in each.
+    """Block means, and the inputs of the device in each.
 
     Attributes
     ----------
     x : n rows
-    y : (n, 6) means, m/s^2 and rad/s; nan where nothing was usable
+    y : (n, 6) means, m/s^2 and rad/s; nan where no sample was usable
     sd : (n, 6) standard deviation of each mean from white noise
-    common : (n, 6) standard deviation of an error that all rows of a window share
+    window_error : (n, 6) standard deviation of an error that all rows of a window share
     length : (n,) s
     noise : (6,) standard deviation of one sample
     span : (n, 2) instants of the first and the last sample, s
-    wander : (n, 3) rms angle by which a hand turns the device about each of its axes
+    hand_angle : (n, 3) rms angle by which a hand turns the device about each axis
         within the window, rad
-    alike : (6,) standard deviation of an error that all windows share
+    session_error : (6,) standard deviation of an error that all windows share
 
     """
 
     x: Experience
     y: Array
     sd: Array
-    common: Array
+    window_error: Array
     length: Array
     noise: Array
     span: Array
-    wander: Array
-    alike: Array = field(default_factory=lambda: np.zeros(6))
+    hand_angle: Array
+    session_error: Array = field(default_factory=lambda: np.zeros(6))
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -70,44 +70,46 @@ class Rows:
         return np.isfinite(self.y) & np.isfinite(self.sd)
 
     def without(self, left: NDArray[np.bool_]) -> Rows:
-        """The rows, some of which (n,) are not to be used."""
+        """The rows with those marked in `left` (n,) made unusable."""
         return replace(self, sd=np.where(left[:, None], np.nan, self.sd))
 
 
 @dataclass(frozen=True)
 class RowSource:
-    """What rows are made of.
+    """Samples of a session, with what is needed to reduce them to rows.
 
     Attributes
     ----------
-    block : the samples, put right
-    about : what was known
+    block : the samples, corrected
+    about : description of the session
     usable : (n, 6) samples that may be used
-    arrived : (p,) instant from which the device was at rest in each position, s
-    warmth : the temperature
+    rest_began : (p,) instant from which the device was at rest in each position, s
+    thermometer : the temperature
     pace : seconds of the device's clock in a true second
-    left : (p, 6) variance that a swaying base leaves of each window's mean, SI squared
-    white : (6,) deviation of one sample on such a base, where what is slow of the noise
-        was taken out with what swayed
-    unsure_gravity : m/s^2, standard deviation of what swaying takes from gravity
+    sway_variance : (p, 6) variance of each window's mean that remains after a base's
+        sway was subtracted, SI squared; None if the base does not sway
+    sway_noise : (6,) standard deviation of one sample on such a base; the subtraction
+        removes slow noise as well
+    sway_gravity_sigma : m/s^2, standard deviation of the apparent loss of gravity by
+        sway
 
     """
 
     block: Block
     about: Description
     usable: NDArray[np.bool_]
-    arrived: Array
-    warmth: Thermometer
+    rest_began: Array
+    thermometer: Thermometer
     pace: float = 1.0
-    left: Array | None = None
-    white: Array | None = None
-    unsure_gravity: float = 0.0
+    sway_variance: Array | None = None
+    sway_noise: Array | None = None
+    sway_gravity_sigma: float = 0.0
 
     @property
-    def whole(self) -> RowSource:
-        """The same of the samples of which every output may be used, if there are any.
+    def complete_samples(self) -> RowSource:
+        """The source with only those samples whose outputs are all usable.
 
-        The others are as if they had not been sent.
+        Unchanged if there are no such samples, or no others.
         """
         every = self.usable.all(axis=1)
         if every.all() or not every.any():
@@ -121,15 +123,15 @@ class RowSource:
         return rate_of(self.block)
 
     @cached_property
-    def shaken(self) -> Shaking:
-        """How noisy the windows are that have samples."""
+    def window_noise(self) -> WindowNoise:
+        """Noise of the windows that have samples."""
         block = masked(self.block, self.usable)
-        windows = spans(block, self.about)
+        windows = window_bounds(block, self.about)
         held = np.diff(windows, axis=1)[:, 0] > 1
-        return shaking(block, windows[held], self.rate)
+        return measure_window_noise(block, windows[held], self.rate)
 
 
-def reduce(
+def reduce_to_rows(
     source: RowSource,
     whole: bool = False,
     level: Array | None = None,
@@ -139,20 +141,23 @@ def reduce(
 
     Parameters
     ----------
-    source : what is cut
-    whole : whether each window is one row, as a hand held the device
-    level : (6,) standard deviation of one sample; if not given, what windows show
-    apart : whether each window also has a row of its own for the gyroscopes, its last,
-        and the blocks are those of the accelerometers
+    source : samples and windows
+    whole : whether each window is one row, as of a device that is held by hand
+    level : (6,) standard deviation of one sample; if None, it is measured in windows
+    apart : whether the blocks are for the accelerometers only, and each window has a
+        further row, its last, for the gyroscopes
 
     """
     block, rate = masked(source.block, source.usable), source.rate
-    windows = spans(block, source.about)
+    windows = window_bounds(block, source.about)
     held = np.flatnonzero(np.diff(windows, axis=1)[:, 0] > 1)
-    shaken = source.shaken
+    shaken = source.window_noise
     noise, levels = shaken.noise, shaken.levels
-    if source.white is not None:
-        noise, levels = np.fmax(noise, source.white), np.fmax(levels, source.white)
+    if source.sway_noise is not None:
+        noise, levels = (
+            np.fmax(noise, source.sway_noise),
+            np.fmax(levels, source.sway_noise),
+        )
     if level is not None:
         noise, levels = level, np.tile(level, (len(held), 1))
     source = replace(source, block=shaken.block)
@@ -164,7 +169,7 @@ def reduce(
             each = block_bounds(block.t, (a, b), rate, len(held), without)
         bounds.append(np.vstack([each, [(a, b)]]) if whole or apart else each)
     rows = [len(b) for b in bounds]
-    out = averaged(
+    out = average_rows(
         source,
         np.concatenate(bounds),
         np.repeat(held, rows),
@@ -172,13 +177,13 @@ def reduce(
         noise,
         np.repeat(shaken.variance, rows, axis=0),
     )
-    rounded = rounding(block, windows[held])
-    alike = rounding_alike(block, windows[held], rounded)
+    rounded = rounding_sigma(block, windows[held])
+    alike = shared_rounding_sigma(block, windows[held], rounded)
     off = np.repeat(rounded, rows, axis=0)
-    if source.left is not None:
-        off = np.hypot(off, np.sqrt(source.left[out.x.position]))
-    # the Earth turns a device of unknown orientation about any of its axes; one that
-    # was never turned has it in its bias, and some gyroscopes show where it points
+    if source.sway_variance is not None:
+        off = np.hypot(off, np.sqrt(source.sway_variance[out.x.position]))
+    # the direction of the Earth's rate is unknown in device axes, except in a device
+    # that was never turned (bias contains it) or whose gyroscopes measure it
     free = out.x.earth_unseen & (len(held) > 1)
     earth = EARTH_RATE / 3**0.5 * np.abs(source.about.nominal["gyr_scale"])
     off[free, 3:] = np.hypot(off[free, 3:], earth)
@@ -187,10 +192,10 @@ def reduce(
         ends[np.cumsum(rows) - 1] = True
         out.sd[ends, :3] = np.nan
         out.sd[~ends, 3:] = np.nan
-    return replace(out, common=off, alike=alike)
+    return replace(out, window_error=off, session_error=alike)
 
 
-def averaged(
+def average_rows(
     source: RowSource,
     bound: NDArray[np.intp],
     position: NDArray[np.intp],
@@ -198,28 +203,28 @@ def averaged(
     noise: Array,
     variance: Array,
 ) -> Rows:
-    """Average between bounds.
+    """Average samples between bounds to rows.
 
     Parameters
     ----------
     bound : (n, 2) first and one past the last sample of each row
-    position : (n,) where the device was held
-    level : (n, 6) standard deviation of one sample
-    noise : (6,) the usual one
+    position : (n,) index of each row's position
+    level : (n, 6) standard deviation of one sample in each row
+    noise : (6,) usual standard deviation of one sample
     variance : (n, 3) of the samples of the accelerometers, (m/s^2)^2
 
     """
     block = source.block
     y, count = block_means(masked(block, source.usable), bound)
     sd = level / np.sqrt(np.maximum(count, 1))
-    told = (count > 0) & (sd > 0)  # what never changes tells nothing
+    told = (count > 0) & (sd > 0)  # an output that never changes has no information
     sd = np.where(told, sd, np.nan)
     span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
     length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
     x = _experience(source, position, y, span.mean(axis=1), length, variance)
     sd[~x.force_known, :3] = np.nan
     scale = source.about.nominal["gyr_scale"]
-    _without_round(x, y[:, 3:], sd[:, 3:], length, scale)
+    _subtract_rotating_earth_rate(x, y[:, 3:], sd[:, 3:], length, scale)
     still = np.zeros((len(y), 3))
     return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
 
@@ -232,18 +237,18 @@ def _experience(
     length: Array,
     variance: Array,
 ) -> Experience:
-    """What the device goes through in rows of outputs (n, 6) at t, length s each."""
+    """Inputs of the device in rows of outputs (n, 6) at t, `length` (n,) s each."""
     about = source.about
-    warming, heating = source.warmth.at(t)
-    gyroscopes = readings(about, position, y[:, 3:])
+    warming, heating = source.thermometer.at(t)
+    gyroscopes = gyro_readings(about, position, y[:, 3:])
     x = Experience.at_rest(
         *known_angles(about, position),
         about.gravity,
-        f=force_read(about, position, y[:, :3]),
+        f=force_from_outputs(about, position, y[:, :3]),
         t=t,
         lasts=length,
         since_start=t - source.block.t[0],
-        since_turn=t - source.arrived[position],
+        since_turn=t - source.rest_began[position],
         warming=warming,
         heating=heating,
         variance=np.nan_to_num(variance),
@@ -254,7 +259,7 @@ def _experience(
         transport=about.under_way.rate,
         mounting=about.mounting,
         latitude=about.latitude,
-        gravity_sigma=float(np.hypot(gravity_sigma(about), source.unsure_gravity)),
+        gravity_sigma=float(np.hypot(gravity_sigma(about), source.sway_gravity_sigma)),
         joint_turns=_joint_turns(source),
         **known_attitudes(about, position),
     )
@@ -263,24 +268,25 @@ def _experience(
 
 
 def _joint_turns(source: RowSource) -> JointTurns:
-    """When the joints were turned, as far as the positions' angles are known.
+    """Turns of the joints, as far as the positions' angles are known.
 
-    An attitude that was measured is not that of two joints: no joint stayed in its
-    place because an angle did.
+    Measured attitudes are not used: their angles are not those of joints.
     """
     positions = source.about.positions
     if not positions:
         return JointTurns.none()
     known = np.column_stack([*angles(positions), third_angles(positions)])
     known[np.isfinite(attitude_sigmas(positions))] = np.nan
-    return JointTurns.of(source.arrived[: len(known)], known)
+    return JointTurns.of(source.rest_began[: len(known)], known)
 
 
-def _without_round(
+def _subtract_rotating_earth_rate(
     x: Experience, gyr: Array, sd: Array, length: Array, scale: Array
 ) -> None:
-    """Take out of the gyroscopes' means (n, 3) what goes round with a rate table."""
+    """Subtract the Earth's rate that rotates with a rate table from means (n, 3)."""
     for p in np.unique(x.position[x.rate.any(axis=1)]):
         at = np.flatnonzero(x.position == p)
         rate = x.rate[at[0]] @ x.mounting
-        gyr[at] -= going_round(x.t[at], rate, gyr[at], sd[at], scale, length[at]).values
+        gyr[at] -= fit_rotating_earth_rate(
+            x.t[at], rate, gyr[at], sd[at], scale, length[at]
+        ).values

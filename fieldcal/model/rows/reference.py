@@ -25,11 +25,11 @@ FEWEST = 8
 
 
 class Reference:
-    """What a reference says between its samples, by cubic splines.
+    """A reference of the motion, interpolated by cubic splines.
 
     Parameters
     ----------
-    block : its samples; a channel that it has not is taken as 0
+    block : its samples; missing channels are taken as 0
 
     Attributes
     ----------
@@ -62,8 +62,8 @@ class Reference:
             yield finite[:, channels[0]], np.array(channels)
 
     @property
-    def lost(self) -> Index:
-        """Channels that it lacks of triads of which it has some."""
+    def missing_channels(self) -> Index:
+        """Missing channels of triads that are not missing altogether."""
         some = np.repeat(self.observed.reshape(2, 3).any(axis=1), 3)
         return np.flatnonzero(some & ~self.observed)
 
@@ -74,14 +74,14 @@ class Reference:
             out[:, channels] = spline(s, order)
         return out
 
-    def through(self, sensor: Callable[[CubicSpline], CubicSpline]) -> Self:
-        """What a sensor makes of it."""
+    def filtered_by(self, sensor: Callable[[CubicSpline], CubicSpline]) -> Self:
+        """The reference after a filter is applied to each spline."""
         out = copy(self)
         out.splines = [(channels, sensor(spline)) for channels, spline in self.splines]
         return out
 
     def covers(self, s: Array, margin: float) -> NDArray[np.bool_]:
-        """Instants about which it has samples, and so far beyond, s."""
+        """Which instants, s, are inside the reference by a margin and in no gap."""
         inside = (s > self.start + margin) & (s < self.end - margin)
         after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
         return inside & (self.t[after] - self.t[after - 1] < GAP * self.step)

@@ -41,15 +41,15 @@ motion at w, 7e-4 of one at 1 Hz."""
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What the sensors of a triad make of the motion.
+    """Response of the sensors of a triad to the motion of a reference.
 
     Attributes
     ----------
-    late : s by which they are late
+    late : delay, s
     tau : time constant of the low-pass of first order, s
-    second : that of second order, s
-    sensed : the motion so followed
-    slope, bend : by how much less of it is followed for each second of either
+    second : time constant of the low-pass of second order, s
+    sensed : the reference after both low-passes
+    slope, bend : decrease of `sensed` per second of `tau` and of `second`
 
     """
 
@@ -68,19 +68,24 @@ class Response:
         tau: float = 0.0,
         second: float = 0.0,
     ) -> Self:
-        """Of sensors that follow a reference."""
+        """Response to a reference with a delay and time constants."""
         sensed = reference
         if tau:
-            sensed = sensed.through(partial(first_order, tau=tau))
+            sensed = sensed.filtered_by(partial(first_order, tau=tau))
         if second:
-            sensed = sensed.through(partial(second_order, tau=second))
+            sensed = sensed.filtered_by(partial(second_order, tau=second))
         slope = partial(first_order_slope, tau=max(abs(tau), LEAST))
         bend = partial(second_order_slope, tau=max(abs(second), LEAST_SECOND))
         return cls(
-            late, tau, second, sensed, sensed.through(slope), sensed.through(bend)
+            late,
+            tau,
+            second,
+            sensed,
+            sensed.filtered_by(slope),
+            sensed.filtered_by(bend),
         )
 
-    def towards(
+    def step_towards(
         self,
         reference: Reference,
         late: float,
@@ -88,10 +93,10 @@ class Response:
         second: float,
         free: bool = True,
     ) -> Self:
-        """What a step from here to a delay and time constants, s, comes to.
+        """Response after a step towards an estimated delay and time constants, s.
 
-        If a delay is `free`, a time constant is that of (1) or (2), or none, and of
-        what that is less the sensors are the later.
+        If the delay is `free`, the time constants are those of (1) and (2), and their
+        difference from the estimate is added to the delay.
         """
         first, other = tau, second
         if free:
@@ -115,8 +120,8 @@ class Response:
         step = 3 * max(abs(now), LEAST_SECOND) ** 2 * (second - now)
         return float(np.cbrt(now**3 + step))  # (2)
 
-    def apart(self, other: Self) -> float:
-        """How far the time constants of two are apart, in parts of the least."""
+    def distance_to(self, other: Self) -> float:
+        """Largest difference of the time constants, relative to the least ones."""
         return max(
             abs(self.tau - other.tau) / LEAST,
             abs(self.second - other.second) / LEAST_SECOND,

@@ -13,7 +13,7 @@ import numpy as np
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
 from fieldcal.model.rows.block_means import block_means
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.session.description import Description
 
@@ -25,9 +25,9 @@ RATE, FORCE = 2e-3, 0.05
 """Differences that are never motion, however low the noise, rad/s and m/s^2."""
 
 
-def arrivals(block: Block, about: Description, noise: Array) -> Array:
+def rest_instants(block: Block, about: Description, noise: Array) -> Array:
     """Instant from which the device was at rest in each position, (p,) s."""
-    windows = spans(block, about)
+    windows = window_bounds(block, about)
     m = max(2, round(PIECE_S * rate_of(block)))
     out = np.full(len(windows), block.t[0])
     before = 0
@@ -54,8 +54,8 @@ def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
     return start + (int(at[-1]) + 1) * m if len(at) else 0
 
 
-def beginnings(source: RowSource) -> Array:
-    """Where each window begins, (p,) s; a position without one has its arrival."""
+def window_starts(source: RowSource) -> Array:
+    """Start of each window, (p,) s; of a position without one, the start of rest."""
     windows = source.about.windows
     given = [np.nan if w is None else w[0] for w in windows] or [source.block.t[0]]
-    return np.where(np.isnan(given), source.arrived, given)
+    return np.where(np.isnan(given), source.rest_began, given)

@@ -19,7 +19,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.positions import rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import rate_of
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.session.description import Description
 from fieldcal.windows.sway import find_sway
 from fieldcal.windows.sway_process import needed_seconds
@@ -38,58 +38,58 @@ end already: its steps are as long."""
 
 
 @dataclass(frozen=True, slots=True)
-class Swaying:
-    """What a swaying base does in a recording.
+class BaseSway:
+    """Sway of a base in a recording.
 
     Attributes
     ----------
-    block : the samples without it
-    left : (p, 6) variance that it leaves of each window's mean
-    white : (6,) deviation of one sample: below the quickest wave the
-        noise has gone with the waves
-    amplitude, hz : rad, Hz, of one wave with all its power
+    block : the samples without the sway
+    excess_variance : (p, 6) variance of each window's mean that remains
+    white : (6,) standard deviation of one sample; noise slower than the quickest wave
+        is subtracted with the waves
+    amplitude, hz : rad and Hz, of one wave with the power of all
     spread : (2,) standard deviations of both over the windows
-    seconds : that a window needs, s
-    gravity : m/s^2, standard deviation of what swaying takes from gravity in all
-        windows: without gyroscopes nobody knows whether the base turns or is pushed
+    needed_seconds : length that a window needs, s
+    gravity_sigma : m/s^2, standard deviation of the apparent loss of gravity in all
+        windows, if without gyroscopes rotation and acceleration are not separable
 
     """
 
     block: Block
-    left: Array
+    excess_variance: Array
     white: Array
     amplitude: float
     hz: float
     spread: tuple[float, float]
-    seconds: float
-    gravity: float
+    needed_seconds: float
+    gravity_sigma: float
 
     @property
     def sentence(self) -> str:
-        """Say it to the operator."""
+        """Sentence for the operator."""
         unknown = (
             "; without gyroscopes nothing tells whether it turns or is pushed: the"
-            f" scale factors are uncertain by {1e6 * self.gravity / G0:.0f}e-6 for that"
+            " scale factors are uncertain by"
+            f" {1e6 * self.gravity_sigma / G0:.0f}e-6 for that"
         )
         return (
             f"the base sways by {np.rad2deg(self.amplitude):.2g}° at {self.hz:.2g} Hz:"
             " this is taken out of the windows, and what it leaves open is in the ±;"
-            f" each position needs {self.seconds:.0f} s on such a base"
-            f"{unknown if self.gravity else ''}"
+            f" each position needs {self.needed_seconds:.0f} s on such a base"
+            f"{unknown if self.gravity_sigma else ''}"
         )
 
 
-def swaying(block: Block, about: Description) -> Swaying | None:
-    """Look whether the base sways; None where it does not, or nobody can tell.
+def find_base_sway(block: Block, about: Description) -> BaseSway | None:
+    """Sway of the base; None if it does not sway, or if this cannot be decided.
 
-    Gyroscopes tell turning from what pushes; without any, accelerometers leave it
-    open. Positions must be known, as the device turns in a hand as well, and there
-    about nothing.
+    Gyroscopes separate rotation from acceleration; accelerometers alone do not. The
+    positions must be known, since a device in a hand also rotates.
     """
     gyroscopes = np.isfinite(block.gyr).any(axis=0)
-    if not _fixed(about) or gyroscopes.any() != gyroscopes.all():
+    if not _on_known_positions(about) or gyroscopes.any() != gyroscopes.all():
         return None
-    scale, windows = about.nominal["gyr_scale"], spans(block, about)
+    scale, windows = about.nominal["gyr_scale"], window_bounds(block, about)
     found = {
         p: some
         for p, (a, b) in enumerate(windows)
@@ -107,13 +107,13 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
     left = np.array([
         sum(w.excess_variance for w in found[p]) / len(found[p]) ** 2 if p in found
-        else _at_ends(sizes.mean(axis=0), block.t[a:b], about.gravity)
+        else _unseen_sway_variance(sizes.mean(axis=0), block.t[a:b], about.gravity)
         for p, (a, b) in enumerate(windows)
     ])  # fmt: skip
     root = np.sqrt(max(len(found) - 1, 1))
     noise = [w.noise * w.length for some in found.values() for w in some]
-    return Swaying(
-        _at_rest(block, windows, found, scale),
+    return BaseSway(
+        _without_sway(block, windows, found, scale),
         left,
         np.sqrt(np.mean(noise, axis=0) * rate_of(block)),
         float(np.sqrt((amplitude**2).mean())),
@@ -124,30 +124,30 @@ def swaying(block: Block, about: Description) -> Swaying | None:
     )
 
 
-def _at_ends(size: Array, t: Array, gravity: float) -> Array:
-    """Variance (6,) of means of a window that does not show the swaying by itself.
+def _unseen_sway_variance(size: Array, t: Array, gravity: float) -> Array:
+    """Variance (6,) of the means of a window in which no sway was found.
 
-    The mean of a wave is what its ends leave of it, sqrt(2) of its size over w T.
+    The mean of a wave over T has the size sqrt(2) / (w T) of the wave.
     """
     length = float(np.ptp(t)) if len(t) > 1 else np.inf
     turned = 2 * size[0] / max(size[1] / size[0], 1e-12) / length**2
     return np.repeat([gravity**2 * turned, 2 * size[0] / length**2], 3)
 
 
-def _fixed(about: Description) -> bool:
+def _on_known_positions(about: Description) -> bool:
     """Whether the device is held in positions that are known, and on no rate table."""
     positions = about.positions
     known = all(p.oriented for p in positions)
     return bool(positions) and known and not rates(positions).any()
 
 
-def _at_rest(
+def _without_sway(
     block: Block,
     windows: NDArray[np.intp],
     found: dict[int, list[SwayWaves]],
     scale: Array,
 ) -> Block:
-    """Samples as they would be on a base at rest."""
+    """Samples corrected to a base at rest."""
     six, rate = block.six, rate_of(block)
     for p, some in found.items():
         a, b = (int(i) for i in windows[p])

@@ -51,13 +51,13 @@ CLEARLY = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Round:
-    """What goes round in one window.
+class RotatingEarthRate:
+    """The part of the Earth's rate that rotates with a table, in one window.
 
     Attributes
     ----------
-    values : (k, 3) in each of the outputs, rad/s; none where it is not known
-    covariance : (3, 3) that the mean of the others is uncertain by for it
+    values : (k, 3) in each of the outputs, rad/s; 0 if it is not known
+    covariance : (3, 3) of the window's mean after it is subtracted
 
     """
 
@@ -66,15 +66,15 @@ class Round:
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
-    """What gyroscopes read in the positions of a session.
+class GyroReadings:
+    """Angular rates that the gyroscopes measure in the positions of a session.
 
     Attributes
     ----------
     positions : of the session
     position : (n,) index of each row's
-    w : (n, 3) what they read, about rad/s in device axes; nan where nothing
-    earth : rad/s, length of the rate at rest; 0 where it is not seen
+    w : (n, 3) measured rates, rad/s in device axes; nan where missing
+    earth : rad/s, length of the Earth's rate; 0 if the gyroscopes do not measure it
 
     """
 
@@ -84,9 +84,9 @@ class Readings:
     earth: float = 0.0
 
     def rates(self, mounting: Array) -> Array:
-        """Rates that a table adds, (n, 3) rad/s about procedure axes.
+        """Rates of a rate table, (n, 3) rad/s about procedure axes.
 
-        About an axis that nobody knows: along what is read in each position.
+        If its axis is not known, the direction is that measured in each position.
         `mounting` (3, 3) is P, procedure = P device.
         """
         out: Array = rates(self.positions)[self.position]
@@ -98,9 +98,9 @@ class Readings:
         return out
 
     def earth_rates(self) -> Array:
-        """The Earth's rate in device axes where nobody knows the orientation, (n, 3).
+        """The Earth's rate in device axes in rows of unknown orientation, (n, 3).
 
-        Along what is read, where enough positions tell bias and direction; else 0.
+        Along the measured rate if enough positions determine the bias; else 0.
         """
         out = np.zeros((len(self.position), 3))
         free = [
@@ -119,28 +119,28 @@ class Readings:
         return out
 
     def _pointing(self, speed: Array) -> tuple[Array, bool]:
-        """Means of the positions less their bias, and whether that is known, (3)."""
+        """Means of the positions less the bias, and whether that is determined, (3)."""
         mean = np.zeros((len(self.positions), 3))
         held = np.unique(self.position)
         for p in held:
             mean[p] = np.nan_to_num(self.w[self.position == p]).mean(axis=0)
         here = [p for p in held if not any(self.positions[p].rate or ())]
         length = np.where(speed > 0, speed, self.earth)
-        bias, known = _centre(mean[here], length[here])
+        bias, known = _bias_from_norms(mean[here], length[here])
         mean[here] -= bias
         return mean, known
 
 
 def _unit(w: Array) -> Array:
-    """Where a rate points; anywhere if it is none."""
+    """Unit vector along a rate; an arbitrary one if the rate is 0."""
     length = float(np.linalg.norm(w))
     return w / length if length > 0 else np.array([0.0, 1.0, 0.0])
 
 
-def _centre(w: Array, length: Array) -> tuple[Array, bool]:
-    """Offset that leaves rates (p, 3) of such lengths (p,), rad/s, and if it is known.
+def _bias_from_norms(w: Array, length: Array) -> tuple[Array, bool]:
+    """Bias of rates (p, 3) of known lengths (p,), rad/s, and whether it is determined.
 
-    Nothing where they do not tell it: what is read is then all there is.
+    Zero if it is not, (3).
     """
     size = float(np.abs(w).max(initial=1e-12))
     design = np.column_stack([2 * w / size, -np.ones(len(w))])
@@ -151,10 +151,10 @@ def _centre(w: Array, length: Array) -> tuple[Array, bool]:
     return size * found[:3], True
 
 
-def going_round(
+def fit_rotating_earth_rate(
     t: Array, rate: Array, gyr: Array, sd: Array, scale: Array, length: Array | float
-) -> Round:
-    """Find what goes round in one window.
+) -> RotatingEarthRate:
+    """Fit the part of the Earth's rate that rotates with a table in one window.
 
     Parameters
     ----------
@@ -168,7 +168,9 @@ def going_round(
     speed = float(np.linalg.norm(rate))
     turned = speed * float(np.ptp(t))
     used = np.isfinite(gyr).all(axis=1) & np.isfinite(sd).all(axis=1)
-    none = Round(np.zeros_like(gyr), _unknown(rate / speed, turned))
+    none = RotatingEarthRate(
+        np.zeros_like(gyr), _unseen_rate_covariance(rate / speed, turned)
+    )
     if turned < 2 * np.pi * TURNS or used.sum() < 3:
         return none
     shape = scale[:, None] * _unit_vectors(rate / speed, speed * (t - t[0]))
@@ -187,11 +189,11 @@ def going_round(
     if np.linalg.norm(found[3:]) > EARTH_RATE + CLEARLY * sigma:
         return none
     mean = shape[used].mean(axis=0)
-    return Round(shape @ found[3:], mean @ covariance @ mean.T)
+    return RotatingEarthRate(shape @ found[3:], mean @ covariance @ mean.T)
 
 
-def _unknown(axis: Array, turned: float) -> Array:
-    """Covariance of the mean where nothing is taken out, (2)."""
+def _unseen_rate_covariance(axis: Array, turned: float) -> Array:
+    """Covariance of the mean if nothing is subtracted, (2)."""
     size = 2 / 3 * EARTH_RATE**2 * min(0.5, 1 / max(turned, 1e-9) ** 2)
     across: Array = size * (np.eye(3) - np.outer(axis, axis))
     return across

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.noise import grain_of, noise_of
+from fieldcal.model.rows.noise import noise_of, rounding_noise
 from fieldcal.windows.noise import ChannelNoise, short_lag_noise
 
 LOUDER = 6.0
@@ -38,15 +38,15 @@ STEPS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Shaking:
-    """How noisy the windows of a recording are.
+class WindowNoise:
+    """Noise of the windows of a recording.
 
     Attributes
     ----------
-    noise : (6,) usual deviation of one sample
-    levels : (w, 6) deviation of one sample that the means of each window obey
+    noise : (6,) usual standard deviation of one sample
+    levels : (w, 6) standard deviation of one sample that applies to each window's means
     variance : (w, 3) of the accelerometers' samples in each window, (m/s^2)^2
-    block : the samples without the lines that shake single windows
+    block : the samples without the vibration lines of single windows
 
     """
 
@@ -56,13 +56,15 @@ class Shaking:
     block: Block
 
 
-def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
+def measure_window_noise(
+    block: Block, windows: NDArray[np.intp], rate_hz: float
+) -> WindowNoise:
     """Measure the noise of every window.
 
-    The usual noise is that of the quiet windows. Others have more: what their samples
-    have on top of it, or, if that is less, what means over a second have.
+    The usual noise is that of the quiet windows. In others, the smaller of two levels
+    applies: the excess noise of samples, or the noise of means over a second.
     """
-    found, more, loud = _compared(block, windows, rate_hz)
+    found, more, loud = _compare_windows(block, windows, rate_hz)
     noise = found.white
     levels = np.sqrt(noise**2 + more)
     variance = levels[:, :3] ** 2
@@ -78,26 +80,28 @@ def shaking(block: Block, windows: NDArray[np.intp], rate_hz: float) -> Shaking:
     for i in np.flatnonzero(loud).tolist():
         alone = noise_of(block, windows[i : i + 1], rate_hz).white
         levels[i] = np.fmax(noise, np.fmin(levels[i], alone))
-    return Shaking(noise, levels, variance, block)
+    return WindowNoise(noise, levels, variance, block)
 
 
-def usual_noise(
+def quiet_window_noise(
     block: Block, windows: NDArray[np.intp], rate_hz: float
 ) -> ChannelNoise:
     """Noise of one sample in the quiet windows, (6,)."""
-    return _compared(block, windows, rate_hz)[0]
+    return _compare_windows(block, windows, rate_hz)[0]
 
 
-def _compared(
+def _compare_windows(
     block: Block, windows: NDArray[np.intp], rate_hz: float
 ) -> tuple[ChannelNoise, Array, NDArray[np.bool_]]:
-    """Usual noise (6,), what windows have on top (w, 6), and which are loud (w,)."""
+    """Usual noise (6,), excess variance of windows (w, 6), and loud windows (w,)."""
     out = np.empty((len(windows), 6))
     for i, (a, b) in enumerate(windows):
         out[i] = np.concatenate(
             [short_lag_noise(t[a:b]) for t in (block.acc, block.gyr)]
         )
-    grain = grain_of(block, windows)  # outputs may stay on one step all through some
+    grain = rounding_noise(
+        block, windows
+    )  # outputs may stay on one step all through some
     stands = _never_changes(out, grain)
     out[stands] = np.nan
     known = np.maximum(np.isfinite(out).sum(axis=0), 1)
@@ -117,9 +121,9 @@ def _compared(
 
 
 def _never_changes(levels: Array, grain: Array) -> NDArray[np.bool_]:
-    """Windows in which an output never changes, though in others noise exceeds a step.
+    """Windows in which an output never changes although its noise exceeds a step.
 
-    On its rail or stuck it tells nothing of the noise.
+    The output is stuck or saturated there, and has no information on the noise.
 
     Parameters
     ----------
@@ -147,15 +151,15 @@ def without_lines(piece: Array, rate_hz: float) -> Array:
     if known.sum() < 64 or len(piece) > LONGEST:
         return out
     for _ in range(LINES):
-        hz = _strongest(out[known], rate_hz)
+        hz = _strongest_line_hz(out[known], rate_hz)
         if hz is None:
             break
-        out = out - _fitted(t, out, known, hz)
+        out = out - _fit_line(t, out, known, hz)
     return out
 
 
-def _strongest(y: Array, rate_hz: float) -> float | None:
-    """Frequency that stands out most, Hz; None if none does."""
+def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
+    """Frequency of the strongest significant line, Hz; None if there is none."""
     n = 4 << (len(y) - 1).bit_length()
     taper = np.hanning(len(y))[:, None]
     power = np.abs(np.fft.rfft((y - y.mean(axis=0)) * taper, n, axis=0)) ** 2
@@ -169,7 +173,7 @@ def _strongest(y: Array, rate_hz: float) -> float | None:
     return float(hz[hz >= LOWEST_HZ][at]) if total[at] > STANDS else None
 
 
-def _fitted(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
+def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
     """The line near a frequency, (n, c), its frequency fitted to all outputs."""
     for _ in range(STEPS):
         design = _waves(t, hz)

@@ -1,4 +1,4 @@
-"""The state at the estimate of a set: what is not linear is linear about it.
+"""The base state at the estimate of a set, by iterated linearisation.
 
 Source: Gauss and Newton.
 """
@@ -17,8 +17,8 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
-from fieldcal.model.system.fitted import whole
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.fitted import estimates_by_column
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import System, gram
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turn
@@ -32,13 +32,13 @@ CONVERGED = 0.03
 
 
 class GaussNewton:
-    """States of one session, and what its rows say about them.
+    """Linearises the rows of a session about states, and fits sets.
 
     Parameters
     ----------
     system : rows and their dictionary
-    nominal : the state that a simulation starts from
-    turns : what makes rows of turns, if there are any
+    nominal : nominal state
+    turns : makes the rows of turns; None if there are no turns
 
     """
 
@@ -47,46 +47,46 @@ class GaussNewton:
     ) -> None:
         self.system, self.nominal, self.turns = system, nominal, turns
         self.dictionary: Dictionary = system.dictionary
-        self.turned: list[TurnRows] = []
+        self.turn_rows: list[TurnRows] = []
 
-    def padded(self, values: Array) -> Array:
-        """Values with those of columns that were added since: zero."""
+    def pad(self, values: Array) -> Array:
+        """Values of columns, padded with zeros for columns that were added since."""
         return np.pad(values, (0, self.dictionary.width - len(values)))
 
-    def wanted(self, members: Sequence[Member]) -> NDArray[np.bool_]:
-        """Columns of a set, and the turns of unknown orientations."""
+    def wanted_columns(self, members: Sequence[Member]) -> NDArray[np.bool_]:
+        """Columns of a set, permanent groups, and rotations of unknown orientations."""
         d = self.dictionary
         wanted = np.zeros(d.width, dtype=bool)
         for group in [*d.always, *d.unfitted, *(g for _, g in members)]:
             wanted[group.columns] = True
-        if d.free.any():
+        if d.unoriented.any():
             wanted[d.rotations] = True
         return wanted
 
     def gram(self, state: State, values: Array, known: Set | None) -> Gram:
-        """What all rows say of all columns about a state."""
-        values = self.padded(values)
+        """Gram matrix of all rows and columns about a state."""
+        values = self.pad(values)
         linear = self.system.linearised(state)
         if self.turns is not None:
-            self.turned = self.turns.linearised(state, values, linear, known)
-        return gram(linear, self.dictionary, values, self.turned)
+            self.turn_rows = self.turns.linearised(state, values, linear, known)
+        return gram(linear, self.dictionary, values, self.turn_rows)
 
-    def followed(self, state: State, values: Array) -> None:
-        """Follow the turns about a state; the accelerometers on the way are left."""
+    def follow_turns(self, state: State, values: Array) -> None:
+        """Update the rows of turns about a state, without the accelerometers' rows."""
         if self.turns is None:
             return
-        free = self.dictionary.free.any()  # only there windows say where turns end
+        free = self.dictionary.unoriented.any()  # else turns end at known attitudes
         linear = self.system.linearised(state) if free else []
-        self.turned = self.turns.linearised(state, self.padded(values), linear, None)
+        self.turn_rows = self.turns.linearised(state, self.pad(values), linear, None)
 
     def gram_of(
-        self, linear: Sequence[Linear], values: Array, wanted: NDArray[np.bool_]
+        self, linear: Sequence[LinearRows], values: Array, wanted: NDArray[np.bool_]
     ) -> Gram:
-        """What rows say of some columns, linearised already; turns as they were."""
+        """Gram matrix of some columns from linearised rows, with the current turns."""
         d, some = self.dictionary, np.flatnonzero(wanted)
-        return gram(linear, d, self.padded(values), self.turned, some)
+        return gram(linear, d, self.pad(values), self.turn_rows, some)
 
-    def settled(
+    def settle(
         self,
         state: State,
         values: Array,
@@ -94,56 +94,56 @@ class GaussNewton:
         sizes: Sizes | None = None,
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
-        values = self.padded(values)
+        values = self.pad(values)
         for _ in range(NEWTON):
-            wanted = self.wanted(members) | (values != 0)
+            wanted = self.wanted_columns(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
             rows = self.gram_of(linear, values, wanted)
             search = Search(self.dictionary, rows)
-            found = search.evaluated(members, sizes)
+            found = search.evaluate(members, sizes)
             sizes = found.sizes
             before = values
-            state, values = self.moved(found)
-            if self.step(found, before, values) < CONVERGED:
+            state, values = self.state_at_estimate(found)
+            if self.largest_step(found, before, values) < CONVERGED:
                 break
         return state, values, found
 
-    def step(self, found: Set, before: Array, values: Array) -> float:
-        """The largest step of what is in the state, in standard deviations of a set."""
+    def largest_step(self, found: Set, before: Array, values: Array) -> float:
+        """Largest change of the state's parameters, in their standard deviations."""
         error = np.sqrt(np.maximum(np.diag(found.state.inverse), 1e-300))
-        step = np.abs(values - self.padded(before))[found.state.columns] / error
+        step = np.abs(values - self.pad(before))[found.state.columns] / error
         counted = np.isin(found.state.columns, self._nonlinear(found.members))
         return float(step[counted].max(initial=0.0))
 
     def _nonlinear(self, members: tuple[Member, ...]) -> Array:
-        """Columns whose values are in the state: all that are no course in time."""
+        """Columns whose estimates the state contains."""
         groups = [*self.dictionary.always, *(g for _, g in members)]
         return np.concatenate([g.columns for g in groups if g.in_state])
 
-    def turns_by(self, state: State) -> list[Turn]:
-        """The turns as a state follows them."""
-        return [] if self.turns is None else list(self.turns.turning.turns(state))
+    def turns_at(self, state: State) -> list[Turn]:
+        """The turns integrated with a state."""
+        return [] if self.turns is None else list(self.turns.tracker.turns(state))
 
-    def on_turns(
+    def outputs_in_turns(
         self, turns: Sequence[Turn], state: State, members: Sequence[Member]
     ) -> Iterator[Array]:
-        """What some causes of a state make of the outputs in turns, (m + 1, 6) each."""
+        """Contribution of some causes to the outputs in turns, (m + 1, 6) each."""
         if self.turns is None:
             return
         terms = tuple(
             t for t in state.terms
             if any(t.effect is g.effect for _, g in members)
         )  # fmt: skip
-        yield from self.turns.courses(turns, state, terms)
+        yield from self.turns.outputs_of_terms(turns, state, terms)
 
-    def moved(self, found: Set) -> tuple[State, Array]:
+    def state_at_estimate(self, found: Set) -> tuple[State, Array]:
         """The state at a set's estimate, and its columns' values."""
         d = self.dictionary
         kept = np.zeros(d.width, dtype=bool)
         kept[self._nonlinear(found.members)] = True
-        if d.free.any():
+        if d.unoriented.any():
             kept[d.rotations] = True
-        values = np.where(kept, whole(found.state, d), 0.0)
+        values = np.where(kept, estimates_by_column(found.state, d), 0.0)
         nominal = self.nominal
         terms = [Term(t.effect, t.values, t.shape, t.origin) for t in nominal.terms]
         for _, group in found.members:
@@ -163,7 +163,7 @@ class GaussNewton:
         return state, values
 
     def _attitude(self, values: Array) -> Iterator[Array]:
-        """What measured attitudes are off by, (p, 3), where there are any."""
+        """Errors of measured attitudes, (p, 3), if there are any."""
         d = self.dictionary
         if d.attitude >= 0:
-            yield values[d.attitude : d.attitude + 3 * d.places].reshape(-1, 3)
+            yield values[d.attitude : d.attitude + 3 * d.position_count].reshape(-1, 3)

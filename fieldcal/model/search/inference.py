@@ -1,8 +1,8 @@
-"""From rows to an explanation: linearise, search, move the state, until both stay.
+"""From rows to an explanation: linearise, search and update the state until both stay.
 
-The search is exact in what is linear. A set that was found moves the state to its
-estimate, where everything is linearised and searched again, beginning with that set.
-What a part of the same recording was explained by may be begun with as well.
+The search is exact for the linearised rows. The state is updated to the estimate of the
+set that was found; there all rows are linearised and searched again, starting from that
+set. The search may also start from an explanation of a part of the recording.
 """
 
 from __future__ import annotations
@@ -16,48 +16,47 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.search.proportion import in_proportion
+from fieldcal.model.search.proportion import proportional_causes
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State
-from fieldcal.model.system.fitted import whole
+from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 
 PASSES = 8
-"""Linearisations at most; a set that comes and goes is settled by weight."""
+"""Largest number of linearisations; of sets that alternate, the likelier is kept."""
 
 OWN_SIGMA = 0.5
-"""Fall of ln Z where a time constant is off by its own uncertainty."""
+"""Decrease of ln Z if a time constant is off by its own uncertainty."""
 
-STAYED = 1.0
+SMALL_STEP = 1.0
 """Largest step of a column, in standard deviations, after which rows of turns need not
 be linearised again."""
 
 SCATTERED = 4.0
-"""Instability, in that of a typical device, behind which causes may be that nothing but
-each other shows."""
+"""Instability, in typical ones, above which causes may hide that show only together."""
 
 Key = tuple[tuple[str, int], ...]
-"""Of a set: the keys of its causes with their variants."""
+"""Key of a set: the keys of its causes with their variants."""
 
-AFAR = 0.05
+LARGE_ANGLE = 0.05
 """An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
 
 
 @dataclass(frozen=True, slots=True)
-class Inferred:
-    """What was found.
+class InferenceResult:
+    """Result of an inference.
 
     Attributes
     ----------
-    inference : it was found by
+    inference : that found it
     search : about the last state
     best : the set of the highest weight
     state : its estimate
     values : (k,) of the dictionary's columns in that state
-    turned : rows of the turns about it
-    contradicted : windows between which the gyroscopes lead elsewhere about it
-    been : sets that a state of their own was found for, by their keys
+    turn_rows : rows of the turns about it
+    contradicted_turns : pairs of windows whose attitudes contradict the gyroscopes
+    visited_keys : keys of the sets for which a state was calculated
 
     """
 
@@ -66,57 +65,56 @@ class Inferred:
     best: Set
     state: State
     values: Array
-    turned: Sequence[TurnRows]
-    contradicted: tuple[tuple[int, int], ...]
-    been: frozenset[Key]
+    turn_rows: Sequence[TurnRows]
+    contradicted_turns: tuple[tuple[int, int], ...]
+    visited_keys: frozenset[Key]
 
 
 class Inference(Refinement):
     """The inference of one session."""
 
-    def run(self, begin: Sequence[Member] | None = None) -> Inferred:
-        """Search until set and state stay.
+    def run(self, begin: Sequence[Member] | None = None) -> InferenceResult:
+        """Search until set and state no longer change.
 
         Parameters
         ----------
-        begin : of any dictionary, what it is to begin with instead of with nothing;
-            other states to begin from are then not looked for, nor pairs of causes of
-            which neither is worth anything by itself
+        begin : members of any dictionary to start from, instead of the empty set; other
+            starting states and the costly changes of sets are then not tried
 
         """
         start: Array = np.zeros(self.dictionary.width)
-        state, values, _ = self.settled(self.nominal, start, ())
+        state, values, _ = self.settle(self.nominal, start, ())
         search = Search(self.dictionary, self.gram(state, values, None))
         if begin is not None:
-            found = search.upheld(self.dictionary.like(begin))
+            found = search.drop_superfluous(self.dictionary.match_members(begin))
         if begin is None or (begin and not found.members):
-            state, values, found = self._from_nothing(state, values, search)
-        about = dict.fromkeys([found, search.evaluated(())])
-        self.dictionary.joined(in_proportion(self.dictionary, list(about)))
-        return self._until_it_stays(state, values, found, thorough=begin is None)
+            state, values, found = self._search_from_nominal(state, values, search)
+        about = dict.fromkeys([found, search.evaluate(())])
+        self.dictionary.add_causes(proportional_causes(self.dictionary, list(about)))
+        return self._iterate(state, values, found, thorough=begin is None)
 
-    def resumed(self, better: Set, before: Inferred) -> Inferred:
-        """Go on with a set that is better than what was found before.
+    def resume(self, better: Set, before: InferenceResult) -> InferenceResult:
+        """Continue from a better set than that of an earlier result.
 
-        What leads back to a set that was gone through before would lead to all that
-        followed it: of several that are about as likely, each leads to the next one.
+        It ends at a set that was visited before: sets of about equal weight would
+        otherwise lead to each other in a cycle.
         """
         start: Array = np.zeros(self.dictionary.width)
-        state, values, _ = self.settled(self.nominal, start, ())
-        return self._until_it_stays(state, values, better, False, before.been)
+        state, values, _ = self.settle(self.nominal, start, ())
+        return self._iterate(state, values, better, False, before.visited_keys)
 
-    def _until_it_stays(
+    def _iterate(
         self,
         state: State,
         values: Array,
         found: Set,
         thorough: bool,
         been: frozenset[Key] = frozenset(),
-    ) -> Inferred:
-        """Settle and search in turn, from a set, about a state that has no members.
+    ) -> InferenceResult:
+        """Update the state and search in turn, starting from set `found`.
 
-        What costs much is tried if it is to be `thorough`, where the rest stays. A set
-        that has `been` gone through ends it.
+        If `thorough`, costly changes are tried once cheap ones find nothing. A set in
+        `been` ends it.
         """
         members: tuple[Member, ...] = ()
         seen = set(been)
@@ -124,114 +122,111 @@ class Inference(Refinement):
         for _ in range(PASSES):
             seen.add(Search.key(found.members))
             if found.members != members:
-                state, values, _ = self.settled(
+                state, values, _ = self.settle(
                     state, values, found.members, found.sizes
                 )
-                members = self.shaped(state, values, found.members, found.sizes)
+                members = self.refine_shapes(state, values, found.members, found.sizes)
                 # with the columns that are in the state now: those of the grid's
                 # points, estimated beside, would be taken off the way a second time
-                state, values, found = self.settled(state, values, members, found.sizes)
+                state, values, found = self.settle(state, values, members, found.sizes)
             search = Search(self.dictionary, self.gram(state, values, found))
             for before in passed:
-                search.evaluated(before)  # it may be as likely as what replaced it
+                search.evaluate(before)  # it may be as likely as what replaced it
             passed[found.members] = None
             found = search.run(members, thorough=False)
             same = frozenset(c.key for c, _ in members)
             if thorough and found.keys == same:
                 found = search.run(members)
             if found.keys == same:
-                own = search.evaluated(members, found.sizes)  # with its own shapes
+                own = search.evaluate(members, found.sizes)  # with its own shapes
                 # a point of the grid next to where a time constant was refined
                 back = Search.key(found.members) in seen
                 if found.score <= own.score + (OWN_SIGMA if back else SETTLED):
                     found = own
-                    there, moved, _ = self.settled(state, values, members, found.sizes)
-                    if self.step(found, values, moved) < STAYED:
+                    there, moved, _ = self.settle(state, values, members, found.sizes)
+                    if self.largest_step(found, values, moved) < SMALL_STEP:
                         break
                     state, values = there, moved
                     continue
             if Search.key(found.members) in seen:
                 break
-        astray = self.turns.turning.contradicted if self.turns is not None else ()
-        return Inferred(
-            self, search, found, state, self.padded(values), self.turned, tuple(astray),
+        astray = self.turns.tracker.contradicted_turns if self.turns is not None else ()
+        return InferenceResult(
+            self, search, found, state, self.pad(values), self.turn_rows, tuple(astray),
             frozenset(seen),
         )  # fmt: skip
 
-    def _from_nothing(
+    def _search_from_nominal(
         self, state: State, values: Array, search: Search
     ) -> tuple[State, Array, Set]:
-        """The best set about a state of nothing, or about another beginning."""
-        best, turned = (state, values, search.run(thorough=False)), self.turned
-        for begin in self._beginnings(search, best[2]):
-            there, moved, _ = self.settled(state, values, begin.members, begin.sizes)
+        """The best set about the nominal state, or about another starting set."""
+        best, turned = (state, values, search.run(thorough=False)), self.turn_rows
+        for begin in self._starting_sets(search, best[2]):
+            there, moved, _ = self.settle(state, values, begin.members, begin.sizes)
             about = Search(self.dictionary, self.gram(there, moved, None))
             found = about.run(begin.members, thorough=False)
             if found.score > best[2].score:
-                best, turned = (there, moved, found), self.turned
-        self.turned = turned
+                best, turned = (there, moved, found), self.turn_rows
+        self.turn_rows = turned
         return best
 
-    def _beginnings(self, search: Search, found: Set) -> Iterator[Set]:
-        """Sets whose states may be far from that of nothing, and explain more."""
-        if (far := self._afar(search)) is not None:
+    def _starting_sets(self, search: Search, found: Set) -> Iterator[Set]:
+        """Starting sets whose states may be far from the nominal one."""
+        if (far := self._set_with_large_angle(search)) is not None:
             yield far
         usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
         keys = {c.key for c, _ in usual}
         scatter = priors.SIZES[list(found.sizes.instability)]
         if (scatter.max() > SCATTERED and not keys <= found.keys) or (
-            self._turned_otherwise(found, keys)
+            self._turns_need_usual_causes(found, keys)
         ):
-            yield search.evaluated(usual)
+            yield search.evaluate(usual)
 
-    def _turned_otherwise(self, found: Set, usual: set[str]) -> bool:
-        """Whether turns are explained by what not every triad has, and not by that.
+    def _turns_need_usual_causes(self, found: Set, usual: set[str]) -> bool:
+        """Whether turns are explained by unusual causes, and not by all usual ones.
 
-        It bends the state, about which what every triad has looks worse than it is.
+        Usual causes look less likely about a state that contains unusual ones.
         """
         if usual <= found.keys:
             return False
         others = [group.columns for cause, group in found.members if not cause.usual]
         at = np.concatenate([np.empty(0, int), *others])
         return any(np.isin(t.columns[t.design.any(axis=0)], at).any()
-                   for t in self.turned)  # fmt: skip
+                   for t in self.turn_rows)  # fmt: skip
 
-    def _afar(self, search: Search) -> Set | None:
-        """A position set far from where it is said to be, if one seems to be.
+    def _set_with_large_angle(self, search: Search) -> Set | None:
+        """Set of one position with a large angle error, if there seems to be one.
 
-        No columns about the one place show the other: what is linear in the angle
-        leaves so much that it loses against whatever has more columns.
+        A large angle is not linear: about the stated angle its residuals make it less
+        likely than causes with more columns.
         """
-        nothing = search.evaluated(())
+        nothing = search.evaluate(())
         for offer in search.offers(nothing):
             cause, group = offer.member
             if cause.kind != "position":
                 continue
-            one = search.taken(nothing, offer)
-            there = whole(one.state, self.dictionary)[group.columns]
-            return one if np.abs(there).max() >= AFAR else None
+            one = search.accept(nothing, offer)
+            there = estimates_by_column(one.state, self.dictionary)[group.columns]
+            return one if np.abs(there).max() >= LARGE_ANGLE else None
         return None
 
-    def beside(self, found: Inferred, there: Set) -> Set:
-        """A set with its shapes refined, but for those that what was found has.
+    def refine_beside(self, found: InferenceResult, there: Set) -> Set:
+        """A set with its shapes refined, except those that the result contains.
 
-        What that takes of columns is not in the dictionary afterwards.
+        The columns that this needs are added to a copy of the dictionary.
         """
-        own = self.copied(found)
+        own = self.independent_copy(found)
         members, known = there.members, [g for _, g in found.best.members]
         for i, (_, group) in enumerate(members):
             if group.shape and group.effect is not None and group not in known:
-                members = own.refined(
+                members = own.refine_shape(
                     found.state, found.values, members, [i], there.sizes
                 )
         search = own.search_among(found.state, found.values, [members])
-        return search.evaluated(members, there.sizes)
+        return search.evaluate(members, there.sizes)
 
-    def copied(self, found: Inferred) -> Inference:
-        """The same about what was found, of which columns that are added are its own.
-
-        Turns are as they are about that.
-        """
-        own = Inference(self.system.apart(), self.nominal)
-        own.turned = list(found.turned)
+    def independent_copy(self, found: InferenceResult) -> Inference:
+        """A copy for a result, with its turns, to which columns can be added."""
+        own = Inference(self.system.independent_copy(), self.nominal)
+        own.turn_rows = list(found.turn_rows)
         return own

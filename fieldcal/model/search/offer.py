@@ -1,4 +1,4 @@
-"""One offer, and what a set may be given beside one instability."""
+"""Offers: causes that may be added to a set, each with its predicted score."""
 
 from __future__ import annotations
 
@@ -8,60 +8,60 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import Cause
-from fieldcal.model.causes.dictionary import AlikeGroups
+from fieldcal.model.causes.dictionary import EqualWidthGroups
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 
-Less = tuple[int, ...]
+InstabilityIndices = tuple[int, ...]
 """Indices of instabilities in `priors.SIZES`, (7,)."""
 
-Best = dict[Cause, tuple[float, int, int]]
-"""Of each cause what it would add, ln, the number of its variant, the index of size."""
+BestVariants = dict[Cause, tuple[float, int, int]]
+"""For each cause: log evidence that it adds, indices of its variant and size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Offer:
-    """A member that a set may be given.
+    """A member that may be added to a set.
 
     Attributes
     ----------
     member : cause and variant
-    score : of the set with it, predicted
-    size : index of its likeliest size
-    less : instability beside it
+    score : predicted score of the set with it
+    size : index of its most probable size
+    instability : indices of the set's instability with it
 
     """
 
     member: Member
     score: float
     size: int
-    less: Less
+    instability: InstabilityIndices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OfferTable:
-    """What may be added to a set beside one instability.
+    """Offers to a set at one instability.
 
     Attributes
     ----------
-    less : its instability
-    state, score : of the set
+    instability : its indices
+    state, score : of the set at this instability
     offers : the best first
 
     """
 
-    less: Less
+    instability: InstabilityIndices
     state: Eliminated
     score: float
     offers: list[Offer]
 
 
-def likelier(alike: AlikeGroups, apart: dict[int, Array]) -> Array:
-    """Odds of what is likelier there than not before the rows are seen, ln, (m,).
+def extra_log_odds(alike: EqualWidthGroups, apart: dict[int, Array]) -> Array:
+    """Positive log prior odds of groups, (m,); 0 for those unlikely before the rows.
 
-    What begins in one triad where the device was off does so in the other one, whether
-    or not rows show it; 0 of everything else.
+    A cause that begins in one triad where the device was off also begins in the other,
+    whether or not the rows show it.
     """
     out = np.zeros(len(alike.cause))
     for i, shares in apart.items():
@@ -70,8 +70,10 @@ def likelier(alike: AlikeGroups, apart: dict[int, Array]) -> Array:
     return out
 
 
-def offered(there: Set, score: float, less: Less, best: Best) -> list[Offer]:
-    """What was found for a set that has not got it, the best first."""
+def ranked_offers(
+    there: Set, score: float, less: InstabilityIndices, best: BestVariants
+) -> list[Offer]:
+    """Offers of causes that a set does not contain, the best first."""
     offers = [
         Offer((cause, cause.variants[v]), score + worth, size, less)
         for cause, (worth, v, size) in best.items()

@@ -34,30 +34,35 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.evidence.gram import ROUNDED, Eliminated, gained, gains
-from fieldcal.model.evidence.sizing import DENSITY, EVEN
+from fieldcal.model.evidence.gram import (
+    ROUNDED,
+    Eliminated,
+    evidence_gains,
+    gains_from_eigenvalues,
+)
+from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX
 from fieldcal.model.priors import SIZES
 
 Pair = tuple[int, int]
-Gained = tuple[float, Pair, Pair]
+PairGain = tuple[float, Pair, Pair]
 
 
-def pairs(
+def pair_gains(
     state: Eliminated,
     groups: Sequence[Group],
     sizes: Sequence[int],
     wanted: Sequence[Pair] | None = None,
     least: Sequence[float] | None = None,
-) -> Iterator[Gained]:
-    """Gain of every two groups beside a set, their numbers, and their sizes.
+) -> Iterator[PairGain]:
+    """Gain of pairs of groups in addition to a set: gain, group numbers, size indices.
 
     Parameters
     ----------
     state : the set, eliminated
-    groups : that it may be given
-    sizes : index in `priors.SIZES` of each one's likeliest size alone
-    wanted : numbers of the groups of each pair, all pairs if not given
-    least : gain below which each pair is of no use and may be left out
+    groups : that may be added
+    sizes : index in `priors.SIZES` of each group's most probable size alone
+    wanted : numbers of the groups of each pair; all pairs if None
+    least : gain below which each pair may be omitted
 
     """
     every = np.array(
@@ -68,7 +73,7 @@ def pairs(
     enough = np.full(len(every), -np.inf) if least is None else np.asarray(least)
     columns = np.concatenate([g.columns for g in groups])
     typical = np.concatenate([g.typical for g in groups])
-    inner, pull = state.rest(columns, typical)
+    inner, pull = state.schur_complement(columns, typical)
     first = np.cumsum([0, *(len(g.columns) for g in groups)])
     wide = np.diff(first)
     alone = {
@@ -81,15 +86,15 @@ def pairs(
         i, j = every[some].T
         one, two = alone[v].at_numbers(number[i]), alone[w].at_numbers(number[j])
         shared = inner[one.at[:, :, None], two.at[:, None, :]]
-        kept = _most(one, two, shared) >= enough[some]
+        kept = _gain_bound(one, two, shared) >= enough[some]
         if kept.any():
             both = (one.at_numbers(kept), two.at_numbers(kept), shared[kept])
             start = np.asarray(sizes)[i[kept]]
-            yield from _alike(*both, start, every[some[kept]].tolist())
+            yield from _gains_of_equal_widths(*both, start, every[some[kept]].tolist())
 
 
-def _most(one: _Alone, two: _Alone, shared: Array) -> Array:
-    """What no pair's gain is above, (n,), by (3)."""
+def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
+    """Upper bound of each pair's gain, (n,), by (3)."""
     if one.at.shape[1] > two.at.shape[1]:
         one, two, shared = two, one, np.swapaxes(shared, 1, 2)
     largest = np.full(len(shared), len(SIZES) - 1)
@@ -98,18 +103,18 @@ def _most(one: _Alone, two: _Alone, shared: Array) -> Array:
     beside = np.linalg.solve(inner, pull[:, :, None])[:, :, 0]
     own = (two.along**2 / (two.strength + SIZES[-1] ** -2)).sum(axis=1)
     square = own + (pull * beside).sum(axis=1)
-    most: Array = 0.5 * square + 2 * DENSITY.max()
+    most: Array = 0.5 * square + 2 * LOG_DENSITY.max()
     return most
 
 
-def _alike(
+def _gains_of_equal_widths(
     one: _Alone, two: _Alone, shared: Array, start: Index, both: Sequence[list[int]]
-) -> Iterator[Gained]:
-    """The same of pairs of which the first and the second are alike in width."""
+) -> Iterator[PairGain]:
+    """Gains of pairs whose first groups, and whose second groups, have equal widths."""
     first, then = _Beside(one, two, shared), _Beside(two, one, shared.swapaxes(1, 2))
     n = np.arange(len(both))
     found = []
-    for begin in (start, np.full(len(both), EVEN)):
+    for begin in (start, np.full(len(both), UNIT_INDEX)):
         v = then.profile(begin).argmax(axis=1)
         profile = first.profile(v)
         u = profile.argmax(axis=1)
@@ -149,7 +154,7 @@ class _Alone:
         seen = strength > ROUNDED * np.maximum(top, 1e-300)
         axes, strength = axes * seen[:, None, :], np.where(seen, strength, 0.0)
         along = (pulled[:, None, :] @ axes)[:, 0]
-        profile = gained(strength, along**2) + DENSITY
+        profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
         return cls(at, own, pulled, strength, axes, along, profile)
 
     def at_numbers(self, some: Index | NDArray[np.bool_]) -> Self:
@@ -158,7 +163,7 @@ class _Alone:
 
 
 class _Beside:
-    """Groups beside others, each at some size.
+    """Groups in addition to others of some sizes.
 
     Parameters
     ----------
@@ -173,7 +178,7 @@ class _Beside:
         self.wide = one.at.shape[1] > other.at.shape[1]
 
     def rest(self, size: Index) -> tuple[Array, Array]:
-        """What is left of the one beside the other at some sizes, (1)."""
+        """Matrices of the groups after elimination of the others at some sizes, (1)."""
         root, taken = self._taken(self.shared, size)
         return self.one.inner - root @ np.swapaxes(root, 1, 2), self.one.pull - taken
 
@@ -182,12 +187,12 @@ class _Beside:
         one = self.one
         if self.wide:
             root, taken = self._taken(np.swapaxes(one.axes, 1, 2) @ self.shared, size)
-            return self._in_axes(root, one.along - taken) + DENSITY
+            return self._in_axes(root, one.along - taken) + LOG_DENSITY
         own = np.diagonal(one.inner, 0, 1, 2).max(axis=1)
-        return gains(*self.rest(size), own) + DENSITY
+        return evidence_gains(*self.rest(size), own) + LOG_DENSITY
 
     def _taken(self, shared: Array, size: Index) -> tuple[Array, Array]:
-        """What the other takes at some sizes: S^T E^(1/2) and S^T E q."""
+        """S^T E^(1/2) and S^T E q of the others at some sizes."""
         other = self.other
         kept = 1 / (other.strength + 1 / SIZES[size, None] ** 2)
         taken = (shared @ (kept * other.along)[:, :, None])[:, :, 0]

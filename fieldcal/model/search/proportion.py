@@ -23,44 +23,50 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import FEW, TRIADS, Cause, Group
+from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.unknown_causes import typical
+from fieldcal.model.causes.unknown_causes import typical_unknown_sizes
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 
 
-def in_proportion(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
-    """Causes of one proportion about what is left beside each of some sets."""
+def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator[Cause]:
+    """Causes of proportional offsets, about the window offsets beside each set."""
     for part, channels in TRIADS:
         some = np.intersect1d(channels, dictionary.observed)
-        if len(some) < 2 or len(dictionary.held) <= FEW:
+        if len(some) < 2 or len(dictionary.window_positions) <= MIN_WINDOWS:
             continue
-        about = [_left(dictionary, one, some) for one in sets]
-        groups = tuple(_group(dictionary, part, some, left) for left in about)
+        about = [_window_offsets(dictionary, one, some) for one in sets]
+        groups = tuple(
+            _proportional_group(dictionary, part, some, left) for left in about
+        )
         yield Cause("position", part, priors.UNKNOWN, groups, "unknown")
 
 
-def _left(d: Dictionary, there: Set, some: Array) -> Array:
-    """What windows are off by beside a set, in typical sizes, (p, channels)."""
-    rows = there.state.rows.gram.weighed(priors.SIZES[0] * d.unstable)
-    state = Eliminated.of(rows, there.state.columns, there.state.sizes)
-    columns = np.concatenate([d.window(c) for c in some])
-    inner, pull = state.rest(columns, np.repeat(typical(d)[some], len(d.held)))
+def _window_offsets(d: Dictionary, there: Set, some: Array) -> Array:
+    """Offsets of the windows that a set does not explain, in typical sizes, (p, c)."""
+    rows = there.state.rows.gram.with_instability(
+        priors.SIZES[0] * d.typical_instability
+    )
+    state = Eliminated.of(rows, there.state.columns, there.state.prior_sigma)
+    columns = np.concatenate([d.window_columns(c) for c in some])
+    inner, pull = state.schur_complement(
+        columns, np.repeat(typical_unknown_sizes(d)[some], len(d.window_positions))
+    )
     inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
     left: Array = np.linalg.solve(inner, pull).reshape(len(some), -1).T
     return left
 
 
-def _group(d: Dictionary, part: str, some: Array, left: Array) -> Group:
-    """The group about the leading singular vectors of what is left."""
+def _proportional_group(d: Dictionary, part: str, some: Array, left: Array) -> Group:
+    """Group about the leading singular vectors of the offsets."""
     course, size, directions = np.linalg.svd(left, full_matrices=False)
     middle = course[:, 0] * np.sqrt(len(left))
-    directions = directions * typical(d)[some]  # (1), in outputs
+    directions = directions * typical_unknown_sizes(d)[some]  # (1), in outputs
 
     def of(view: RowView) -> Array:
-        inside = np.equal.outer(view.x.position, d.held).astype(float)
+        inside = np.equal.outer(view.x.position, d.window_positions).astype(float)
         out = np.zeros((len(inside), 6, len(left) + len(directions) - 1))
         out[:, some, : len(left)] = inside[:, None] * directions[0][:, None]
         out[:, some, len(left) :] = (inside @ middle)[:, None, None] * directions[1:].T

@@ -1,8 +1,8 @@
-"""Columns that change what is experienced in positions, as the turns between meet them.
+"""Columns that change the inputs in positions, and with them the ends of turns.
 
-The positions are changed once for all turns, by a step up and down of each column; of
-that a turn has its two ends. The closure phi_T of `turn` is linear in neither of them,
-so it moves by the difference of its values at both steps.
+The positions are changed once for all turns, by a step up and down of each column. A
+turn uses the two positions at its ends. The closure phi_T of `turn` is not linear in
+them, so its derivative is a central difference.
 """
 
 from __future__ import annotations
@@ -15,14 +15,18 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State
-from fieldcal.model.turns.attitude import between, closures, rows_of
-from fieldcal.model.turns.turn import Turn, only
+from fieldcal.model.turns.attitude import (
+    closures,
+    first_row_of_each,
+    interpolate_vectors,
+)
+from fieldcal.model.turns.turn import Turn, select_rows
 from fieldcal.physics.experience import Experience
 
 
 @dataclass(frozen=True, slots=True)
-class Ends:
-    """What is experienced in some positions or, of a turn, at its ends.
+class TurnEnds:
+    """Inputs in some positions, or at the two ends of a turn.
 
     Attributes
     ----------
@@ -36,30 +40,30 @@ class Ends:
     held: Array
 
     @classmethod
-    def of(cls, x: Experience) -> Ends:
-        """Of rows, (n, ...)."""
+    def of(cls, x: Experience) -> TurnEnds:
+        """Inputs of rows, (n, ...)."""
         return cls(x.f, x.w, x.to_device)
 
     @classmethod
-    def stacked(cls, some: list[Ends]) -> Ends:
-        """Several of the same positions, (k, n, ...)."""
+    def stacked(cls, some: list[TurnEnds]) -> TurnEnds:
+        """Stack several inputs of the same positions, (k, n, ...)."""
         return cls(
             *(np.stack([getattr(e, n) for e in some]) for n in ("f", "w", "held"))
         )
 
-    def at(self, *place: object) -> Ends:
-        """Some of them."""
-        return Ends(self.f[place], self.w[place], self.held[place])  # type: ignore[index]
+    def at(self, *place: object) -> TurnEnds:
+        """Some of the positions, by index."""
+        return TurnEnds(self.f[place], self.w[place], self.held[place])  # type: ignore[index]
 
-    def with_end(self, here: int, other: Ends) -> Ends:
-        """Both ends (2, ...) k times, one of them replaced by k others (k, ...)."""
+    def with_end(self, here: int, other: TurnEnds) -> TurnEnds:
+        """Both ends (2, ...), k times, with end `here` from `other` (k, ...)."""
         parts = []
         for name in ("f", "w", "held"):
             own, new = getattr(self, name), getattr(other, name)
             both = np.repeat(own[None], len(new), axis=0)
             both[:, here] = new
             parts.append(both)
-        return Ends(*parts)
+        return TurnEnds(*parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,36 +82,39 @@ class EndColumns:
     first: int
     places: Index
     each: bool
-    base: Ends
-    up: Ends
-    down: Ends
+    base: TurnEnds
+    up: TurnEnds
+    down: TurnEnds
     step: Array
 
     @classmethod
     def of(cls, first: int, one: General, x: Experience, state: State) -> EndColumns:
-        """Of a basis with `sides`; `x` are the windows' rows."""
+        """Evaluate a basis with `sides`; `x` are the windows' rows."""
         if one.sides is None:
             raise ValueError(f"{one.name} changes nothing in positions")
         places = np.unique(x.position)
-        plain = only(x, rows_of(x, places).tolist())
+        plain = select_rows(x, first_row_of_each(x, places).tolist())
         ups, downs, steps = zip(*one.sides(plain, state), strict=True)
         return cls(
-            first, places, one.each, Ends.of(state.experienced(plain)),
-            Ends.stacked([Ends.of(x) for x in ups]),
-            Ends.stacked([Ends.of(x) for x in downs]), np.array(steps),
+            first, places, one.per_position, TurnEnds.of(state.experienced(plain)),
+            TurnEnds.stacked([TurnEnds.of(x) for x in ups]),
+            TurnEnds.stacked([TurnEnds.of(x) for x in downs]), np.array(steps),
         )  # fmt: skip
 
-    def met_by(self, turn: Turn, scale: Array) -> tuple[Index, Array, Array]:
-        """Columns (k,) that a turn meets, their outputs, and how the closure moves.
+    def columns_for(self, turn: Turn, scale: Array) -> tuple[Index, Array, Array]:
+        """Columns (k,) of a turn, with derivatives of its outputs and of its closure.
 
-        Outputs (m + 1, 6, k) are those at the edges of the turn, for scale factors
-        (6,); the closure (3, k) moves by its own units.
+        Derivatives of the outputs at the turn's edges are (m + 1, 6, k), for scale
+        factors `scale` (6,); those of the closure (3, k), rad.
         """
         columns, up, down, step = self._at(np.searchsorted(self.places, turn.positions))
         f, w = ((a - b) / (2 * step[:, None, None])
                 for a, b in ((up.f, down.f), (up.w, down.w)))  # fmt: skip
         outputs = np.concatenate(
-            [between(turn.attitude, turn.done, *np.moveaxis(v, 0, 2)) for v in (f, w)],
+            [
+                interpolate_vectors(turn.attitude, turn.done, *np.moveaxis(v, 0, 2))
+                for v in (f, w)
+            ],
             axis=1,
         )
         end = turn.attitude[-1]
@@ -115,7 +122,7 @@ class EndColumns:
         moved = ((one - other) / (2 * step[:, None])).T
         return columns, outputs * scale[:, None], moved
 
-    def _at(self, ends: Index) -> tuple[Index, Ends, Ends, Array]:
+    def _at(self, ends: Index) -> tuple[Index, TurnEnds, TurnEnds, Array]:
         """Columns, both ends with each of them up and down, (k, 2, ...), and steps."""
         count = len(self.step)
         if not self.each:
@@ -125,7 +132,7 @@ class EndColumns:
         base = self.base.at(ends)
         columns = self.first + count * self.places[ends][:, None] + np.arange(count)
         up, down = (
-            _joined(
+            _concatenate(
                 base.with_end(i, some.at(slice(None), p)) for i, p in enumerate(ends)
             )
             for some in (self.up, self.down)
@@ -133,9 +140,9 @@ class EndColumns:
         return columns.ravel(), up, down, np.tile(self.step, 2)
 
 
-def _joined(parts: Iterator[Ends]) -> Ends:
-    """One after the other."""
+def _concatenate(parts: Iterator[TurnEnds]) -> TurnEnds:
+    """Concatenate along the columns."""
     some = list(parts)
-    return Ends(
+    return TurnEnds(
         *(np.concatenate([getattr(e, n) for e in some]) for n in ("f", "w", "held"))
     )

@@ -1,4 +1,4 @@
-"""A set with its residuals, as rows see them."""
+"""A fitted set with its residuals."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
+class FittedSet:
     """A set at a base state.
 
     Attributes
@@ -25,24 +25,24 @@ class Fitted:
     rows, dictionary : of the session
     linear : rows of each channel about the state
     values : (k,) of the dictionary's columns in the state
-    set : what is fitted
+    set : the fitted set
 
     """
 
     rows: Rows
     dictionary: Dictionary
-    linear: Sequence[Linear]
+    linear: Sequence[LinearRows]
     values: Array
     set: Set
 
     @property
     def estimate(self) -> Array:
-        """Of every column of the dictionary, (k,)."""
-        return whole(self.set.state, self.dictionary)
+        """Estimate of every column of the dictionary, (k,)."""
+        return estimates_by_column(self.set.state, self.dictionary)
 
     @property
-    def certain(self) -> Array:
-        """The same without what is random: that takes nothing from a residual."""
+    def deterministic_estimate(self) -> Array:
+        """The estimate without random groups, which are not subtracted in residuals."""
         out = self.estimate
         for group in self.dictionary.always:
             if group.random:
@@ -65,12 +65,15 @@ class Fitted:
 
     @property
     def squares(self) -> Array:
-        """Whitened squares of each channel, its windows' instability counted, (6,)."""
+        """Whitened squares of each channel, with its instability as noise, (6,)."""
         return self.squares_of(self.residual())
 
     def squares_of(self, residual: Array) -> Array:
-        """The same of other residuals, weighed alike."""
-        tau = priors.SIZES[list(self.set.sizes.instability)] * self.dictionary.unstable
+        """The same for other residuals."""
+        tau = (
+            priors.SIZES[list(self.set.sizes.instability)]
+            * self.dictionary.typical_instability
+        )
         out = np.zeros(6)
         for part in self.linear:
             c = part.channel
@@ -78,33 +81,35 @@ class Fitted:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
             info = np.add.reduceat(part.weight**2, first)
             mean = np.add.reduceat(white * part.weight, first) / info
-            shared = self.dictionary.common[part.window[first], c] ** 2 + tau[c] ** 2
+            shared = (
+                self.dictionary.window_error[part.window[first], c] ** 2 + tau[c] ** 2
+            )
             kept = 1 / (1 + info * shared)
             out[c] = float(white @ white) - float((info * mean**2) @ (1 - kept))
         return out
 
     @property
     def dof(self) -> int:
-        """Rows less what was estimated of them."""
+        """Degrees of freedom: number of rows less effective number of parameters."""
         free = self.set.state
-        spent = 1 - np.diag(free.inverse) / free.sizes**2
+        spent = 1 - np.diag(free.inverse) / free.prior_sigma**2
         return int(sum(len(p.white) for p in self.linear) - round(float(spent.sum())))
 
 
-def whole(state: Eliminated, dictionary: Dictionary) -> Array:
+def estimates_by_column(state: Eliminated, dictionary: Dictionary) -> Array:
     """Estimates of a set as values of every column of the dictionary, (k,).
 
-    Turns of positions whose orientation nobody knows are those that fit each best; none
-    where no output there says anything of them.
+    Rotations of positions with unknown orientation are fitted to the residuals; 0 where
+    no output depends on them.
     """
     out = np.zeros(dictionary.width)
     np.add.at(out, state.columns, state.estimate)
-    if dictionary.free.any() and state.rows.root.size:
+    if dictionary.unoriented.any() and state.rows.root.size:
         gram, at = state.rows.gram, state.rows.gram.index[state.columns]
         left = np.zeros(gram.info.shape)
         left[gram.info > 0] = state.rows.off - state.rows.white[:, at] @ state.estimate
-        for j, p in enumerate(dictionary.held):
-            if dictionary.free[j]:
+        for j, p in enumerate(dictionary.window_positions):
+            if dictionary.unoriented[j]:
                 pull = gram.loose[j].T @ state.rows.root[j].T @ left[j]
                 out[dictionary.rotations_of(p)] += priors.SMALL_ROTATION * pull
     return out

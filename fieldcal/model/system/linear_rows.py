@@ -8,7 +8,7 @@ from fieldcal.core.samples import Array, Index
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class LinearRows:
     """Rows of one channel, whitened.
 
     Attributes
@@ -16,10 +16,10 @@ class Linear:
     channel : index in `samples.CHANNELS`
     rows : (r,) which rows
     window : (r,) number of the window of each row
-    weight : (r,) what whitens
-    columns : (k,) of the dictionary that touch it
-    design : (r, k)
-    white : (r,) y - h(state)
+    weight : (r,) 1/sigma
+    columns : (k,) of the dictionary with influence on the channel
+    design : (r, k) whitened
+    white : (r,) whitened y - h(state)
 
     """
 

@@ -1,4 +1,4 @@
-"""The linearised system of a session: what its rows say of every column.
+"""The linearised system of a session: the Gram matrix of its rows.
 
     G = Phi^T R^-1 Phi,    b = Phi^T R^-1 (y - h(state) + Phi u(state))
 
@@ -24,16 +24,16 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
+from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_rows import TurnRows
 
 SHOWS = 1.0
-"""How far a column of typical size stands out of the noise of all rows together, in
-standard deviations, where they show it."""
+"""Least size of a column that rows show, in standard deviations of all rows together,
+for a parameter of typical size."""
 
 
 Parts = dict[int, list[tuple[Index, Array]]]
-"""Columns that touch each channel, with their values in all rows, (n, k)."""
+"""For each channel: columns with influence on it, and their values, (n, k)."""
 
 
 class System(ABC):
@@ -49,18 +49,20 @@ class System(ABC):
         self.dictionary = dictionary
 
     @abstractmethod
-    def apart(self) -> Self:
-        """The same rows with a dictionary of their own, as it is now."""
+    def independent_copy(self) -> Self:
+        """The same rows with a copy of the dictionary."""
 
     @abstractmethod
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[Linear]:
+    ) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
 
 
-def add_course(parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]) -> None:
-    """Add columns `at` of a function that is the same on every channel, those kept."""
+def append_course(
+    parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]
+) -> None:
+    """Append the columns `at` of a `Course`, as far as they are `kept`, to `parts`."""
     width = table.shape[1]
     for c, some in parts.items():
         own = slice(c * width, (c + 1) * width)
@@ -69,25 +71,26 @@ def add_course(parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]) -
 
 
 def gram(
-    linear: Sequence[Linear],
+    linear: Sequence[LinearRows],
     dictionary: Dictionary,
     values: Array,
     turns: Sequence[TurnRows] = (),
     columns: Index | None = None,
 ) -> Gram:
-    """Add up what rows say; `values` (k,) are those of the columns in the state.
+    """Gram matrix of windows, turns and prior knowledge.
 
-    `columns` are those wanted, all if not given.
+    `values` (k,) are those of the columns in the state; `columns` are those wanted, all
+    if None.
     """
     kept = np.arange(dictionary.width) if columns is None else np.unique(columns)
     index = np.full(dictionary.width, -1, dtype=np.intp)
     index[kept] = np.arange(len(kept))
-    held = dictionary.held
+    held = dictionary.window_positions
     size = len(held) + len(turns)
     kind = np.tile(np.arange(6), (size, 1))
     kind[len(held) :] = CLOSURE
     shared = np.zeros((size, 6))
-    shared[: len(held)] = dictionary.common
+    shared[: len(held)] = dictionary.window_error
     out = Gram(
         np.zeros((len(kept), len(kept))),
         np.zeros(len(kept)),
@@ -107,14 +110,14 @@ def gram(
         total.append(_add_turn(out, i, turn, values))
     if dictionary.known is not None:
         total.append(_add_known(out, dictionary.known))
-    for j in np.flatnonzero(dictionary.free):
+    for j in np.flatnonzero(dictionary.unoriented):
         at = index[dictionary.rotations_of(held[j])]
         out.loose[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
     return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
 
 
-def _add_windows(out: Gram, part: Linear, values: Array) -> tuple[float, int]:
-    """Add one channel's rows; back come its squares about the means and their count."""
+def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int]:
+    """Add one channel's rows; returns its squares about the means and their number."""
     c, all_ = part.channel, out.index[part.columns]
     there = all_ >= 0
     at, design = all_[there], part.design if there.all() else part.design[:, there]
@@ -135,7 +138,7 @@ def _add_windows(out: Gram, part: Linear, values: Array) -> tuple[float, int]:
 
 
 def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
-    """Add what is known from elsewhere of the columns that are here."""
+    """Add prior knowledge of columns; returns its squares and their number."""
     all_ = out.index[known.columns]
     at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
     out.within[np.ix_(at, at)] += design.T @ design
@@ -144,7 +147,7 @@ def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
 
 
 def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, int]:
-    """Add one turn's closure and way as well."""
+    """Add a turn's closure and way; returns the way's squares and their number."""
     all_, some = out.index[turn.columns], len(turn.closure)
     there = all_ >= 0
     at = all_[there]

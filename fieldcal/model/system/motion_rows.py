@@ -15,8 +15,8 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.rows.coloured import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.linear_system import SHOWS, Parts, System, add_course
+from fieldcal.model.system.linear_rows import LinearRows
+from fieldcal.model.system.linear_system import SHOWS, Parts, System, append_course
 
 
 class MotionSystem(System):
@@ -36,16 +36,16 @@ class MotionSystem(System):
 
     @property
     def motion(self) -> MotionRows:
-        """The rows as they stand beside their reference now."""
-        return self.dictionary.place.rows
+        """The rows at the current alignment with the reference."""
+        return self.dictionary.current.rows
 
-    def apart(self) -> MotionSystem:
-        """The same rows with a dictionary of their own, as it is now."""
-        return MotionSystem(self.dictionary.apart(), self.power)
+    def independent_copy(self) -> MotionSystem:
+        """The same rows with a copy of the dictionary."""
+        return MotionSystem(self.dictionary.independent_copy(), self.power)
 
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[Linear]:
+    ) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
         d, rows = self.dictionary, self.motion
         views = self._views(state)
@@ -53,12 +53,12 @@ class MotionSystem(System):
         white = rows.cosines(np.where(rows.used, off, 0.0))
         parts: Parts = {c: [] for c in d.observed.tolist()}
         asked = self._grouped() if wanted is None else wanted
-        for first, end, basis in d.spans():
+        for first, end, basis in d.basis_ranges():
             at, kept = np.arange(first, end), asked[first:end]
             if not kept.any():
                 continue
             if isinstance(basis, Course):
-                add_course(parts, at, rows.cosines(basis.of(views[0])), kept)
+                append_course(parts, at, rows.cosines(basis.evaluate(views[0])), kept)
                 continue
             table = self._table(basis, views)
             for c, some in parts.items():
@@ -73,23 +73,23 @@ class MotionSystem(System):
         return out
 
     def _views(self, state: State) -> list[RowView]:
-        """Rows of the accelerometers, and of gyroscopes that follow otherwise."""
+        """Rows with the accelerometers' inputs, and the gyroscopes' if different."""
         d = self.dictionary
-        inputs = [d.x] if d.later is d.x else [d.x, d.later]
+        inputs = [d.x] if d.gyro_inputs is d.x else [d.x, d.gyro_inputs]
         return [RowView.of(x, d.since, state) for x in inputs]
 
     def _off(self, views: Sequence[RowView], state: State) -> Array:
-        """What a state leaves, (n, 6).
+        """Recorded less calculated outputs, (n, 6).
 
-        The reference was looked up as the sensors are known to follow it, so what the
-        state has of that counts beyond it.
+        The inputs contain the known responses of the sensors already, so these are
+        subtracted from the state's.
         """
         rows, since = self.motion, self.dictionary.since
         acc, gyr = views[0].x, views[-1].x
         out = rows.y - state.output(acc, since)
         if len(views) > 1:
             out[:, GYR] = rows.y[:, GYR] - state.output(gyr, since)[:, GYR]
-        change = self.dictionary.place.change
+        change = self.dictionary.current.change
         for triad, x, known in ((ACC, acc, rows.acc), (GYR, gyr, rows.gyr)):
             out[:, triad] -= (
                 known.late * change[:, triad]
@@ -101,14 +101,16 @@ class MotionSystem(System):
 
     @staticmethod
     def _table(basis: General, views: Sequence[RowView]) -> Array:
-        """Columns of all channels, those of the gyroscopes as they are late."""
-        table = basis.of(views[0])
+        """Columns of all channels, with the gyroscopes' own inputs."""
+        table = basis.evaluate(views[0])
         if len(views) > 1:
-            table = np.concatenate([table[:, ACC], basis.of(views[1])[:, GYR]], axis=1)
+            table = np.concatenate(
+                [table[:, ACC], basis.evaluate(views[1])[:, GYR]], axis=1
+            )
         return table
 
     def _grouped(self) -> NDArray[np.bool_]:
-        """Columns that some group has."""
+        """Columns that belong to a group."""
         d = self.dictionary
         out = np.zeros(d.width, dtype=bool)
         for group in [*d.always, *(v for c in d.causes for v in c.variants)]:
@@ -117,19 +119,21 @@ class MotionSystem(System):
 
     def _channel(
         self, c: int, some: Sequence[tuple[Index, Array]], white: Array
-    ) -> Linear:
+    ) -> LinearRows:
         """One channel's coefficients, whitened."""
         weight = 1 / np.sqrt(self.power[:, c])
         design = np.hstack([table for _, table in some]) * weight[:, None]
         columns = np.concatenate([at for at, _ in some])
         rows = np.arange(len(white))
-        return Linear(
+        return LinearRows(
             int(c), rows, self.motion.part, weight, columns, design, white * weight
         )
 
 
-def left(part: Linear, values: Array, found: Eliminated) -> tuple[Array, Array]:
-    """What a fit leaves of a channel's coefficients, and their leverages, (n,) each.
+def fit_residuals(
+    part: LinearRows, values: Array, found: Eliminated
+) -> tuple[Array, Array]:
+    """Residuals of a channel's coefficients, and their leverages, (n,) each.
 
     Parameters
     ----------
@@ -151,13 +155,11 @@ def left(part: Linear, values: Array, found: Eliminated) -> tuple[Array, Array]:
 def noise_levels(
     bands: Bands,
     frequency: Array,
-    linear: Sequence[Linear],
+    linear: Sequence[LinearRows],
     values: Array,
     found: Eliminated,
 ) -> dict[int, Array]:
-    """Ln of the noise's power at the places of bands, by channel.
-
-    It is that of what a fit leaves.
+    """Log power of the noise at the places of bands, by channel, from residuals.
 
     Parameters
     ----------
@@ -171,7 +173,7 @@ def noise_levels(
     for _, channels in TRIADS:
         triad = [part for part in linear if part.channel in channels]
         if triad:
-            told = [left(part, values, found) for part in triad]
+            told = [fit_residuals(part, values, found) for part in triad]
             levels = bands.levels(frequency, *map(list, zip(*told, strict=True)))
             out |= {part.channel: one for part, one in zip(triad, levels, strict=True)}
     return out

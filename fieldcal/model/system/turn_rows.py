@@ -1,9 +1,9 @@
-"""What the turns between windows say: closures, and the accelerometers on the way.
+"""Rows of the turns between windows: closures, and accelerometers during the turn.
 
 At the end of a turn the attitude R must take the attitude (or, without known angles,
-the force) of p to that of q: what it is off by is phi_T of `turn`, (1), the closure. On
-the way the accelerometers see (2) there (`way_rows`). White noise of the gyroscopes of
-density N makes phi_T a sum with covariance N^2 T.
+the force) of p to that of q. The remaining rotation is phi_T of `turn`, (1), the
+closure. During the turn the accelerometers measure (2) there (`way_rows`). White noise
+of the gyroscopes of density N gives phi_T the covariance N^2 T.
 
 Source: rotation kinematics to first order in phi.
 """
@@ -25,19 +25,19 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
-from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.met_columns import Met, met_columns
-from fieldcal.model.system.way_rows import WayRows, settling
-from fieldcal.model.turns.attitude import closures, geometry, rows_of
-from fieldcal.model.turns.turn import Turn, Turning, moved, only
+from fieldcal.model.system.linear_rows import LinearRows
+from fieldcal.model.system.met_columns import TurnColumns, columns_of_turns
+from fieldcal.model.system.way_rows import WayRows, settling_amplitudes
+from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
+from fieldcal.model.turns.turn import Turn, TurnTracker, apply_way_effects, select_rows
 from fieldcal.physics.experience import Experience
 
 SMALL = 1e-3
 """Step of the force for a derivative, m/s^2."""
 
 STEADY = 3.0
-"""Squares a row on the way, with everything fitted that shows there, from which a hand
-shook the device and the way says nothing."""
+"""Mean square of a row on the way, after a fit of all columns, above which a hand shook
+the device and the rows on the way are not used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +47,12 @@ class TurnRows:
     Attributes
     ----------
     positions : from, to
-    closure : (s,) what is seen of phi_T, rad, plus what the state has of the columns
+    closure : (s,) known components of phi_T, rad, plus the columns' values in the state
     columns : (k,) of the dictionary
     design : (s, k) of the closure
     info : (s,) information, 1/rad^2
-    bent : (s, 6) by what it is off for accelerometers that are each off at both ends,
-        and for gyroscopes that are each off on the way
+    bent : (s, 6) error of the closure per error of each accelerometer at both ends, and
+        of each gyroscope during the turn
     way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
 
     """
@@ -66,8 +66,8 @@ class TurnRows:
     way: Array
     way_design: Array
 
-    def copied(self, old: Index, new: Index) -> TurnRows:
-        """With new columns that are as some old ones, of a shape next to theirs."""
+    def with_copied_columns(self, old: Index, new: Index) -> TurnRows:
+        """The rows with new columns that copy old ones of a neighbouring shape."""
         at = [int(np.flatnonzero(self.columns == c)[0]) for c in old.tolist()
               if c in self.columns]  # fmt: skip
         kept = np.isin(old, self.columns)
@@ -84,83 +84,97 @@ class Turns:
 
     Parameters
     ----------
-    turning : what follows the turns
+    turning : integrates the turns
     dictionary : columns
-    way : whether the accelerometers are looked at on the way
+    way : whether the accelerometers during turns are used
 
     """
 
-    def __init__(self, turning: Turning, dictionary: Dictionary, way: bool) -> None:
-        self.turning, self.dictionary = turning, dictionary
+    def __init__(self, turning: TurnTracker, dictionary: Dictionary, way: bool) -> None:
+        self.tracker, self.dictionary = turning, dictionary
         self.rows = turning.rows
         # of each window
         self.first = np.unique(self.rows.x.position, return_index=True)[1]
-        self.wander = self.rows.wander[self.first]
-        self.way = way and not dictionary.free.any()
+        self.wander = self.rows.hand_angle[self.first]
+        self.way = way and not dictionary.unoriented.any()
 
     def linearised(
-        self, state: State, values: Array, windows: Sequence[Linear], known: Set | None
+        self,
+        state: State,
+        values: Array,
+        windows: Sequence[LinearRows],
+        known: Set | None,
     ) -> list[TurnRows]:
         """Rows of all turns about a state; `values` of the columns in it.
 
-        `windows` are the rows of the windows about the same state, `known` is what they
-        say; None where that is still to be sought, and the way is not looked at.
+        `windows` are the rows of the windows about the same state, `known` is the set
+        fitted to them. If `known` is None, accelerometers during turns are not used.
         """
-        seen = self.way and known is not None and not _strange(known)
+        seen = self.way and known is not None and not _has_unknown_acc_cause(known)
         self.known = known if seen else None
         self.at_ends = {
             first: EndColumns.of(first, one, self.rows.x, state)
             for first, one in self.dictionary.bases
             if isinstance(one, General) and one.sides is not None
         }
-        if self.dictionary.free.any():
-            self.means = _means(windows, self.dictionary)
-            self.off = _off(windows, self.dictionary)
-            self.spread = _spread(windows, self.dictionary)
-            x, since = only(self.rows.x, self.first), self.dictionary.since
-            self.slopes = _slopes(state, x, since[:, self.first])
-        turns = list(self.turning.turns(state))
+        if self.dictionary.unoriented.any():
+            self.means = _window_columns(windows, self.dictionary)
+            self.off = _window_residuals(windows, self.dictionary)
+            self.spread = _window_variances(windows, self.dictionary)
+            x, since = select_rows(self.rows.x, self.first), self.dictionary.since
+            self.slopes = _output_slopes(state, x, since[:, self.first])
+        turns = list(self.tracker.turns(state))
         views = [self._view(turn, state) for turn in turns]
-        met = met_columns(turns, views, self.dictionary, self.at_ends, self.known)
-        return _steadied(
+        met = columns_of_turns(turns, views, self.dictionary, self.at_ends, self.known)
+        return _drop_shaken_way(
             [self._rows(*one, values) for one in zip(turns, views, met, strict=True)]
         )
 
-    def courses(
+    def outputs_of_terms(
         self, turns: Sequence[Turn], state: State, terms: Sequence[Term]
     ) -> Iterator[Array]:
-        """Outputs that some terms of a state make in turns, at edges, (m + 1, 6)."""
+        """Contribution of some terms of a state to the outputs of turns, (m + 1, 6)."""
         rest = tuple(t for t in state.terms if t not in terms)
         less = replace(state, terms=rest)
         for turn in turns:
-            since = self.turning.after(turn.t, turn.positions[1])
-            x = moved(replace(turn.x, f=turn.felt), less)
+            since = self.tracker.time_since_turn(turn.t, turn.positions[1])
+            x = apply_way_effects(
+                replace(turn.x, f=turn.force_without_way_effects), less
+            )
             yield state.output(turn.x, since) - less.output(x, since)
 
     # -- rows
 
     def _view(self, turn: Turn, state: State) -> RowView:
-        """A turn as columns see it."""
-        since = self.turning.after(turn.x.t, turn.positions[1])
+        """The edges of a turn, at which columns are evaluated."""
+        since = self.tracker.time_since_turn(turn.x.t, turn.positions[1])
         return RowView(turn.x, turn.x, since, state)
 
-    def _rows(self, turn: Turn, view: RowView, met: Met, values: Array) -> TurnRows:
-        """Closure and way of one turn, by all columns that reach them."""
+    def _rows(
+        self, turn: Turn, view: RowView, met: TurnColumns, values: Array
+    ) -> TurnRows:
+        """Closure and way of one turn, with all columns that influence them."""
         d, state = self.dictionary, view.state
-        _, seen, across = geometry(turn.ends, turn.positions, turn.attitude, turn.done)
+        _, seen, across = turn_geometry(
+            turn.ends, turn.positions, turn.attitude, turn.done
+        )
         index, close, general = met.index, met.closing, met.general
-        loose = dict(self._loose_ends(turn)) if d.free.any() else {}
-        ends: Array = np.zeros((3, 3)) if turn.rounded is None else turn.rounded
+        loose = dict(self._loose_ends(turn)) if d.unoriented.any() else {}
+        ends: Array = (
+            np.zeros((3, 3))
+            if turn.rounding_covariance is None
+            else turn.rounding_covariance
+        )
         for p, bent in loose.items():
-            # the force there is the one that is read, which the state may not meet
+            # the force there is the measured one, which may differ from the state's
             seen = seen - bent @ self.off[p]
             close = close - bent @ self.means[p][:, index]
-            ends = ends + bent @ self._unsure(p) @ bent.T
+            ends = ends + bent @ self._force_covariance(p) @ bent.T
         there = np.abs(close).max(axis=0) > 0
         for columns, outputs in general:
             there[np.isin(index, columns)] |= np.any(outputs != 0.0, axis=(0, 1))
         index = index[there]
-        basis, info = _plane(across, ends, self._closure_variance(turn, view))
+        basis, info = _known_axes(across, ends, self._closure_variance(turn, view))
         close = basis @ close[:, there]
         closure = basis @ seen + close @ values[index]
         off = [(basis @ bent) ** 2 for bent in loose.values()]
@@ -174,7 +188,7 @@ class Turns:
             way, design = seen_by.rows(general, values, index)
         return TurnRows(turn.positions, closure, index, close, info, bent, way, design)
 
-    def _unsure(self, p: int) -> Array:
+    def _force_covariance(self, p: int) -> Array:
         """Covariance of the accelerometers of a window at the end of a turn, (3, 3)."""
         moved = turned_force(self.rows.x.f[self.first[p]], self.wander[p])
         slope = self.slopes[p]
@@ -189,30 +203,38 @@ class Turns:
         scale = np.abs(view.state.scale[3:])
         length = float(np.ptp(turn.x.t))
         white = self.rows.noise[3:] / scale * np.sqrt(turn.interval)
-        fading = settling(view.state, turn.x, view.since)[3:] / scale
+        fading = settling_amplitudes(view.state, turn.x, view.since)[3:] / scale
         built_up = priors.BUILT_UP * length * float(np.abs(fading).max())
-        earth = EARTH_RATE / 3**0.5 * length if self.dictionary.free.any() else 0.0
+        earth = (
+            EARTH_RATE / 3**0.5 * length if self.dictionary.unoriented.any() else 0.0
+        )
         walked = float((white**2).mean()) * length
-        return walked + turn.blur**2 + built_up**2 + earth**2 + self._swung(turn)
+        return (
+            walked
+            + turn.closure_sigma**2
+            + built_up**2
+            + earth**2
+            + self._hand_variance(turn)
+        )
 
-    def _swung(self, turn: Turn) -> float:
-        """Variance of what a hand turns at both ends, whose angles are known, rad^2."""
-        if self.dictionary.free.any():
+    def _hand_variance(self, turn: Turn) -> float:
+        """Variance of a hand's rotation at both ends, if angles are known, rad^2."""
+        if self.dictionary.unoriented.any():
             return 0.0
-        ends = np.searchsorted(self.dictionary.held, turn.positions)
+        ends = np.searchsorted(self.dictionary.window_positions, turn.positions)
         return float((self.wander[ends] ** 2).mean(axis=1).sum())
 
     def _loose_ends(self, turn: Turn) -> Iterator[tuple[int, Array]]:
-        """How the closure moves with what is added to the accelerometers at its ends.
+        """Derivatives of the closure by accelerometer errors at its ends, (3, 3) each.
 
-        Of a position of unknown orientation, that turns the force that they are taken
-        to see: df = -(1 - n n^T) (dU/df)^-1 dU. Of the two windows, (3, 3) each.
+        In a position of unknown orientation such an error rotates the force that is
+        derived from them: df = -(1 - n n^T) (dU/df)^-1 dU.
         """
         ends = turn.ends
-        rows = rows_of(ends, turn.positions)
+        rows = first_row_of_each(ends, turn.positions)
         both, held = ends.f[rows], np.repeat(ends.to_device[rows][None], 3, axis=0)
         for i, p in enumerate(turn.positions):
-            j = int(np.searchsorted(self.dictionary.held, p))
+            j = int(np.searchsorted(self.dictionary.window_positions, p))
             up = both[i] / np.linalg.norm(both[i])
             across = (np.eye(3) - np.outer(up, up)) @ np.linalg.inv(self.slopes[j])
             step = 1e-4 * float(np.linalg.norm(both[i]))
@@ -225,10 +247,10 @@ class Turns:
             yield j, -bent @ across
 
 
-def _strange(known: Set) -> bool:
-    """Whether something that no physics makes acts on accelerometers at rest.
+def _has_unknown_acc_cause(known: Set) -> bool:
+    """Whether an unknown function acts on the accelerometers at rest.
 
-    What it does while the device is turned, nobody can say.
+    Its value during turns is not known.
     """
     return any(
         cause.kind == "unknown" and "acc" in triads_of(group.part)
@@ -236,14 +258,14 @@ def _strange(known: Set) -> bool:
     )
 
 
-def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
-    """What is known of a closure: orthonormal rows, (2 or 3, 3), and information.
+def _known_axes(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
+    """Known axes of a closure: orthonormal rows, (2 or 3, 3), and their information.
 
     Parameters
     ----------
-    across : (3, 3) projection on it
-    ends : (3, 3) covariance of what the forces at both ends leave of it, rad^2
-    alike : variance besides, rad^2
+    across : (3, 3) projection on the known part
+    ends : (3, 3) covariance from the forces at both ends, rad^2
+    alike : further variance, the same about all axes, rad^2
 
     """
     values, axes = np.linalg.eigh(across)
@@ -252,9 +274,9 @@ def _plane(across: Array, ends: Array, alike: float) -> tuple[Array, Array]:
     return turned.T @ plane, 1 / (np.maximum(spread, 0.0) + alike)
 
 
-def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
+def _window_columns(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     """Columns of the accelerometers in the mean of each window, (p, 3, k)."""
-    out = np.zeros((len(d.held), 3, d.width))
+    out = np.zeros((len(d.window_positions), 3, d.width))
     for part in windows:
         if part.channel < 3:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
@@ -265,9 +287,9 @@ def _means(windows: Sequence[Linear], d: Dictionary) -> Array:
     return out
 
 
-def _off(windows: Sequence[Linear], d: Dictionary) -> Array:
+def _window_residuals(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     """Recorded less calculated of the accelerometers' mean in each window, (p, 3)."""
-    out = np.zeros((len(d.held), 3))
+    out = np.zeros((len(d.window_positions), 3))
     for part in windows:
         if part.channel < 3:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
@@ -277,9 +299,9 @@ def _off(windows: Sequence[Linear], d: Dictionary) -> Array:
     return out
 
 
-def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
+def _window_variances(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     """Variance of the accelerometers' mean in each window, (p, 3)."""
-    out = d.common[:, :3] ** 2
+    out = d.window_error[:, :3] ** 2
     for part in windows:
         if part.channel < 3:
             first = np.flatnonzero(np.diff(part.window, prepend=-1))
@@ -288,10 +310,10 @@ def _spread(windows: Sequence[Linear], d: Dictionary) -> Array:
     return out
 
 
-def _slopes(state: State, x: Experience, since: Array) -> Array:
+def _output_slopes(state: State, x: Experience, since: Array) -> Array:
     """Derivative of the accelerometers' outputs by the force in each row, (p, 3, 3).
 
-    With what is seen of other axes, and with curvature.
+    It contains cross-coupling and nonlinearity.
     """
     seen, out = state.experienced(x), np.zeros((len(x), 3, 3))
     for c in range(3):
@@ -304,8 +326,8 @@ def _slopes(state: State, x: Experience, since: Array) -> Array:
     return out
 
 
-def _steadied(rows: list[TurnRows]) -> list[TurnRows]:
-    """Without the way, where a hand shook the device on it."""
+def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
+    """Remove the rows on the way if a hand shook the device."""
     if not rows or not len(rows[0].way):
         return rows
     columns = np.unique(np.concatenate([r.columns for r in rows]))

@@ -1,8 +1,9 @@
-"""What the accelerometers say on the way from one window to the next.
+"""Rows of the accelerometers during a turn from one window to the next.
 
-They speak of what no window shows; what windows show is as these have it, within its
-uncertainty: on the way the attitude is known by interpolation only, (2) of `turn`. The
-white noise of the gyroscopes of density N makes phi_k - u phi_T a bridge with
+They determine columns that no window shows. Columns that windows show have the windows'
+estimates and uncertainties, since during a turn the attitude is known by interpolation
+only, (2) of `turn`. The white noise of the gyroscopes of density N makes phi_k - u
+phi_T a bridge with the covariance
 
     N^2 (min(t, t') - u' t - u t' + u u' T)                                         (1)
 """
@@ -18,7 +19,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import inverse_of, root_of
+from fieldcal.model.evidence.gram import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import Turn
@@ -30,9 +31,9 @@ class WayRows:
 
     Parameters
     ----------
-    turn, view : what is followed, and what columns see of it
+    turn, view : the turn, and its edges
     dictionary : columns
-    known : what windows and closures say
+    known : set fitted to windows and closures
     noise : (6,) standard deviation of one sample
 
     """
@@ -70,7 +71,7 @@ class WayRows:
         cov = self._covariance()
         cov += held @ found.inverse[np.ix_(at, at)] @ held.T
         sd = self.turn.sd.ravel()
-        whiten = inverse_of(root_of(cov / np.outer(sd, sd))) / sd
+        whiten = triangular_inverse(cholesky_root(cov / np.outer(sd, sd))) / sd
         whole = np.zeros((len(z), len(index)))
         order = np.argsort(index)
         place = order[np.searchsorted(index[order], columns[own])]
@@ -80,12 +81,12 @@ class WayRows:
     def _output_means(self, outputs: Array) -> Array:
         """Means over the pieces, by outputs at their edges, (k, 3, columns), (2)."""
         scale = self.state.scale
-        path = self.turn.carried(outputs[:, 3:] / scale[3:, None])
-        swung = self.turn.swung(path) * scale[:3, None]
+        path = self.turn.attitude_error(outputs[:, 3:] / scale[3:, None])
+        swung = self.turn.force_error(path) * scale[:3, None]
         return self.turn.means(outputs[:, :3] + swung)
 
     def _window_columns(self, columns: Index, flat: Array) -> tuple[Array, Index]:
-        """Columns that the set of the windows has, and their indices in it."""
+        """Values of the columns of the windows' set, and their indices in it."""
         d, found = self.dictionary, self.known.state
         out, at = [], []
         order = np.argsort(columns)
@@ -107,7 +108,7 @@ class WayRows:
         inside = np.flatnonzero((held >= first) & (held < first + 3 * one.width))
         if not len(inside):
             return
-        table = self.turn.means(one.of(self.view))
+        table = self.turn.means(one.evaluate(self.view))
         for i in inside.tolist():
             c, m = divmod(int(held[i]) - first, one.width)
             seen = np.zeros((len(table), 3))
@@ -115,58 +116,62 @@ class WayRows:
             yield i, seen.ravel()
 
     def _covariance(self) -> Array:
-        """Of the rows, (3 k, 3 k)."""
+        """Covariance of the rows, (3 k, 3 k)."""
         turn, x, state = self.turn, self.turn.x, self.state
         middle = (x.t[turn.cut[1:]] + x.t[turn.cut[:-1]]) / 2 - x.t[0]
         done = np.interp(middle, x.t - x.t[0], turn.done)
         length = float(x.t[-1] - x.t[0])
         bridge = np.minimum.outer(middle, middle) + np.outer(done, done) * length
         bridge -= np.outer(middle, done) + np.outer(done, middle)  # (1)
-        fading = settling(state, x, self.view.since)
+        fading = settling_amplitudes(state, x, self.view.since)
         cov = np.diag((turn.sd**2).ravel())
-        built = _built_up(x, self.view.since, middle)
+        built = _settling_covariance(x, self.view.since, middle)
         cov += np.kron(built, np.outer(fading[:3], fading[:3]))
         density = self.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
         building = priors.BUILT_UP * np.sqrt(length) * fading[3:] / state.scale[3:]
         density = np.hypot(density, building)
         for axis in range(3):
             along = np.broadcast_to(np.eye(3)[axis][:, None], (len(x.t), 3, 1))
-            arm = turn.means(turn.swung(along)[:, :, 0]) * state.scale[:3]
+            arm = turn.means(turn.force_error(along)[:, :, 0]) * state.scale[:3]
             arm = arm * density[axis]
             blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
             cov += blocks.reshape(cov.shape)
         sizes = priors.SIZES[list(self.known.sizes.instability)]
-        loose = (sizes * self.dictionary.unstable)[:3]
-        # what windows are off by for reasons unknown changes with the attitude as well
+        loose = (sizes * self.dictionary.typical_instability)[:3]
+        # the instability of windows may change with the attitude during a turn
         apart = np.subtract.outer(middle, middle) / priors.BUILDS_S
         course = 1.0 + np.exp(-(apart**2) / 2)
-        walks = self.dictionary.wander.apart(middle, np.diff(x.t[turn.cut]))
+        walks = self.dictionary.wander.residual_covariance(
+            middle, np.diff(x.t[turn.cut])
+        )
         for c in range(3):
             cov[c::3, c::3] += walks[c]
         out: Array = cov + np.kron(course, np.diag(loose**2))
         return out
 
 
-def on_the_way(columns: Index, dictionary: Dictionary, known: Set) -> NDArray[np.bool_]:
+def seen_on_the_way(
+    columns: Index, dictionary: Dictionary, known: Set
+) -> NDArray[np.bool_]:
     """Columns that no window shows, or that the windows' set holds."""
     held = np.isin(columns, known.state.columns)
     out: NDArray[np.bool_] = held | ~dictionary.shown[columns]
     return out
 
 
-def settling(state: State, x: Experience, since: Array) -> Array:
-    """What begins to fade at the end of a turn, (6,)."""
+def settling_amplitudes(state: State, x: Experience, since: Array) -> Array:
+    """Amplitudes, (6,), of the effects that decay from the end of a turn on."""
     never = state.output(x, np.full_like(since, np.inf))[-1]
     then = state.output(x, np.zeros_like(since))[-1]
     sizes: Array = then - never
     return sizes
 
 
-def _built_up(x: Experience, since: Array, middle: Array) -> Array:
-    """Covariance between pieces of what settling adds to each, for a size of one.
+def _settling_covariance(x: Experience, since: Array, middle: Array) -> Array:
+    """Covariance between pieces of the error from settling effects, for amplitude one.
 
-    How it builds up in a turn is not known: smoothly, somewhere between none and all of
-    it; afterwards it fades from an instant that is known so well.
+    How they build up during a turn is not known: smoothly, between zero and the full
+    amplitude. Afterwards they decay from an instant with a known uncertainty.
     """
     rest = np.isfinite(since[0])
     k = int(np.argmax(rest)) if rest.any() else len(x.t) - 1

@@ -13,12 +13,12 @@ from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
-from fieldcal.model.system.linear_rows import Linear
-from fieldcal.model.system.linear_system import SHOWS, Parts, System, add_course
+from fieldcal.model.system.linear_rows import LinearRows
+from fieldcal.model.system.linear_system import SHOWS, Parts, System, append_course
 
 NOTHING = 1e-6
-"""What a column of typical size makes on an accelerometer in windows that show it, at
-least, m/s^2."""
+"""Least change of an accelerometer by a column of typical size that windows show,
+m/s^2."""
 
 
 class WindowSystem(System):
@@ -35,13 +35,13 @@ class WindowSystem(System):
         super().__init__(dictionary)
         self.rows = rows
 
-    def apart(self) -> Self:
-        """The same rows with a dictionary of their own, as it is now."""
-        return type(self)(self.rows, self.dictionary.apart())
+    def independent_copy(self) -> Self:
+        """The same rows with a copy of the dictionary."""
+        return type(self)(self.rows, self.dictionary.independent_copy())
 
     def linearised(
         self, state: State, wanted: NDArray[np.bool_] | None = None
-    ) -> list[Linear]:
+    ) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
         d = self.dictionary
         view = RowView.of(self.rows.x, d.since, state)
@@ -55,15 +55,15 @@ class WindowSystem(System):
         return out
 
     def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> Parts:
-        """Columns of each channel that are wanted and touch it."""
+        """Wanted columns with influence on each channel."""
         parts: Parts = {c: [] for c in self.dictionary.observed.tolist()}
-        for first, end, basis in self.dictionary.spans():
+        for first, end, basis in self.dictionary.basis_ranges():
             at, kept = np.arange(first, end), wanted[first:end]
             if not kept.any():
                 continue
-            table = basis.of(view)
+            table = basis.evaluate(view)
             if isinstance(basis, Course):
-                add_course(parts, at, table, kept)
+                append_course(parts, at, table, kept)
                 continue
             if not kept.all():
                 at, table = at[kept], table[:, :, kept]
@@ -76,21 +76,21 @@ class WindowSystem(System):
 
     def _channel(
         self, c: int, parts: Sequence[tuple[Index, Array]], off: Array
-    ) -> Linear:
+    ) -> LinearRows:
         """One channel's rows, whitened."""
         rows, d = self.rows, self.dictionary
         use = np.flatnonzero(rows.used[:, c])
-        left = d.wander.left_of_rows(rows.length, c)[use]
+        left = d.wander.residual_variance_of_rows(rows.length, c)[use]
         weight = 1 / np.sqrt(rows.sd[use, c] ** 2 + left)
         design = np.hstack([table[use] for _, table in parts]) * weight[:, None]
         columns = np.concatenate([at for at, _ in parts])
-        window = np.searchsorted(d.held, rows.x.position[use])
-        return Linear(c, use, window, weight, columns, design, off[use] * weight)
+        window = np.searchsorted(d.window_positions, rows.x.position[use])
+        return LinearRows(c, use, window, weight, columns, design, off[use] * weight)
 
-    def _shows(self, part: Linear) -> NDArray[np.bool_]:
+    def _shows(self, part: LinearRows) -> NDArray[np.bool_]:
         """Whether each column of a channel shows at its typical size, (k,).
 
-        A gyroscope sees the Earth turn, so there it has to stand out of the noise.
+        Gyroscopes measure the Earth's rate, so there it must exceed the noise.
         """
         table = np.abs(part.design) * self.dictionary.typical[part.columns]
         if part.channel < 3:

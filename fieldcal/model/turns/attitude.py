@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
 SMOOTH_S = 0.1
 """Means that the angular acceleration is taken from."""
 
-ASTRAY = 0.3
-"""Misclosure that no gyroscope makes, rad: clipped, or turned in another way."""
+LOST_ANGLE = 0.3
+"""Misclosure that no gyroscope error makes, rad: outputs clipped, or another turn."""
 
 
 def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
@@ -32,37 +32,44 @@ def trapezoid_means(t: Array, values: Array, cut: NDArray[np.intp]) -> Array:
     return mean
 
 
-def between(attitude: Array, done: Array, start: Array, end: Array) -> Array:
-    """Vectors of the base (3, ...) on the way, known at both ends, (m + 1, 3, ...)."""
+def interpolate_vectors(
+    attitude: Array, done: Array, start: Array, end: Array
+) -> Array:
+    """Vectors fixed in the base, in device axes during a turn, (m + 1, 3, ...).
+
+    `start` and `end` (3, ...) are their values at both ends; `attitude` (m + 1, 3, 3)
+    is R and `done` (m + 1,) the completed part of the turn.
+    """
     part = done.reshape(-1, *[1] * start.ndim)
     back = attitude @ attitude[-1].T
     out: Array = (1 - part) * (attitude @ start) + part * (back @ end)
     return out
 
 
-def blur(t: Array, w: Array, each: int, noise: Array) -> float:
-    """How far the attitude is off for want of samples: twice as many would tell, rad.
+def sampling_error(t: Array, w: Array, each: int, noise: Array) -> float:
+    """Error of the attitude by the finite sampling rate, rad.
 
-    From every other sample it comes out otherwise, for their noise, (3,) rad/s, as much
-    as the whole is uncertain, and for the steps; from all, the steps make a third of
-    that or less (Richardson; the rule is of the second order at least).
+    The attitude is compared with that from every other sample. Their difference, less
+    the part of the noise (3,) rad/s, is divided by three (Richardson's rule for a
+    method of second order at least).
     """
     whole = (len(t) - 1) // (2 * each) * 2 * each
     ends = []
     for skip in (1, 2):
         some = slice(0, whole + 1, skip)
         edge = np.arange(0, whole // skip + 1, max(each // skip, 1))
-        ends.append(carry(small_turns(t[some], w[some], edge))[-1])
+        ends.append(attitudes_from_rotations(small_turns(t[some], w[some], edge))[-1])
     off = ends[0] @ ends[1].T
     apart = off[2, 1] ** 2 + off[0, 2] ** 2 + off[1, 0] ** 2
     chance = float(noise @ noise) * float(t[-1] - t[0]) ** 2 / len(t)
     return float(np.sqrt(max(apart - chance, 0.0)) / 3)
 
 
-def vee(matrix: Array) -> Array:
+def antisymmetric_vector(matrix: Array) -> Array:
     """Vectors v of the antisymmetric parts [v]x of matrices (..., 3, 3), (..., 3).
 
-    >>> vee(np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]]))
+    >>> cross = np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]])
+    >>> antisymmetric_vector(cross)
     array([1., 2., 3.])
     """
     part = (matrix - np.swapaxes(matrix, -1, -2)) / 2
@@ -70,7 +77,7 @@ def vee(matrix: Array) -> Array:
 
 
 def accelerations(t: Array, w: Array) -> Array:
-    """Angular acceleration at the edges, from means over `SMOOTH_S`."""
+    """Angular acceleration at the edges (m + 1, 3), from means over `SMOOTH_S`."""
     step = float(t[1] - t[0])
     m = max(1, round(SMOOTH_S / step)) | 1
     kernel = np.ones(m) / m
@@ -80,41 +87,41 @@ def accelerations(t: Array, w: Array) -> Array:
     return out
 
 
-def astray(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
+def vertical_lost(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:
     """Whether the gyroscopes lost track of the vertical in a turn."""
     p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
     along = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
-    return bool(along < np.cos(ASTRAY))
+    return bool(along < np.cos(LOST_ANGLE))
 
 
-def geometry(
+def turn_geometry(
     x: Experience, pair: tuple[int, int], attitude: Array, done: Array
 ) -> tuple[Array, Array, Array]:
-    """What a turn has to do with the positions at its ends.
+    """Force during a turn and its closure, by the positions at both ends.
 
     Returns
     -------
-    f : (m + 1, 3) force on the way, from both ends
+    f : (m + 1, 3) force during the turn, interpolated from both ends
     closure : (3,) phi_T in the axes of p
-    known : (3, 3) projection on what of it is known
+    known : (3, 3) projection on the known part of the closure
 
     """
-    ends = rows_of(x, pair)
+    ends = first_row_of_each(x, pair)
     f, held = x.f[ends], x.to_device[ends]
     (closure,), (whole,) = closures(f[None], held[None], attitude[-1])
     known = np.eye(3)
     if not whole:
         known -= np.outer(f[0], f[0]) / (f[0] @ f[0])
-    return between(attitude, done, *f), closure, known
+    return interpolate_vectors(attitude, done, *f), closure, known
 
 
-def rows_of(x: Experience, positions: Iterable[int]) -> Index:
+def first_row_of_each(x: Experience, positions: Iterable[int]) -> Index:
     """The first row of each position."""
     return np.array([int(np.argmax(x.position == p)) for p in positions])
 
 
 def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """phi_T where positions are so, in the axes of p, and whether all of it is known.
+    """Closures phi_T in the axes of p, and whether all components are known.
 
     Parameters
     ----------
@@ -124,14 +131,16 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_
 
     Returns
     -------
-    (n, 3) rad, and (n,); of what is not all known, what lies across the force at p
+    (n, 3) rad, and (n,); if not all is known, the part perpendicular to the force at p
 
     """
     off = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
-    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(ASTRAY)
+    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(LOST_ANGLE)
     if whole.all():
-        return vee(off), whole
+        return antisymmetric_vector(off), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)
     seen = f[:, 1] @ end
     seen /= np.linalg.norm(seen, axis=1, keepdims=True)
-    return np.where(whole[:, None], vee(off), np.cross(up, seen)), whole
+    return np.where(
+        whole[:, None], antisymmetric_vector(off), np.cross(up, seen)
+    ), whole

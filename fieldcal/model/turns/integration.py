@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.reduce import RowSource
-from fieldcal.model.turns.attitude import between
-from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.model.turns.attitude import interpolate_vectors
+from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
 FINE_S = 0.02
@@ -36,12 +36,12 @@ FEWEST = 8
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One turn to be followed, by the model of the windows.
+    """One turn to be integrated, with the calibration from the windows.
 
     Attributes
     ----------
     source : samples
-    x : what is experienced in the windows
+    x : inputs in the windows
     bias, scale : (3,) of the gyroscopes
     late : s by which they are late
     pair : windows that the turn leads from and to
@@ -87,8 +87,8 @@ class Steps:
 
 
 @dataclass(frozen=True, slots=True)
-class Integrated:
-    """What was integrated.
+class IntegratedTurn:
+    """An integrated turn.
 
     Attributes
     ----------
@@ -104,8 +104,8 @@ class Integrated:
     done: Array
 
 
-def divided(leg: Leg) -> Steps | None:
-    """Steps of about `FINE_S`, and pieces of about `PIECE_S`; None of too few."""
+def divide_into_steps(leg: Leg) -> Steps | None:
+    """Steps of about `FINE_S`, and pieces of about `PIECE_S`; None if too few."""
     block, first = leg.source.block, leg.first
     rate = leg.source.rate
     each = max(1, round(FINE_S * rate))
@@ -118,19 +118,19 @@ def divided(leg: Leg) -> Steps | None:
     return Steps(first, t, each, np.arange(count + 1) * each, cut)
 
 
-def integrated(leg: Leg, steps: Steps, rid: Array) -> Integrated:
-    """Follow a turn; `rid` (m + 1, 3) are errors of the rates that are known, rad/s."""
+def integrate_turn(leg: Leg, steps: Steps, rid: Array) -> IntegratedTurn:
+    """Integrate a turn; `rid` (m + 1, 3) are known errors of the rates, rad/s."""
     x, t, edge = leg.x, steps.t, steps.edge
     part = ((t - t[0]) / (t[-1] - t[0]))[:, None]
     ends = [x.w[x.position == p].mean(axis=0) for p in leg.pair]
     earth = (1 - part) * ends[0] + part * ends[1]
     rate = _angular_rates(leg, t, _interpolated(t, steps.at, rid))
-    for _ in range(2):  # the Earth's rate turns with the device, once it is known how
+    for _ in range(2):  # the second time with the Earth's rate in the moving axes
         angle = small_turns(t, rate - earth, edge) / leg.source.pace
         size = np.concatenate([[0.0], np.cumsum(np.linalg.norm(angle, axis=1))])
-        attitude, done = carry(angle), size / size[-1]
-        earth = _interpolated(t, steps.at, between(attitude, done, *ends))
-    return Integrated(rate, earth, attitude, done)
+        attitude, done = attitudes_from_rotations(angle), size / size[-1]
+        earth = _interpolated(t, steps.at, interpolate_vectors(attitude, done, *ends))
+    return IntegratedTurn(rate, earth, attitude, done)
 
 
 def _interpolated(t: Array, at: Array, values: Array) -> Array:

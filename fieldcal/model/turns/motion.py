@@ -1,4 +1,4 @@
-"""When the device moves between two windows, by its gyroscopes."""
+"""Bounds of the motion between two windows, by the gyroscopes."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ LONGEST_S = 60.0
 """A turn that takes longer is not followed."""
 
 CLEARLY = 2.0
-"""How far motion has to stand out for its ends to be seen; else the gap is taken."""
+"""Least ratio of motion to limit; below, the whole gap is used."""
 
 TOUCH_S = 5.0
-"""Time before and after the motion that shows, in which smaller ones belong to it."""
+"""Time before and after a motion in which smaller ones belong to it, s."""
 
 AWAY = 5.0
-"""Standard deviations of the angle turned from which the device is on its way."""
+"""Standard deviations of the integrated angle from which the device moves."""
 
 
-def moving(
+def motion_bounds(
     source: RowSource, rows: Rows, pair: tuple[int, int], first: int, last: int
 ) -> tuple[int, int] | None:
     """Bounds of the motion between two windows, in samples.
 
-    None where samples are missing, or the motion is too long to be followed.
+    None if samples are missing, or if the motion is too long to be integrated.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def moving(
 
 
 def _moving_at_end(off: Array, noise: Array) -> int:
-    """Samples from where the angle turned stands out of the noise, to the end.
+    """Number of samples from where the integrated angle exceeds its noise to the end.
 
-    What is turned too slowly to be seen at once is seen by its sum.
+    The integral shows rotation that is too slow to be seen in single samples.
     """
     angle = np.abs(np.cumsum(off, axis=0))
     spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]

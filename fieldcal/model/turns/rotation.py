@@ -44,12 +44,12 @@ def mean_rates(t: Array, w: Array) -> Array:
     return mean
 
 
-def carry(angle: Array) -> Array:
+def attitudes_from_rotations(angle: Array) -> Array:
     """Attitudes from small turns, (m + 1, 3, 3), the first of them identity, (1).
 
     `angle` is (m, 3) rad; the turn of a body by it turns vectors seen in it back.
 
-    >>> quarter = carry(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
+    >>> quarter = attitudes_from_rotations(np.full((90, 3), [0.0, 0.0, np.pi / 180]))
     >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
     array([ 0., -1.,  0.])
     """

@@ -1,4 +1,4 @@
-"""Rounding on the way: gyroscopes that stand on one value while the device turns.
+"""Rounding during a turn: gyroscope outputs that keep one value.
 
 An output that changes from step to step is off by something else in each sample, which
 averages out. One that stands on a value U of its grid of steps q is off by the same as
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Index
-from fieldcal.model.rows.noise import rounding, steps_in
+from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
 
 NEXT = 0.99
 """Part of a step: a mean between two values is less than one from both."""
@@ -31,12 +31,12 @@ NEXT = 0.99
 
 @dataclass(frozen=True, slots=True)
 class StandingOutputs:
-    """Where the gyroscopes stand in the windows.
+    """Rounded values that the gyroscopes keep in the windows.
 
     Attributes
     ----------
-    value, step : (3,) rad/s; a step is 0 where noise hides it
-    variance : (3,) of the error of an output that stands, (rad/s)^2
+    value, step : (3,) rad/s; the step is 0 if noise exceeds it
+    variance : (3,) of the error of a constant output, (rad/s)^2
 
     """
 
@@ -45,9 +45,9 @@ class StandingOutputs:
     variance: Array
 
     def share(self, gyr: Array, edge: Index) -> Array:
-        """Share of the time about each edge in which outputs (n, 3) stand, (m + 1, 3).
+        """Share of time about each edge with the windows' values, (m + 1, 3).
 
-        What is counted is where they stand in the windows.
+        `gyr` (n, 3) are the outputs, `edge` the samples at the edges.
         """
         there = self._there(gyr).astype(float)
         each = max(1, int(edge[1] - edge[0]))
@@ -57,10 +57,10 @@ class StandingOutputs:
         out: Array = smooth[edge] / inside[edge][:, None]
         return out
 
-    def apart(
+    def closure_covariance(
         self, t: Array, gyr: Array, scale: Array, edge: Index, attitude: Array
     ) -> Array:
-        """Covariance that values elsewhere leave in a closure, (3, 3) rad^2, (1).
+        """Covariance of a closure from rounding at other values, (3, 3) rad^2, (1).
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class StandingOutputs:
             bound = np.flatnonzero(np.diff(gyr[:, c]) != 0) + 1
             first, last = np.append(0, bound), np.append(bound, len(gyr))
             length = (last - first) * gap / scale[c]
-            part = length**2 * _lasting(gyr[first, c], length)  # (1)
+            part = length**2 * _run_factor(gyr[first, c], length)  # (1)
             middle = (first + last) // 2
             near = np.clip(np.searchsorted(edge, middle), 0, len(edge) - 1)
             axis = attitude[near, c]  # R^T e_c
@@ -84,13 +84,13 @@ class StandingOutputs:
         return out
 
     def _there(self, gyr: Array) -> NDArray[np.bool_]:
-        """Where outputs (n, 3) are those of the windows."""
+        """Samples whose outputs (n, 3) are those of the windows."""
         found: NDArray[np.bool_] = np.abs(gyr - self.value) < NEXT * self.step
         return found
 
 
-def _lasting(value: Array, length: Array) -> Array:
-    """Factor c of (1) of runs on some values (r,) that last so long, (r,)."""
+def _run_factor(value: Array, length: Array) -> Array:
+    """Factor c of (1), (r,), for runs on values (r,) with their lengths (r,)."""
     out = np.ones(len(value))
     before, after = np.diff(value)[:-1], np.diff(value)[1:]
     faster = length[1:-1] * (1 / length[2:] - 1 / length[:-2])
@@ -98,16 +98,16 @@ def _lasting(value: Array, length: Array) -> Array:
     return out
 
 
-def standing(
+def find_standing_outputs(
     block: Block, windows: NDArray[np.intp], alike: Array
 ) -> StandingOutputs | None:
-    """Where gyroscopes stand in windows; None if none of them does.
+    """Rounded values of gyroscopes in windows; None if no output keeps its value.
 
-    `alike` (3,) rad/s is what the errors of all windows have in common.
+    `alike` (3,) rad/s is the part of the rounding errors that all windows share.
     """
     if not alike.any() or not len(windows):
         return None
     means = [block.gyr[a:b].mean(axis=0) for a, b in windows.tolist() if b > a]
-    step = np.where(alike > 0, steps_in(block, windows)[1], 0.0)
-    variance = np.mean(rounding(block, windows)[:, 3:] ** 2, axis=0)
+    step = np.where(alike > 0, quantisation_steps(block, windows)[1], 0.0)
+    variance = np.mean(rounding_sigma(block, windows)[:, 3:] ** 2, axis=0)
     return StandingOutputs(np.nanmedian(means, axis=0), step, variance)

@@ -1,4 +1,4 @@
-"""How far the device turns to and fro at the ends of a turn.
+"""Sway of the device at the ends of a turn.
 
 The mean force of a window tells its mean attitude, and a turn is followed from one
 instant to another. Where a base or a hand sways by psi(t) about the mean attitude, the
@@ -25,11 +25,11 @@ EDGE_S = 10.0
 """Time of a window next to the turn that is looked at, s."""
 
 LEAST = 16
-"""Samples below which nothing is known."""
+"""Least number of samples."""
 
 
-def at_ends(source: RowSource, windows: Index) -> float:
-    """Variance (1) of a closure about the axis with most of it, rad^2.
+def sway_at_ends(source: RowSource, windows: Index) -> float:
+    """Variance (1) of a closure about the axis where it is largest, rad^2.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ def at_ends(source: RowSource, windows: Index) -> float:
     after = slice(start, min(last, start + most))
     scale = source.about.nominal["gyr_scale"]
     return sum(
-        swaying(source.block.gyr[some] / scale, 1 / source.rate)
+        sway_variance(source.block.gyr[some] / scale, 1 / source.rate)
         for some in (before, after)
         if source.usable[some, 3:].all()
     )
 
 
-def swaying(rate: Array, step: float) -> float:
-    """Mean square of psi about the axis with most of it, rad^2.
+def sway_variance(rate: Array, step: float) -> float:
+    """Mean square of psi about the axis where it is largest, rad^2.
 
     Parameters
     ----------

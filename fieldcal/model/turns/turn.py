@@ -23,37 +23,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.bounds import spans
+from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (
     accelerations,
-    astray,
-    between,
-    blur,
-    geometry,
-    rows_of,
+    first_row_of_each,
+    interpolate_vectors,
+    sampling_error,
     trapezoid_means,
+    turn_geometry,
+    vertical_lost,
 )
-from fieldcal.model.turns.integration import Integrated, Leg, divided, integrated
-from fieldcal.model.turns.motion import moving
-from fieldcal.model.turns.rounded import standing
-from fieldcal.model.turns.tremor import at_ends
+from fieldcal.model.turns.integration import (
+    IntegratedTurn,
+    Leg,
+    divide_into_steps,
+    integrate_turn,
+)
+from fieldcal.model.turns.motion import motion_bounds
+from fieldcal.model.turns.rounded import find_standing_outputs
+from fieldcal.model.turns.tremor import sway_at_ends
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
 
 LEAST = np.deg2rad(1.0)
-"""A smaller turn says nothing."""
+"""Smaller turns are not used."""
 
 PER_ROW = (
     "alpha", "beta", "gamma", "f", "w", "w_dot", "slope", "bend", "missed", "f_bend",
     "t", "lasts", "since_start", "since_turn", "warming", "heating", "variance",
     "position", "rate", "speed", "speed_sigma", "attitude_sigma", "alpha_axis",
 )  # fmt: skip
-"""Fields of what is experienced that differ from row to row."""
+"""Fields of `Experience` that have one value per row."""
 
-RIDS = 3
-"""Times that what the state has wrong is taken out: each leaves a percent of it."""
+CORRECTIONS = 3
+"""Largest number of corrections for the gyroscopes' other errors; each leaves 1 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,34 +68,36 @@ class Turn:
     Attributes
     ----------
     positions : from, to
-    ends : what is experienced in the windows
-    x : at the edges, as the gyroscopes tell
-    felt : (m + 1, 3) m/s^2, force there without what acts on the way alone
+    ends : inputs in the windows
+    x : inputs at the edges, by the gyroscopes
+    force_without_way_effects : (m + 1, 3) m/s^2, force at the edges without effects
+        that act during turns only
     attitude : (m + 1, 3, 3) R
     done : (m + 1,) u
     cut : (k + 1,) edges between the pieces
     acc, sd : (k, 3) means of the accelerometers in the pieces, and their white noise
-    blur : rad, what sampling leaves open of the closure, and swaying at its ends
+    closure_sigma : rad, uncertainty of the closure by sampling and sway at its ends
     interval : s between samples
-    stands : (m + 1, 3) share of the time about the edges in which gyroscopes stand on
-        their values of the windows; only if those are off by the same in all windows
-    rounded : (3, 3) rad^2, covariance that rounding elsewhere leaves in the closure
+    standing_share : (m + 1, 3) share of the time about the edges in which gyroscopes
+        keep their values of the windows; None unless all windows share rounding errors
+    rounding_covariance : (3, 3) rad^2, covariance of the closure from rounding at other
+        values
 
     """
 
     positions: tuple[int, int]
     ends: Experience
     x: Experience
-    felt: Array
+    force_without_way_effects: Array
     attitude: Array
     done: Array
     cut: Index
     acc: Array
     sd: Array
-    blur: float
+    closure_sigma: float
     interval: float
-    stands: Array | None = None
-    rounded: Array | None = None
+    standing_share: Array | None = None
+    rounding_covariance: Array | None = None
 
     @property
     def t(self) -> Array:
@@ -99,14 +106,14 @@ class Turn:
 
     @property
     def closure(self) -> Array:
-        """What is seen of phi_T, (3,) rad in the axes of p."""
-        return geometry(self.ends, self.positions, self.attitude, self.done)[1]
+        """The closure phi_T, (3,) rad in the axes of p."""
+        return turn_geometry(self.ends, self.positions, self.attitude, self.done)[1]
 
     def means(self, values: Array) -> Array:
-        """Means over the pieces of something known at the edges, (k, ...).
+        """Means over the pieces of values given at the edges, (k, ...).
 
-        As the trapezoid rule takes them from samples `interval` apart, by the next term
-        of Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
+        Equal to the trapezoid rule for samples `interval` apart, by the next term of
+        Euler and Maclaurin, -dt^2/12 (v'(b) - v'(a)).
         """
         t = self.x.t
         mean = trapezoid_means(t, values, self.cut)
@@ -117,7 +124,7 @@ class Turn:
         return mean - (step**2 - self.interval**2) / 12 * bend
 
     def weights(self, scale: Array) -> Array:
-        """Of the outputs at each edge in the closure, (3, m + 1, 3), (1)."""
+        """Weights of the outputs at each edge in the closure, (3, m + 1, 3), (1)."""
         gaps = np.diff(self.x.t)
         each = np.zeros(len(self.x.t))
         each[:-1] += gaps / 2
@@ -125,8 +132,8 @@ class Turn:
         out: Array = np.moveaxis(self.attitude, 2, 0) * each[:, None] / scale
         return out
 
-    def carried(self, off: Array) -> Array:
-        """Phi less its share of the closure at the edges, (m + 1, 3, k)."""
+    def attitude_error(self, off: Array) -> Array:
+        """Attitude error phi - u phi_T at the edges by rate errors, (m + 1, 3, k)."""
         turned = np.einsum("mji,mjk->mik", self.attitude, off)
         gaps = np.diff(self.x.t)[:, None, None]
         phi = np.zeros_like(turned)
@@ -134,16 +141,16 @@ class Turn:
         way: Array = phi - self.done[:, None, None] * phi[-1]
         return way
 
-    def swung(self, phi: Array) -> Array:
-        """R (phi x f_p) at the edges, (m + 1, 3, k), (2)."""
+    def force_error(self, phi: Array) -> Array:
+        """Force error R (phi x f_p) at the edges, (m + 1, 3, k), (2)."""
         start = self.ends.f[self.ends.position == self.positions[0]].mean(axis=0)
         crossed = np.cross(np.moveaxis(phi, 1, 2), start)
         out: Array = np.einsum("mij,mkj->mik", self.attitude, crossed)
         return out
 
 
-class Turning:
-    """Follows the turns of a recording, by the samples that may be used.
+class TurnTracker:
+    """Integrates the turns of a recording, from the usable samples.
 
     Parameters
     ----------
@@ -153,70 +160,79 @@ class Turning:
     Attributes
     ----------
     legs : the windows at both ends, and the bounds of the motion in samples
-    sways : rad^2 by which the device sways in the windows at both ends
-    contradicted : the windows between which the gyroscopes say otherwise than the
-        positions, by the state that turns were followed with last
+    sway_variances : rad^2, variance of sway in the windows at both ends
+    contradicted_turns : pairs of windows whose positions contradict the gyroscopes, by
+        the state that the turns were integrated with last
 
     """
 
     def __init__(self, source: RowSource, rows: Rows, since: Array) -> None:
-        self.source, self.rows, self.since = _on_the_way(source), rows, since
-        self.legs = list(self._found())
-        windows = spans(source.block, source.about)
-        self.sways = {pair: at_ends(source, windows[[*pair]]) for pair, *_ in self.legs}
-        self.standing = standing(source.block, windows, rows.alike[3:])
-        self.contradicted: list[tuple[int, int]] = []
+        self.source, self.rows, self.since = _without_lost_samples(source), rows, since
+        self.legs = list(self._find_turns())
+        windows = window_bounds(source.block, source.about)
+        self.sway_variances = {
+            pair: sway_at_ends(source, windows[[*pair]]) for pair, *_ in self.legs
+        }
+        self.standing = find_standing_outputs(
+            source.block, windows, rows.session_error[3:]
+        )
+        self.contradicted_turns: list[tuple[int, int]] = []
 
-    def _found(self) -> Iterator[tuple[tuple[int, int], int, int]]:
+    def _find_turns(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         rows, x = self.rows, self.rows.x
         if not rows.used.any(axis=0).all():
             return
         windows, held = (
-            spans(self.source.block, self.source.about),
+            window_bounds(self.source.block, self.source.about),
             np.unique(x.position),
         )
         for p, q in zip(held[:-1].tolist(), held[1:].tolist(), strict=True):
             if x.rate[np.isin(x.position, (p, q))].any():
                 continue
             ends = int(windows[p, 1]), int(windows[q, 0])
-            stretch = moving(self.source, rows, (p, q), *ends)
+            stretch = motion_bounds(self.source, rows, (p, q), *ends)
             if stretch is not None:
                 yield (p, q), *stretch
 
     def turns(self, state: State) -> Iterator[Turn]:
-        """Every turn that the gyroscopes have followed, by a state."""
+        """Every turn, integrated with a state."""
         ends = state.experienced(self.rows.x)
-        self.contradicted = []
+        self.contradicted_turns = []
         for pair, first, last in self.legs:
             turn = self._turn(state, ends, pair, first, last)
             if turn is not None:
-                swayed = float(np.hypot(turn.blur, np.sqrt(self.sways[pair])))
-                yield replace(turn, blur=swayed)
+                swayed = float(
+                    np.hypot(turn.closure_sigma, np.sqrt(self.sway_variances[pair]))
+                )
+                yield replace(turn, closure_sigma=swayed)
 
     def _turn(
         self, state: State, ends: Experience, pair: tuple[int, int], a: int, b: int
     ) -> Turn | None:
-        """Follow a turn, rid of what the state has wrong of the gyroscopes."""
+        """Integrate a turn, corrected for the state's other gyroscope errors."""
         bias, scale, late = state.bias[3:], state.scale[3:], state.lag.delay
         leg = Leg(self.source, ends, bias, scale, late, pair, a, b)
-        if (steps := divided(leg)) is None:
+        if (steps := divide_into_steps(leg)) is None:
             return None
         rid: Array = np.zeros((len(steps.edge), 3))
-        for _ in range(RIDS):
-            way = integrated(leg, steps, rid)
+        for _ in range(CORRECTIONS):
+            way = integrate_turn(leg, steps, rid)
             x = self._edges(ends, steps.at, pair, way, steps.edge)
-            felt, x = x.f, moved(x, state)
-            before, rid = rid, wrong(state, x, self.after(steps.at, pair[1]))
+            felt, x = x.f, apply_way_effects(x, state)
+            before, rid = (
+                rid,
+                other_gyro_errors(state, x, self.time_since_turn(steps.at, pair[1])),
+            )
             if np.abs(rid - before).max() * float(np.ptp(steps.at)) < 1e-6:
                 break
         end = way.attitude[-1]
-        if astray(ends, pair, end):
-            self.contradicted.append(pair)
+        if vertical_lost(ends, pair, end):
+            self.contradicted_turns.append(pair)
             return None
         if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < LEAST:
             return None
         noise = self.rows.noise[3:] / np.abs(state.scale[3:])
-        unsure = blur(steps.t, way.rate - way.earth, steps.each, noise)
+        unsure = sampling_error(steps.t, way.rate - way.earth, steps.each, noise)
         samples = slice(steps.first, steps.first + len(steps.t))
         cut = steps.cut
         acc = trapezoid_means(steps.t, self.source.block.acc[samples], steps.edge[cut])
@@ -230,12 +246,14 @@ class Turning:
         gyr, edge = self.source.block.gyr[samples], steps.edge
         return replace(
             turn,
-            stands=self.standing.share(gyr, edge),
-            rounded=self.standing.apart(steps.t, gyr, scale, edge, way.attitude),
+            standing_share=self.standing.share(gyr, edge),
+            rounding_covariance=self.standing.closure_covariance(
+                steps.t, gyr, scale, edge, way.attitude
+            ),
         )
 
-    def after(self, t: Array, q: int) -> Array:
-        """Time since the turn at some instants, by origin: before the arrival none."""
+    def time_since_turn(self, t: Array, q: int) -> Array:
+        """Time since the turn at instants t, (o, n) by origin; inf before its end."""
         x = self.rows.x
         at = int(np.argmax(x.position == q))
         arrived = x.t[at] - self.since[:, at]
@@ -248,14 +266,14 @@ class Turning:
         ends: Experience,
         t: Array,
         pair: tuple[int, int],
-        way: Integrated,
+        way: IntegratedTurn,
         edge: Index,
     ) -> Experience:
-        """What is experienced at the edges of the steps, as the gyroscopes tell."""
-        f, _, _ = geometry(ends, pair, way.attitude, way.done)
+        """Inputs at the edges of the steps, by the gyroscopes."""
+        f, _, _ = turn_geometry(ends, pair, way.attitude, way.done)
         w = way.rate[edge]
-        held = ends.to_device[rows_of(ends, pair)]
-        warming, heating = self.source.warmth.at(t)
+        held = ends.to_device[first_row_of_each(ends, pair)]
+        warming, heating = self.source.thermometer.at(t)
         unknown = np.full(len(t), np.nan)
         out = Experience.at_rest(
             unknown, unknown, ends.gravity, t=t,
@@ -264,43 +282,43 @@ class Turning:
             variance=np.full((len(t), 3), ends.variance.min(axis=0)),
             position=np.full(len(t), -1), mounting=ends.mounting,
             latitude=ends.latitude, f=f, joint_turns=ends.joint_turns,
-            alpha_axis=between(way.attitude, way.done, *held[:, :, 2]),
+            alpha_axis=interpolate_vectors(way.attitude, way.done, *held[:, :, 2]),
         )  # fmt: skip
         return replace(out, w=w, w_dot=accelerations(t, w))
 
 
-def _on_the_way(source: RowSource) -> RowSource:
-    """The same; without samples that may not be used, if any lie between windows."""
+def _without_lost_samples(source: RowSource) -> RowSource:
+    """The source, without unusable samples if any lie between windows."""
     lost: NDArray[np.bool_] = ~np.all(source.usable, axis=1)
-    for first, last in spans(source.block, source.about):
+    for first, last in window_bounds(source.block, source.about):
         lost[first:last] = False
-    return source.whole if lost.any() else source
+    return source.complete_samples if lost.any() else source
 
 
-def only(x: Experience, rows: Sequence[int]) -> Experience:
-    """Some rows."""
+def select_rows(x: Experience, rows: Sequence[int]) -> Experience:
+    """Some rows of an experience."""
     some: dict[str, Any] = {n: getattr(x, n)[list(rows)] for n in PER_ROW}
     return replace(x, **some)
 
 
-def joined(some: Sequence[Experience]) -> Experience:
-    """Rows of one session, one after the other."""
+def concatenate_rows(some: Sequence[Experience]) -> Experience:
+    """Concatenate rows of one session."""
     every: dict[str, Any] = {
         n: np.concatenate([getattr(x, n) for x in some]) for n in PER_ROW
     }
     return replace(some[0], **every)
 
 
-def moved(x: Experience, state: State) -> Experience:
-    """With motion effects that act on the way."""
+def apply_way_effects(x: Experience, state: State) -> Experience:
+    """Inputs with the motion effects that act during turns."""
     for term in state.terms:
         if isinstance(term.effect, Motion) and term.effect.on_the_way:
             x = term.effect.change(x, term.values)
     return x
 
 
-def wrong(state: State, x: Experience, since: Array) -> Array:
-    """What the state has of the gyroscopes beside bias, scale and delay, (n, 3)."""
+def other_gyro_errors(state: State, x: Experience, since: Array) -> Array:
+    """Errors of the gyroscopes in the state beside bias, scale and delay, (n, 3)."""
     terms = tuple(t for t in state.terms if not t.effect.lag(t.values).delay)
     off = replace(state, terms=terms).output(x, since)
     out: Array = off[:, 3:] - state.bias[3:] - state.scale[3:] * x.w

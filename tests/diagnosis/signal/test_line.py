@@ -10,7 +10,7 @@ from fieldcal.diagnosis.signal.periodogram import LONGEST
 from fieldcal.diagnosis.signal.pieces import WindowSamples, samples_of_windows
 from fieldcal.effects.hum import Hum
 from fieldcal.effects.sway import Sway
-from fieldcal.model.rows.reduce import RowSource, reduce
+from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import parse
@@ -143,6 +143,6 @@ def test_what_never_changes_has_no_line_of_rounding() -> None:
     block = Block.of(t, acc, np.full_like(acc, 0.004))
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
-    pieces = samples_of_windows(source, reduce(source))
+    pieces = samples_of_windows(source, reduce_to_rows(source))
     assert len(pieces.samples) == 2
     assert not any(samples.any() for samples in pieces.samples)

@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines
-from fieldcal.model.rows.reduce import RowSource, reduce
+from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import parse
 
@@ -46,7 +46,7 @@ def lines(t: Array, six: Array) -> list[SpectralLine]:
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, starts, Thermometer.of(block))
-    return [tone for tone, _ in find_lines(source, reduce(source))]
+    return [tone for tone, _ in find_lines(source, reduce_to_rows(source))]
 
 
 @pytest.mark.parametrize("seed", range(3))

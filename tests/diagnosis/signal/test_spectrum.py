@@ -7,7 +7,7 @@ import pytest
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.signal.spectrum import find_lines
-from fieldcal.model.rows.reduce import RowSource, reduce
+from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import parse
 
@@ -36,7 +36,7 @@ def lines(six: Array) -> list[float]:
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((N, 6), dtype=bool)
     source = RowSource(block, about, usable, np.zeros(1), Thermometer.of(block))
-    return [tone.hz for tone, _ in find_lines(source, reduce(source))]
+    return [tone.hz for tone, _ in find_lines(source, reduce_to_rows(source))]
 
 
 @pytest.mark.parametrize(

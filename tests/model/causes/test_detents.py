@@ -8,7 +8,12 @@ from small_sessions import LADDER, G, dictionary, ladder, nominal
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.columns import General, RowView
-from fieldcal.model.causes.detents import Detent, columns_of, detents, together
+from fieldcal.model.causes.detents import (
+    Detent,
+    detent_columns,
+    detent_rotations,
+    detents,
+)
 
 ROWS = 2
 EVERY = range(len(LADDER))
@@ -50,7 +55,7 @@ def test_only_positions_whose_angles_are_stated_have_detents() -> None:
 
 
 def test_rotations_of_the_positions_by_each_detent() -> None:
-    table = together([Detent(0, 0.1, (0, 2)), Detent(1, 0.1, (2,))], 4)
+    table = detent_rotations([Detent(0, 0.1, (0, 2)), Detent(1, 0.1, (2,))], 4)
     expected = np.zeros((4, 2, 2))
     expected[[0, 2], 0, 0] = expected[2, 1, 1] = 1.0
     np.testing.assert_array_equal(table, expected.reshape(8, 2))
@@ -61,13 +66,13 @@ def test_a_column_is_the_change_of_the_force_with_the_angle_of_its_positions() -
     d = dictionary(x)
     before = d.width
     some = [one for one in detents(x, EVERY) if len(one.positions) > 1]
-    at = columns_of(d, some)
+    at = detent_columns(d, some)
     assert at.tolist() == list(range(before, before + len(some))) and len(some) > 5
     assert d.width == before + len(some)
-    first, end, basis = list(d.spans())[-1]
+    first, end, basis = list(d.basis_ranges())[-1]
     assert (first, end) == (before, d.width) and isinstance(basis, General)
     state = nominal()
-    found = basis.of(RowView.of(x, np.array([x.since_turn]), state))
+    found = basis.evaluate(RowView.of(x, np.array([x.since_turn]), state))
     assert basis.sides is not None
     for k, (up, down, step) in enumerate(basis.sides(x, state)):
         one, h = some[k], 1e-5

@@ -19,7 +19,7 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.flicker_series import FlickerSeries
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.model.turns.turn import only
+from fieldcal.model.turns.turn import select_rows
 from fieldcal.physics.experience import Experience
 
 UNIT = np.array([2.0, 2.0, 4.0, 10.0, 10.0, 20.0])
@@ -42,7 +42,7 @@ def made(
 def first(places: int, rows: int = 3, **known: Any) -> Experience:
     """The first positions of the ladder."""
     x = ladder(rows, **known)
-    return only(x, np.flatnonzero(x.position < places).tolist())
+    return select_rows(x, np.flatnonzero(x.position < places).tolist())
 
 
 NAMES = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -66,9 +66,9 @@ def test_what_a_device_has_anyway() -> None:
     }.items():
         one = groups[cause, part]
         np.testing.assert_allclose(one.typical, sizes)
-        assert one.in_state and one.in_step == (cause == "scale")
-        assert one.fixed == (1.0 if cause == "earth" else None)
-        np.testing.assert_allclose(one.sizes(3.0), 3.0 * sizes)
+        assert one.in_state and one.changes_together == (cause == "scale")
+        assert one.fixed_size == (1.0 if cause == "earth" else None)
+        np.testing.assert_allclose(one.prior_sigma(3.0), 3.0 * sizes)
     assert groups["bias", "gyr"].columns.tolist() == [WHOLE.bias + c for c in (3, 4, 5)]
     assert groups["scale", "acc"].columns.tolist() == [
         WHOLE.scale + c for c in (0, 1, 2)
@@ -95,13 +95,13 @@ def test_the_earth_that_is_known_or_not_seen_is_no_cause() -> None:
 
 def test_without_angles_the_earth_turns_with_the_device() -> None:
     d = made(ladder(free=(2, 5)))
-    assert d.free.tolist() == [p in (2, 5) for p in range(9)]
+    assert d.unoriented.tolist() == [p in (2, 5) for p in range(9)]
     (one,) = (g for g in d.always if g.cause == "earth anyhow")
     np.testing.assert_allclose(one.typical[:3], EARTH_RATE / 3**0.5)
     np.testing.assert_allclose(one.typical[3:], [EARTH_RATE])
-    assert one.part == "gyr" and one.fixed == 1.0 and not one.in_state
-    assert not made(ladder(free=(2,)), (3, 4, 5)).free.any(), "no force is seen"
-    assert not dictionary(ladder()).free.any()
+    assert one.part == "gyr" and one.fixed_size == 1.0 and not one.in_state
+    assert not made(ladder(free=(2,)), (3, 4, 5)).unoriented.any(), "no force is seen"
+    assert not dictionary(ladder()).unoriented.any()
     for free in (made(ladder(free=(2,)), (0, 1, 2)), made(first(1, free=(0,)))):
         assert "earth anyhow" not in {g.cause for g in free.always}
 
@@ -111,10 +111,12 @@ def test_instability_is_typical_of_each_output(turns: bool) -> None:
     d = made(ladder(), (0, 2, 3), turns)
     acc, gyr = 1e-3, 3e-5
     expected = [acc * 2, 0, acc * 4, gyr * 10, 0, 0, 5e-4 * turns]
-    np.testing.assert_allclose(d.unstable, expected)
+    np.testing.assert_allclose(d.typical_instability, expected)
     assert CLOSURE == 6
-    assert not made(first(2), turns=True).unstable.any(), "of two windows nobody knows"
-    np.testing.assert_allclose(made(first(3)).unstable[0], acc * 2)
+    assert not made(first(2), turns=True).typical_instability.any(), (
+        "of two windows nobody knows"
+    )
+    np.testing.assert_allclose(made(first(3)).typical_instability[0], acc * 2)
 
 
 def test_of_few_windows_instability_is_within_them() -> None:
@@ -132,7 +134,7 @@ def test_of_few_windows_instability_is_within_them() -> None:
     np.testing.assert_allclose(groups["flicker", "gyr"].typical[:k],
                                3e-4 * series.sizes)  # fmt: skip
     assert len(groups["flicker", "gyr"].columns) == 3 * k
-    assert not one.in_state and one.fixed is None
+    assert not one.in_state and one.fixed_size is None
     at = one.columns[:k]
     (first_at,) = (n for n, b in d.bases if b.name == "flicker")
     np.testing.assert_array_equal(at, first_at + np.arange(k))
@@ -143,26 +145,28 @@ def test_of_few_windows_instability_is_within_them() -> None:
 
 
 def test_a_prediction_has_bias_and_scale_factor_alone() -> None:
-    plain = made(ladder(free=(2,))).plain()
+    plain = made(ladder(free=(2,))).calibration_only()
     assert {g.cause for g in plain.always} == {"bias", "scale"}
-    assert {g.fixed for g in plain.always} == {float(priors.SIZES[-1])}
+    assert {g.fixed_size for g in plain.always} == {float(priors.SIZES[-1])}
 
 
 def test_columns_that_are_added_apart_are_not_in_the_other() -> None:
     d = made(ladder())
-    own = d.apart()
+    own = d.independent_copy()
     width, count = d.width, len(d.bases)
-    own.course("more", smooth.alpha, 8, False)
+    own.add_course("more", smooth.alpha, 8, False)
     assert own.width == width + 48 and len(own.bases) == count + 1
     assert d.width == width and len(d.bases) == count
 
 
 def test_where_columns_are() -> None:
     d = WHOLE
-    assert d.wave(2, 3).tolist() == [d.waves + 2 * d.span.count + i for i in range(3)]
-    assert len(d.wave(1)) == smooth.WAVES
-    assert d.window(4).tolist() == [d.windows + 4 * 9 + i for i in range(9)]
-    assert d.places == 9 and d.held.tolist() == list(range(9))
+    assert d.cosine_columns(2, 3).tolist() == [
+        d.waves + 2 * d.span.count + i for i in range(3)
+    ]
+    assert len(d.cosine_columns(1)) == smooth.WAVES
+    assert d.window_columns(4).tolist() == [d.windows + 4 * 9 + i for i in range(9)]
+    assert d.position_count == 9 and d.window_positions.tolist() == list(range(9))
     assert d.scale - d.bias == 6 and d.windows - d.small_rotation == 18
     assert d.waves - d.windows == 54
 
@@ -188,10 +192,12 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
             (group,) = cause.variants
             np.testing.assert_allclose(group.typical, both[c])
         whole = CAUSES[f"position:{channel}"].variants[0]
-        assert whole.columns.tolist() == WHOLE.window(c).tolist()
+        assert whole.columns.tolist() == WHOLE.window_columns(c).tolist()
         np.testing.assert_allclose(whole.typical, both[c])
         each = CAUSES[f"window:{channel}"].variants
-        assert [g.columns.tolist() for g in each] == [[w] for w in WHOLE.window(c)]
+        assert [g.columns.tolist() for g in each] == [
+            [w] for w in WHOLE.window_columns(c)
+        ]
         assert [g.position for g in each] == list(range(9))
         fading = CAUSES[f"force and time:{channel}"].variants
         assert [len(g.columns) for g in fading] == ([12, 4] if c < 3 else [12])
@@ -200,12 +206,14 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
             np.testing.assert_array_equal(fading[1].columns, own)
         for span, group in zip(smooth.SPANS, CAUSES[f"time:{channel}"].variants,
                                strict=True):  # fmt: skip
-            np.testing.assert_allclose(group.typical, both[c] * smooth.smooth(span))
+            np.testing.assert_allclose(
+                group.typical, both[c] * smooth.smooth_course_sizes(span)
+            )
             assert group.shape == {"waves": span}
     for part, some in (("acc", range(3)), ("gyr", range(3, 6))):
         for span, group in zip(smooth.SPANS, CAUSES[f"time:{part}"].variants,
                                strict=True):  # fmt: skip
-            shape = smooth.smooth(span)
+            shape = smooth.smooth_course_sizes(span)
             at = [WHOLE.waves + c * WHOLE.span.count + i for c in some
                   for i in range(len(shape))]  # fmt: skip
             assert group.columns.tolist() == at
@@ -254,14 +262,14 @@ def test_what_a_session_cannot_show_is_not_offered() -> None:
     others = [0, 1, 3, 4, 5, 6, 7, 8]
     assert [g.position for g in causes["misset"].variants] == others
     worn = causes["repeated_angle"]
-    assert all(2 not in g.together for g in worn.variants)
+    assert all(2 not in g.moved_positions for g in worn.variants)
     *each, all_of_them = worn.variants  # a fixture may be worn throughout
-    assert worn.parts_of(all_of_them) == tuple(each)
-    assert all(worn.parts_of(one) == (one,) for one in each)
+    assert worn.single_errors_of(all_of_them) == tuple(each)
+    assert all(worn.single_errors_of(one) == (one,) for one in each)
     changes = causes["force and time:ax"]  # a scale factor that changes, and more
     wide, narrow = changes.variants
     assert {*wide.columns} > {*narrow.columns}
-    assert changes.parts_of(wide) == (wide,)
+    assert changes.single_errors_of(wide) == (wide,)
     np.testing.assert_array_equal(
         all_of_them.columns, np.concatenate([g.columns for g in each])
     )
@@ -302,7 +310,7 @@ def test_biases_that_wander() -> None:
         (group,) = cause.variants
         sizes = [shape * effect.params[c].typical * UNIT[c] for c in some]
         np.testing.assert_allclose(group.typical, np.concatenate(sizes))
-        at = np.concatenate([WHOLE.wave(c) for c in some])
+        at = np.concatenate([WHOLE.cosine_columns(c) for c in some])
         np.testing.assert_array_equal(group.columns, at)
         assert group.params == some and not group.in_state
         alone = CAUSES[f"random_walk:{part}, one axis"]
@@ -341,9 +349,9 @@ def test_the_largest_columns_of_a_wide_group() -> None:
     typical = np.r_[np.linspace(5.0, 1.0, 70), np.linspace(0.5, 4.0, 30)]
     group = Group("time", "ax", np.arange(200, 300), typical)
     largest = np.sort(np.argsort(-typical)[:60])
-    np.testing.assert_array_equal(group.foremost, largest)
+    np.testing.assert_array_equal(group.leading_columns, largest)
     few = Group("time", "ax", np.arange(60), typical[:60])
-    np.testing.assert_array_equal(few.foremost, np.arange(60))
+    np.testing.assert_array_equal(few.leading_columns, np.arange(60))
 
 
 def test_names_of_causes_and_triads() -> None:
@@ -357,36 +365,36 @@ def test_names_of_causes_and_triads() -> None:
 def test_chances_are_shared_among_variants_and_follow_changes() -> None:
     d = made(ladder())
     chances = [np.log(c.chance / len(c.variants)) for c in d.causes]
-    np.testing.assert_allclose(d.chances, chances)
+    np.testing.assert_allclose(d.log_chances, chances)
     at = [c.key for c in d.causes].index("settling:acc")
     cause, width = d.causes[at], d.width
     shown = d.shown.copy()
     shown[5] = d.shown[5] = True
-    (more, (new,)) = d.refined(cause, cause.variants[3], [7.5])
+    (more, (new,)) = d.add_shape_values(cause, cause.variants[3], [7.5])
     assert d.causes[at] is more and more.variants[:-1] == cause.variants
     assert more.variants[-1] is new and new.shape == {"tau_s": 7.5}
     assert new.params == cause.variants[3].params
     assert new.columns.min() >= width and d.width > width
     assert d.shown.tolist() == [*shown, *[False] * (d.width - width)]
-    assert d.chances[at] == pytest.approx(np.log(cause.chance / len(more.variants)))
+    assert d.log_chances[at] == pytest.approx(np.log(cause.chance / len(more.variants)))
     assert len(d.typical) == d.width
     extra = Cause("extra", "", 0.5, (d.causes[0].variants[0],), "unknown")
-    d.joined([extra])
-    assert d.causes[-1] is extra and d.chances[-1] == pytest.approx(np.log(0.5))
-    widths = {b.blocks.shape[1] for b in d.by_width}
-    assert len(widths) == len(d.by_width)
-    seen = sorted((int(c), int(v)) for b in d.by_width
+    d.add_causes([extra])
+    assert d.causes[-1] is extra and d.log_chances[-1] == pytest.approx(np.log(0.5))
+    widths = {b.blocks.shape[1] for b in d.groups_by_width}
+    assert len(widths) == len(d.groups_by_width)
+    seen = sorted((int(c), int(v)) for b in d.groups_by_width
                   for c, v in zip(b.cause, b.variant, strict=True))  # fmt: skip
     assert seen == [(i, j) for i, c in enumerate(d.causes)
                     for j in range(len(c.variants))]  # fmt: skip
-    for alike in d.by_width:
+    for alike in d.groups_by_width:
         for i, j, block, typical in zip(
             alike.cause, alike.variant, alike.blocks[alike.block], alike.typical,
             strict=True,
         ):  # fmt: skip
             group = d.causes[i].variants[j]
-            np.testing.assert_array_equal(block, group.columns[group.foremost])
-            np.testing.assert_array_equal(typical, group.typical[group.foremost])
+            np.testing.assert_array_equal(block, group.columns[group.leading_columns])
+            np.testing.assert_array_equal(typical, group.typical[group.leading_columns])
 
 
 def test_the_first_linearisation_tells_which_columns_windows_show() -> None:
@@ -404,7 +412,9 @@ def test_the_first_linearisation_tells_which_columns_windows_show() -> None:
 def test_however_a_device_lies_the_earth_s_upright_rate_is_along_the_force() -> None:
     """Three rates in its axes, and one along up; nothing where angles are known."""
     x = ladder(free=(2, 5))
-    found = columns.earth_anyhow(RowView.of(x, np.array([x.since_turn]), nominal()))
+    found = columns.earth_rate_unoriented(
+        RowView.of(x, np.array([x.since_turn]), nominal())
+    )
     free = np.isin(x.position, (2, 5))
     assert not found[~free].any() and not found[:, :3].any()
     up = x.f[free] / np.linalg.norm(x.f[free], axis=1)[:, None]
@@ -418,7 +428,9 @@ def test_the_earth_turns_a_device_on_its_way_as_well() -> None:
     way = replace(x, w=np.full((27, 3), 0.4), position=np.full(27, -1))
     assert not way.earth_seen.any()
     assert replace(way, position=x.position).earth_seen.all()
-    found = columns.earth_anyhow(RowView.of(way, np.array([x.since_turn]), nominal()))
+    found = columns.earth_rate_unoriented(
+        RowView.of(way, np.array([x.since_turn]), nominal())
+    )
     np.testing.assert_allclose(found[:, 3:, :3], np.tile(np.eye(3), (27, 1, 1)))
     np.testing.assert_allclose(found[:, 3:, 3], x.f / 9.81)
 
@@ -427,16 +439,16 @@ def test_flicker_is_noise_of_as_many_cosines_as_biases_wander_by() -> None:
     """It is there or not, and is no effect; cosine k has a variance as 1 / k."""
     for part, some in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
         cause = CAUSES[f"flicker:{part}"]
-        assert (cause.kind, cause.told, cause.chance) == ("noise", False, 0.1)
+        assert (cause.kind, cause.reportable, cause.chance) == ("noise", False, 0.1)
         (group,) = cause.variants
         assert group.random and group.effect is None
         k = np.arange(1, smooth.WAVES + 1)
         size = {"acc": 2e-3, "gyr": 1e-4}[part]
         sizes = [size * UNIT[c] / np.sqrt(k) for c in some]
         np.testing.assert_allclose(group.typical, np.concatenate(sizes))
-        at = np.concatenate([WHOLE.wave(c) for c in some])
+        at = np.concatenate([WHOLE.cosine_columns(c) for c in some])
         np.testing.assert_array_equal(group.columns, at)
-    quiet = {c.name.split()[0] for c in WHOLE.causes if not c.told}
+    quiet = {c.name.split()[0] for c in WHOLE.causes if not c.reportable}
     assert {"flicker", "sinking"} <= quiet <= {"flicker", "sinking", "leaning", "way"}
 
 
@@ -448,8 +460,8 @@ def test_what_rounding_has_in_common_is_in_all_windows_and_in_no_turn() -> None:
         UNIT, True, Wander.none(), size,
     )  # fmt: skip
     (group,) = [g for g in d.always if g.cause == "rounding"]
-    assert group.random and group.fixed == 1.0
-    np.testing.assert_array_equal(group.sizes(1.0), [2e-3, 5e-4])
+    assert group.random and group.fixed_size == 1.0
+    np.testing.assert_array_equal(group.prior_sigma(1.0), [2e-3, 5e-4])
     flat = rows_of(x, np.hstack([x.f, x.w]))
     for part in WindowSystem(flat, d).linearised(nominal()):
         (at,) = np.nonzero(part.columns == group.columns[0])

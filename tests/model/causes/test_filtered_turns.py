@@ -20,11 +20,11 @@ def columns_in(x: Experience) -> Array:
     group = filtered_turns(table)
     sizes = [FILTERED_S**2] * 2 + [2 * FILTERED_S**3] * 2 + [3 * FILTERED_S**4] * 2
     assert group.part == FILTERED
-    np.testing.assert_allclose(group.sizes(1.0), sizes, rtol=1e-12)
+    np.testing.assert_allclose(group.prior_sigma(1.0), sizes, rtol=1e-12)
     start, basis = table.bases[-1]
     assert isinstance(basis, General)
     assert list(group.columns) == list(range(start, start + 6))
-    return basis.of(RowView.of(x, np.zeros((1, len(x))), nominal()))
+    return basis.evaluate(RowView.of(x, np.zeros((1, len(x))), nominal()))
 
 
 def on_the_way(slopes: Array) -> Experience:

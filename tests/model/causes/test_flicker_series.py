@@ -76,10 +76,12 @@ def test_what_the_terms_leave_has_the_size_of_what_is_there() -> None:
         ratio = []
         for one in flicker:
             y = size * one.T + sd * rng.standard_normal((120, 6)) + slow
-            left = series.left(y, sd, np.full(6, 1e-3))
+            left = series.residual_variance(y, sd, np.full(6, 1e-3))
             ratio.append(left[50] / (size**2 * whole[50]))
         assert np.median(ratio) == pytest.approx(1.0, abs=0.8)
-    nothing = series.left(sd * rng.standard_normal((120, 6)), sd, np.full(6, 1e-3))
+    nothing = series.residual_variance(
+        sd * rng.standard_normal((120, 6)), sd, np.full(6, 1e-3)
+    )
     assert (nothing[-1] < sd[-1] ** 2).all()
 
 
@@ -89,7 +91,7 @@ def test_a_channel_that_was_not_measured_has_none() -> None:
     y[:, 0] = 10 * drawn(*rows, 4)[0]
     y[:, 1] = np.nan
     sd[:, 2] = np.nan
-    left = FlickerSeries.of(*rows).left(y, sd, np.ones(3))
+    left = FlickerSeries.of(*rows).residual_variance(y, sd, np.ones(3))
     assert (left[:, 0] > 0).all() and not left[:, 1:].any()
 
 
@@ -100,9 +102,9 @@ def test_a_row_that_was_not_measured_changes_little() -> None:
         drawn(*rows, 5)[:6].T,
         np.full((100, 6), 0.1),
     )
-    whole = series.left(y, sd, np.ones(6))
+    whole = series.residual_variance(y, sd, np.ones(6))
     y[[3, 50, 51]] = np.nan
-    ratio = series.left(y, sd, np.ones(6)) / whole
+    ratio = series.residual_variance(y, sd, np.ones(6)) / whole
     assert (ratio > 0.2).all() and (ratio < 5).all()
 
 

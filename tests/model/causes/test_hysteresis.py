@@ -28,7 +28,7 @@ def columns_in(table: ColumnTable, rows: Experience) -> Array:
     assert isinstance(basis, General) and list(group.columns) == [
         start + i for i in (0, 1, 2)
     ]
-    return basis.of(RowView.of(rows, np.zeros((1, len(rows))), nominal()))
+    return basis.evaluate(RowView.of(rows, np.zeros((1, len(rows))), nominal()))
 
 
 def test_each_axis_keeps_the_side_that_its_force_came_from() -> None:

@@ -40,7 +40,7 @@ def test_a_lean_turns_force_and_gyroscopes_as_a_rotation_does() -> None:
     np.testing.assert_allclose(group.typical * [1, 2, 3, 1, 2, 3], group.typical[0])
     _, basis = table.bases[-1]
     assert isinstance(basis, General)
-    found = basis.of(RowView.of(x, np.zeros((1, len(x))), nominal()))
+    found = basis.evaluate(RowView.of(x, np.zeros((1, len(x))), nominal()))
     there = np.flatnonzero(x.position == 4)
     assert not np.delete(found, there, axis=0).any()
     begin, force = x.t[there].min(), x.f[there[0]]
@@ -145,7 +145,7 @@ def test_what_leans_is_no_change_of_a_bias(seed: int, lean: float) -> None:
     """Sun and clouds warm the device as well, and that alone is named."""
     found = explained(stops(np.random.default_rng(seed), lean))
     assert "leaning" in found.best.set.keys
-    assert found.posterior.names(found.best.set) == ("temperature_bias",)
+    assert found.posterior.cause_names(found.best.set) == ("temperature_bias",)
     (standing,) = found.probable_causes
     told = parameter_estimates(found, standing)
     for axis, true in zip("xyz", WARMING, strict=True):
@@ -161,7 +161,7 @@ def test_on_firm_ground_nothing_leans(seed: int) -> None:
     """Nor is one window off for itself: turns end at the force that is read."""
     found = explained(stops(np.random.default_rng(seed), 0.0))
     assert "leaning" not in found.best.set.keys
-    assert found.posterior.names(found.best.set) == ("temperature_bias",)
+    assert found.posterior.cause_names(found.best.set) == ("temperature_bias",)
 
 
 def test_what_gyroscopes_would_have_seen_is_no_lean() -> None:

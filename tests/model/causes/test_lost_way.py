@@ -20,7 +20,7 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.lost_way import lost_ways
-from fieldcal.model.turns.turn import only
+from fieldcal.model.turns.turn import select_rows
 from fieldcal.session.description import parse
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile, Sampling, Truth
@@ -72,7 +72,7 @@ def test_the_turn_that_was_not_followed_is_told_and_no_other(
     said = [text for text in notes(one, []) if "gyroscopes measured" in text]
     assert len(said) == len(one.untracked_turns)
     assert way is None or f"from position {way + 1} to {way + 2} is not" in said[0]
-    assert "gyro_scale" in one.posterior.names(one.best.set)
+    assert "gyro_scale" in one.posterior.cause_names(one.best.set)
 
 
 def calibrated(folder: Path, seed: int, way: int | None) -> Calibration:
@@ -102,17 +102,17 @@ def test_the_columns_are_rates_on_one_way_each() -> None:
     x = ladder(rows=3)
     table = dictionary(x)
     causes = list(lost_ways(table))
-    assert len(causes) == len(table.held) - 1
+    assert len(causes) == len(table.window_positions) - 1
     _, basis = table.bases[-1]
     assert isinstance(basis, General)
-    assert not basis.of(RowView.of(x, np.zeros((1, len(x))), nominal())).any()
+    assert not basis.evaluate(RowView.of(x, np.zeros((1, len(x))), nominal())).any()
     ends = (x.t[x.position == 2].max(), x.t[x.position == 3].min())
     edges = replace(
-        only(x, [0] * 4), t=np.linspace(*ends, 6)[1:-1], position=np.full(4, -1)
+        select_rows(x, [0] * 4), t=np.linspace(*ends, 6)[1:-1], position=np.full(4, -1)
     )  # fmt: skip
-    found = basis.of(RowView.of(edges, np.zeros((1, 4)), nominal()))
+    found = basis.evaluate(RowView.of(edges, np.zeros((1, 4)), nominal()))
     (group,) = causes[2].variants
     own = group.columns - group.columns[0] + 6
     np.testing.assert_array_equal(found[:, 3:, own], np.tile(np.eye(3), (4, 1, 1)))
     assert not np.delete(found, own, axis=2).any() and not found[:, :3].any()
-    assert group.together == (2, 3) and group.random
+    assert group.moved_positions == (2, 3) and group.random

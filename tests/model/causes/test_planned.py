@@ -8,7 +8,12 @@ from observed import BIAS, COUPLING, SCALE, G, outputs
 
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.planned import PLAIN, design, parameters, predicted
+from fieldcal.model.causes.planned import (
+    ACC_CALIBRATION,
+    design_matrix,
+    parameters,
+    predict_outputs,
+)
 
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(-40, -30), (0, 0), (5, 0), (30, -20), (170, 35)]
@@ -47,7 +52,7 @@ def test_what_is_foretold_and_its_derivatives(
     tilt: str, cross: bool, mounting: Array
 ) -> None:
     truth = np.array([*BIAS, *SCALE, *(OFF if cross else ()), *TILTS[tilt]])
-    u, slope = predicted(names_of(tilt, cross), truth, PLACES, G, mounting)
+    u, slope = predict_outputs(names_of(tilt, cross), truth, PLACES, G, mounting)
     np.testing.assert_allclose(u, shown(truth, tilt, cross, mounting), atol=1e-9)
     for k, step in enumerate(STEP * np.eye(len(truth))):
         up, down = (shown(truth + s, tilt, cross, mounting) for s in (step, -step))
@@ -60,26 +65,26 @@ def test_a_design_is_about_a_perfect_device(tilt: str) -> None:
     names = names_of(tilt, True)
     perfect = np.zeros(len(names))
     perfect[3:6] = 1.0
-    table = design(names, PLACES, G, MOUNTINGS[1])
+    table = design_matrix(names, PLACES, G, MOUNTINGS[1])
     for k, step in enumerate(STEP * np.eye(len(names))):
         up, down = (shown(perfect + s, tilt, True, MOUNTINGS[1]) for s in (step, -step))
         np.testing.assert_allclose(table[..., k], (up - down) / (2 * STEP), atol=2e-7)
 
 
 def test_what_is_not_named_is_perfect_and_the_order_is_as_asked() -> None:
-    u, slope = predicted(["acc_bias.z"], np.array([0.5]), PLACES, G)
+    u, slope = predict_outputs(["acc_bias.z"], np.array([0.5]), PLACES, G)
     perfect = outputs(PLACES, bias=np.array([0, 0, 0.5]), scale=np.ones(3))
     np.testing.assert_allclose(u, perfect, atol=1e-12)
     assert slope.shape == (5, 3, 1)
     names = ("acc_scale.y", "base_tilt.about_z_deg", "acc_bias.x")
     whole = parameters("base_tilt")
-    some = design(names, PLACES, G)
+    some = design_matrix(names, PLACES, G)
     rows = [whole.index(n) for n in names]
-    np.testing.assert_array_equal(some, design(whole, PLACES, G)[..., rows])
+    np.testing.assert_array_equal(some, design_matrix(whole, PLACES, G)[..., rows])
 
 
 def test_every_device_has_bias_and_scale_factor() -> None:
-    assert parameters() == PLAIN and len(PLAIN) == 6
+    assert parameters() == ACC_CALIBRATION and len(ACC_CALIBRATION) == 6
     assert parameters("angle_offset")[6:] == (
         "angle_offset.alpha0_deg", "angle_offset.beta0_deg",
     )  # fmt: skip

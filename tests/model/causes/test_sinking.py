@@ -78,7 +78,7 @@ def test_columns_are_what_a_small_tilt_makes_times_a_polynomial() -> None:
     assert group is not None and group.cause == NAME
     _, basis = table.bases[-1]
     assert isinstance(basis, General)
-    found = basis.of(RowView.of(x, np.zeros((1, len(x))), nominal()))
+    found = basis.evaluate(RowView.of(x, np.zeros((1, len(x))), nominal()))
     u = 2 * (x.t - x.t.min()) / np.ptp(x.t) - 1
     legendre = np.column_stack([u, (3 * u**2 - 1) / 2, (5 * u**3 - 3 * u) / 2,
                                 (35 * u**4 - 30 * u**2 + 3) / 8])  # fmt: skip

@@ -45,7 +45,7 @@ def test_a_walk_has_the_variance_of_its_series() -> None:
 
 @pytest.mark.parametrize("span", smooth.SPANS)
 def test_a_smooth_course_has_unit_variance_and_fades(span: float) -> None:
-    sizes = smooth.smooth(span)
+    sizes = smooth.smooth_course_sizes(span)
     assert (sizes**2).sum() / 2 == pytest.approx(1.0)
     k = np.arange(1, len(sizes) + 1)
     np.testing.assert_allclose(
@@ -64,7 +64,7 @@ def test_a_force_that_changes_in_time() -> None:
                 (35 * s**4 - 30 * s**2 + 3) / 8]  # fmt: skip
     assert found.shape == (len(X), 3 * smooth.SLOW)
     for axis in range(3):
-        some = found[:, smooth.along(axis)]
+        some = found[:, smooth.force_time_columns(axis)]
         for column, power in zip(some.T, legendre, strict=True):
             np.testing.assert_allclose(column, X.f[:, axis] / G * power, atol=1e-12)
 

@@ -12,7 +12,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.reduce import Rows
-from fieldcal.model.turns.turn import only
+from fieldcal.model.turns.turn import select_rows
 
 X = ladder(rows=30)
 UNIT = np.ones(6)
@@ -67,9 +67,9 @@ def test_a_walk_is_measured_beside_what_settles(size: float) -> None:
         courses = np.column_stack([np.zeros(len(X)), walk(rng)])
         one = Wander.of(recorded(rng, size, courses), UNIT)
         assert one.modes[1] > smooth.WAVES
-        assert (one.speed[[0, 2, 3, 4, 5]] < 0.1 * size).all()
+        assert (one.walk_rate[[0, 2, 3, 4, 5]] < 0.1 * size).all()
         shares.append(one.share[1])
-        found.append(one.speed[1])
+        found.append(one.walk_rate[1])
     assert np.median(found) == pytest.approx(size, rel=0.2)
     assert np.median(shares) < 0.7  # before the rows it is 0.9
 
@@ -83,12 +83,12 @@ def test_flicker_is_measured_and_is_no_walk(size: float) -> None:
         courses = np.column_stack([flicker(rng) for _ in range(3)])
         one = Wander.of(recorded(rng, size, courses), UNIT)
         assert np.ptp(one.flicker[:3]) < 1e-9 * size  # made alike
-        assert one.left(np.ones(1), 4)[0] < 0.03 * SD[4] ** 2
+        assert one.residual_variance(np.ones(1), 4)[0] < 0.03 * SD[4] ** 2
         found.append(one.flicker[1])
         modes = 2 * one.flicker[1] ** 2 * len(X) / (2 * SD[1] ** 2)
         assert one.modes[1] == int(np.clip(modes, smooth.WAVES, priors.MOST_WAVES))
         assert one.share[1] > 0.5
-        assert one.left(np.ones(1), 1)[0] > 0.05 * one.flicker[1] ** 2
+        assert one.residual_variance(np.ones(1), 1)[0] > 0.05 * one.flicker[1] ** 2
     assert np.median(found) == pytest.approx(size, rel=0.25)
 
 
@@ -102,7 +102,7 @@ def test_outputs_in_counts_wander_by_counts() -> None:
     unit = np.array([10.0, 10.0, 0.2, 5.0, 1.0, 1.0])
     counted = replace(plain, y=plain.y * unit, sd=plain.sd * unit)
     one, many = Wander.of(plain, UNIT), Wander.of(counted, unit)
-    np.testing.assert_allclose(many.speed, one.speed * unit, rtol=1e-9)
+    np.testing.assert_allclose(many.walk_rate, one.walk_rate * unit, rtol=1e-9)
     np.testing.assert_array_equal(many.modes, one.modes)
     assert many.length == one.length == pytest.approx(np.ptp(X.t))
 
@@ -116,27 +116,27 @@ def test_cosines_beyond_the_noise_are_as_many_as_it_is_above_it() -> None:
     found = Wander.of(rows_of(X, y), UNIT)
     length = np.ptp(X.t)
     information = len(X) / (2 * SD[1] ** 2)
-    walks = found.speed[1] * np.sqrt(2 * length * information) / np.pi
+    walks = found.walk_rate[1] * np.sqrt(2 * length * information) / np.pi
     modes = 2 * max(walks, found.flicker[1] ** 2 * information)
     assert found.modes[1] == int(min(modes, priors.MOST_WAVES)) > smooth.WAVES
     none = Wander.none()
-    assert not none.speed.any() and set(none.modes) == {smooth.WAVES}
-    assert not none.apart(np.arange(3.0), np.ones(3)).any()
+    assert not none.walk_rate.any() and set(none.modes) == {smooth.WAVES}
+    assert not none.residual_covariance(np.arange(3.0), np.ones(3)).any()
 
 
 def test_of_few_differences_nothing_is_told() -> None:
     for places in (7, 8):  # one of the later half of five rows each
         kept = (np.arange(len(X)) % 30 < 5) & (X.position < places)
-        some = only(X, np.flatnonzero(kept).tolist())
+        some = select_rows(X, np.flatnonzero(kept).tolist())
         y = np.random.default_rng(1).standard_normal((len(some), 6))
-        assert Wander.of(rows_of(some, y), UNIT).speed.any() == (places == 8)
+        assert Wander.of(rows_of(some, y), UNIT).walk_rate.any() == (places == 8)
 
 
 def test_what_goes_evenly_does_not_wander() -> None:
     rng = np.random.default_rng(3)
     y = np.hstack([X.f, X.w]) + SD * rng.standard_normal((len(X), 6))
     y[:, 0] += 1e-3 * X.t
-    level = Wander.of(rows_of(X, y), UNIT).speed[0]
+    level = Wander.of(rows_of(X, y), UNIT).walk_rate[0]
     assert level < 2e-5
 
 
@@ -158,12 +158,14 @@ def test_what_cosines_leave_is_the_rest_of_their_series() -> None:
             waves = np.array([np.cos(np.pi * k * v / length) for v in each])
             values = waves @ np.column_stack([walks, flickers])
             covariance[:, i, j] = counts @ values / counts.sum()
-    every = one.apart(t, np.full(4, piece))
+    every = one.residual_covariance(t, np.full(4, piece))
     for c, there in zip((0, 5), covariance, strict=True):
         off = np.abs(every[c] - there)
         assert np.diag(off).max() < 0.002 * there[0, 0]
         assert off.max() < 0.06 * there[0, 0]  # of instants, not of means
-        assert every[c][0, 0] == pytest.approx(one.left(np.array([piece]), c)[0])
+        assert every[c][0, 0] == pytest.approx(
+            one.residual_variance(np.array([piece]), c)[0]
+        )
 
 
 @pytest.mark.parametrize("lasts", [0.5, 4.0, 25.0])
@@ -173,23 +175,25 @@ def test_rows_keep_of_a_walk_what_cosines_beyond_have_over_them(lasts: float) ->
     k = np.arange(61, 200_000)
     z = np.pi * k * lasts / 600.0
     every = 300.0 * (2e-3 / (np.pi * k) * np.sin(z) / z) ** 2
-    assert one.left(np.array([lasts]), 1)[0] == pytest.approx(every.sum(), rel=1e-3)
+    assert one.residual_variance(np.array([lasts]), 1)[0] == pytest.approx(
+        every.sum(), rel=1e-3
+    )
 
 
 def test_one_axis_may_walk_alone_and_none_flickers_alone() -> None:
     rng = np.random.default_rng(4)
     courses = np.column_stack([np.zeros(len(X)), walk(rng), np.zeros(len(X))])
     found = Wander.of(recorded(rng, 5e-3, courses), UNIT)
-    assert found.speed[1] > 20 * found.speed[[0, 2]].max()
+    assert found.walk_rate[1] > 20 * found.walk_rate[[0, 2]].max()
     assert np.ptp(found.flicker[:3]) < 1e-9
 
 
 def test_of_few_windows_flicker_is_not_measured() -> None:
     """It is always there by itself, and a walk is measured as ever."""
-    some = only(X, np.flatnonzero(X.position < 2).tolist())
+    some = select_rows(X, np.flatnonzero(X.position < 2).tolist())
     rng = np.random.default_rng(6)
     y = np.hstack([some.f, some.w]) + SD * rng.standard_normal((len(some), 6))
     y[:, 1] += 5e-3 * walk(rng)[: len(some)]
     found = Wander.of(rows_of(some, y), UNIT)
     assert not found.flicker.any() and not found.share.any()
-    assert found.speed[1] == pytest.approx(5e-3, rel=0.5)
+    assert found.walk_rate[1] == pytest.approx(5e-3, rel=0.5)

@@ -8,7 +8,12 @@ from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.evidence.gram import Eliminated, gains, inverse_of, root_of
+from fieldcal.model.evidence.gram import (
+    Eliminated,
+    cholesky_root,
+    evidence_gains,
+    triangular_inverse,
+)
 from fieldcal.model.priors import SIZES
 
 FREE = pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
@@ -27,7 +32,7 @@ WIDE = np.array([0.7, 2.0, 0.05, 1.0])
 @FREE
 def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> None:
     one = case(seed, free)
-    rows, every = one.gram.weighed(TAU), np.arange(WIDTH)
+    rows, every = one.gram.with_instability(TAU), np.arange(WIDTH)
     inner, pull = one.dense.information()
     assert_agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
     assert_agree(rows.matrix(SET, None), inner[SET])
@@ -45,7 +50,7 @@ def test_squares_and_determinant_are_those_of_the_rows(
     seed: int, free: tuple[int, ...]
 ) -> None:
     one = case(seed, free)
-    rows, dense = one.gram.weighed(TAU), one.dense
+    rows, dense = one.gram.with_instability(TAU), one.dense
     square = dense.y @ np.linalg.solve(dense.cov, dense.y)
     assert rows.square == pytest.approx(square, rel=1e-9)
     log_det = np.linalg.slogdet(dense.cov)[1] - 2 * np.log(dense.white).sum()
@@ -60,7 +65,7 @@ def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
     seed: int, free: tuple[int, ...]
 ) -> None:
     one = case(seed, free).gram
-    for p, weight in enumerate(one.weighed(TAU).weight):
+    for p, weight in enumerate(one.with_instability(TAU).weight):
         there = one.info[p] > 0
         cov = one.loose[p][there] @ one.loose[p][there].T
         spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
@@ -76,7 +81,7 @@ def test_evidence_and_estimates_are_those_of_least_squares(
     seed: int, free: tuple[int, ...]
 ) -> None:
     one = case(seed, free)
-    found = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
+    found = Eliminated.of(one.gram.with_instability(TAU), SET, WIDE)
     assert found.score == pytest.approx(one.dense.evidence(SET, WIDE), rel=1e-9)
     mean, cov = one.dense.posterior(SET, WIDE)
     assert_agree(found.estimate, mean)
@@ -87,14 +92,14 @@ def test_evidence_and_estimates_are_those_of_least_squares(
 def test_a_column_that_two_causes_have_may_stand_there_twice(seed: int) -> None:
     one = case(seed)
     twice, wide = np.array([0, 3, 3]), np.array([0.7, 0.4, 1.5])
-    found = Eliminated.of(one.gram.weighed(TAU), twice, wide)
+    found = Eliminated.of(one.gram.with_instability(TAU), twice, wide)
     assert found.score == pytest.approx(one.dense.evidence(twice, wide), rel=1e-9)
     assert_agree(found.estimate, one.dense.posterior(twice, wide)[0])
 
 
 def test_with_nothing_in_it_the_evidence_is_that_of_the_noise() -> None:
     one, none = case(0), np.empty(0, dtype=np.intp)
-    found = Eliminated.of(one.gram.weighed(TAU), none, np.empty(0))
+    found = Eliminated.of(one.gram.with_instability(TAU), none, np.empty(0))
     assert found.score == pytest.approx(one.dense.evidence(none, np.empty(0)), rel=1e-9)
 
 
@@ -107,15 +112,15 @@ def test_the_gain_of_one_more_group_is_the_rise_of_the_evidence(
     """At every size; the group may share a column with the set."""
     one, at = case(seed, free), np.array(more)
     typical = np.linspace(0.02, 0.05, len(at))
-    found = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
-    inner, pull = found.rest(at, typical)
+    found = Eliminated.of(one.gram.with_instability(TAU), SET, WIDE)
+    inner, pull = found.schur_complement(at, typical)
     before = one.dense.evidence(SET, WIDE)
     both = np.concatenate([SET, at])
     rise = [
         one.dense.evidence(both, np.concatenate([WIDE, v * typical])) - before
         for v in SIZES
     ]
-    gain = gains(inner, pull, np.diag(inner).max())
+    gain = evidence_gains(inner, pull, np.diag(inner).max())
     np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
 
 
@@ -127,44 +132,46 @@ def test_the_gain_of_an_instability_is_the_rise_of_the_evidence(
 ) -> None:
     none = np.where(np.arange(7) == kind, 0.0, TAU)
     one, typical = case(seed, free, none), 0.03
-    found = Eliminated.of(one.gram.weighed(none), SET, WIDE)
-    inner, pull = found.of_means(kind, typical)
+    found = Eliminated.of(one.gram.with_instability(none), SET, WIDE)
+    inner, pull = found.schur_complement_of_means(kind, typical)
     before = one.dense.evidence(SET, WIDE)
     rise = []
     for v in SIZES:
         tau = np.where(np.arange(7) == kind, v * typical, TAU)
         rise.append(case(seed, free, tau).dense.evidence(SET, WIDE) - before)
-    gain = gains(inner, pull, np.diag(inner).max())
+    gain = evidence_gains(inner, pull, np.diag(inner).max())
     np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
 
 
 def test_gains_of_many_groups_are_those_of_each() -> None:
     one, found = case(1), []
-    rows = Eliminated.of(one.gram.weighed(TAU), SET, WIDE)
+    rows = Eliminated.of(one.gram.with_instability(TAU), SET, WIDE)
     for at in ([1, 2], [5, 6], [8, 1]):
-        found.append(rows.rest(np.array(at), np.array([0.3, 0.1])))
+        found.append(rows.schur_complement(np.array(at), np.array([0.3, 0.1])))
     inner, pull = (np.stack(some) for some in zip(*found, strict=True))
     own = np.diagonal(inner, 0, 1, 2).max(axis=-1)
-    each = [gains(*one, own=top) for one, top in zip(found, own, strict=True)]
-    np.testing.assert_allclose(gains(inner, pull, own), each, rtol=1e-12)
+    each = [evidence_gains(*one, own=top) for one, top in zip(found, own, strict=True)]
+    np.testing.assert_allclose(evidence_gains(inner, pull, own), each, rtol=1e-12)
 
 
 @SEEDS
 def test_what_elimination_leaves_by_rounding_gains_nothing(seed: int) -> None:
     """A column that the set has at any size cannot add anything."""
     one, at = case(seed), np.array([3])
-    wide = Eliminated.of(one.gram.weighed(TAU), SET, np.full(4, 1e9))
-    inner, pull = wide.rest(at, np.array([1.0]))
-    own = one.gram.weighed(TAU).matrix(at, at)[0, 0]
-    assert np.array_equal(gains(inner, pull, own), np.zeros(len(SIZES)))
+    wide = Eliminated.of(one.gram.with_instability(TAU), SET, np.full(4, 1e9))
+    inner, pull = wide.schur_complement(at, np.array([1.0]))
+    own = one.gram.with_instability(TAU).matrix(at, at)[0, 0]
+    assert np.array_equal(evidence_gains(inner, pull, own), np.zeros(len(SIZES)))
 
 
 @FREE
 def test_some_columns_say_the_same_as_they_do_among_all(free: tuple[int, ...]) -> None:
     whole = case(2, free).gram
-    part = whole.only(np.array([7, 0, 4, 3, 3]))
+    part = whole.select_columns(np.array([7, 0, 4, 3, 3]))
     assert part.within.shape == (4, 4)
-    found, same = (Eliminated.of(g.weighed(TAU), SET, WIDE) for g in (part, whole))
+    found, same = (
+        Eliminated.of(g.with_instability(TAU), SET, WIDE) for g in (part, whole)
+    )
     assert found.score == pytest.approx(same.score, rel=1e-12)
     np.testing.assert_allclose(found.estimate, same.estimate, rtol=1e-12)
     np.testing.assert_array_equal(np.flatnonzero(part.index >= 0), SET)
@@ -176,7 +183,7 @@ def test_a_root_is_one_where_numbers_have_too_few_digits(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(5, 20)) * np.exp(rng.normal(0, 12, 20))
     whole = np.eye(20) + rows.T @ rows
-    root = root_of(whole)
+    root = cholesky_root(whole)
     assert (np.diag(root) > 0).all() and not np.triu(root, 1).any()
     size = np.sqrt(np.diag(whole))
     again = root @ root.T / np.outer(size, size)
@@ -188,8 +195,10 @@ def test_roots_of_several_matrices_are_those_of_each() -> None:
     some = np.random.default_rng(3).standard_normal((2, 90, 80))
     many = np.eye(80) + np.swapaxes(some, 1, 2) @ some
     worst = np.array([many[0], np.full((80, 80), 1e20)])
-    roots = root_of(worst)
+    roots = cholesky_root(worst)
     np.testing.assert_allclose(roots[0] @ roots[0].T, many[0], rtol=1e-8, atol=1e-8)
     assert np.diag(roots[1]).min() >= 1 - 1e-9 and not np.triu(roots[1], 1).any()
-    for one, both in zip(root_of(many), inverse_of(root_of(many)), strict=True):
+    for one, both in zip(
+        cholesky_root(many), triangular_inverse(cholesky_root(many)), strict=True
+    ):
         np.testing.assert_allclose(both @ one, np.eye(80), atol=1e-9)

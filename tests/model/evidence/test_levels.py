@@ -9,7 +9,7 @@ from gram_cases import TAU, WIDTH, case
 
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence import levels as module
-from fieldcal.model.evidence.levels import levels
+from fieldcal.model.evidence.levels import scan_instabilities
 
 SET = np.array([0, 3, 4, 7])
 WIDE = np.array([0.7, 2.0, 0.05, 1.0])
@@ -28,7 +28,7 @@ def left(dense: Dense, block: Array) -> tuple[Array, Array, Array]:
     return inner, some.T @ np.linalg.solve(total, dense.y), alone
 
 
-@pytest.mark.parametrize("at_once", [1, module.AT_ONCE], ids=["single", "together"])
+@pytest.mark.parametrize("at_once", [1, module.MAX_NUMBERS], ids=["single", "together"])
 @pytest.mark.parametrize("free", [(), (1, 3)], ids=["set", "loose"])
 @pytest.mark.parametrize("times", [ACC, GYRO, TURNS], ids=["acc", "gyro", "turns"])
 def test_levels_are_those_of_the_rows_written_out(
@@ -37,9 +37,9 @@ def test_levels_are_those_of_the_rows_written_out(
     at_once: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "AT_ONCE", at_once)
+    monkeypatch.setattr(module, "MAX_NUMBERS", at_once)
     taus = TAU * times
-    found = levels(case(2, free).gram, SET, WIDE, taus, FURTHER)
+    found = scan_instabilities(case(2, free).gram, SET, WIDE, taus, FURTHER)
     for n, tau in enumerate(taus):
         dense = case(2, free, tau).dense
         assert found.score[n] == pytest.approx(dense.evidence(SET, WIDE), rel=1e-9)
@@ -52,7 +52,7 @@ def test_levels_are_those_of_the_rows_written_out(
 
 def test_a_set_that_may_be_given_nothing_has_its_score_all_the_same() -> None:
     none = np.empty((0, 1), dtype=np.intp)
-    found = levels(case(0).gram, SET, WIDE, TAU * ACC, none)
+    found = scan_instabilities(case(0).gram, SET, WIDE, TAU * ACC, none)
     expected = [case(0, (), tau).dense.evidence(SET, WIDE) for tau in TAU * ACC]
     np.testing.assert_allclose(found.score, expected, rtol=1e-9)
     assert found.inner.shape == (2, 0, 1, 1)

@@ -26,14 +26,16 @@ MANY = tuple(Position.deg(a, b) for a in (-60, -20, 20, 60, 120) for b in (-60, 
 
 
 def group(part: str, *columns: int) -> Group:
-    return Group("factory", part, np.array(columns), np.ones(len(columns)), fixed=1.0)
+    return Group(
+        "factory", part, np.array(columns), np.ones(len(columns)), fixed_size=1.0
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_chance_is_that_of_both_sizes_by_dense_rows(seed: int) -> None:
     """A kink and K2 have one size; a kind that both grades have alike is not told."""
     one = case(seed)
-    state = Eliminated.of(one.gram.weighed(TAU), SET, SIZES)
+    state = Eliminated.of(one.gram.with_instability(TAU), SET, SIZES)
     groups = [group("cross_coupling", 0), group("quadratic", 3),
               group("scale_asymmetry", 4), group("g_sensitivity", 7)]  # fmt: skip
     chances = chances_of_coarser(state, groups, COARSER, STATED)
@@ -49,7 +51,7 @@ def test_the_chance_is_that_of_both_sizes_by_dense_rows(seed: int) -> None:
 
 def test_each_triad_warms_up_by_its_own() -> None:
     one = case(1)
-    state = Eliminated.of(one.gram.weighed(TAU), SET, SIZES)
+    state = Eliminated.of(one.gram.with_instability(TAU), SET, SIZES)
     warming = replace(group("warm_up", 0, 3, 4, 7), params=(0, 1, 3, 5))
     coarser = FactoryErrors(acc_per_k=4e-3, gyr_per_k=5e-4)
     stated = FactoryErrors(acc_per_k=4e-4, gyr_per_k=5e-4)

@@ -11,17 +11,17 @@ from small_sessions import Session, ladder
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.gram import Eliminated, gained
+from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (
-    EVEN,
     STEP,
-    alike,
-    likeliest,
-    likeliest_of_axis,
+    UNIT_INDEX,
+    instability_log_prior,
+    most_probable_axis_size,
+    most_probable_size,
 )
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.offers import FALLING, LEVELS, fallen
+from fieldcal.model.search.offers import FALLING, LEVELS, lowered_instability
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")
@@ -38,13 +38,13 @@ def test_numbers_that_everything_is_compared_with() -> None:
         assert share[:8] == pytest.approx(share[0], rel=1e-4)
         large = np.log(share[-1] / share[-2]) / np.log(SIZES[-1] / SIZES[-2])
         assert large == pytest.approx(-tail, rel=1e-3)
-    loose = priors.loosely()
+    loose = priors.instability_density_of_given_set()
     assert loose.sum() == pytest.approx(1.0)
     wide = (SIZES > 1) & (SIZES <= 100)
     beside = loose - 0.8 * priors.density(8.0)
     np.testing.assert_allclose(beside[wide], 0.2 / wide.sum())
     np.testing.assert_allclose(beside[~wide], 0.0, atol=1e-15)
-    assert SIZES[EVEN] == pytest.approx(1.0, rel=0.4)
+    assert SIZES[UNIT_INDEX] == pytest.approx(1.0, rel=0.4)
     np.testing.assert_allclose(np.diff(np.log(SIZES)), STEP)
 
 
@@ -56,8 +56,10 @@ def test_a_size_between_those_tried_is_where_the_evidence_is_highest(
     """By dense rows; its uncertainty is that of the curvature, or the prior's."""
     one, at = case(seed), np.array([1, 2])
     typical = np.array([0.7, 2.0, 1.0, 0.5])
-    state = Eliminated.of(one.gram.weighed(TAU), SET, typical * [1.0, v, v, 1.0])
-    best, unsure = likeliest(state, at, v)
+    state = Eliminated.of(
+        one.gram.with_instability(TAU), SET, typical * [1.0, v, v, 1.0]
+    )
+    best, unsure = most_probable_size(state, at, v)
     fine = v * np.exp(np.linspace(-STEP, STEP, 129))
     score = [one.dense.evidence(SET, typical * [1.0, u, u, 1.0]) for u in fine]
     score += np.interp(np.log(fine), np.log(SIZES), DENSITY)
@@ -71,8 +73,8 @@ def test_a_size_between_those_tried_is_where_the_evidence_is_highest(
 
 def test_a_size_that_rows_say_nothing_of_is_as_uncertain_as_before() -> None:
     one = case(1)
-    state = Eliminated.of(one.gram.weighed(TAU), SET, np.full(4, 1e-6))
-    assert likeliest(state, np.array([0]), 1e-6)[1] == pytest.approx(0.1**-0.5)
+    state = Eliminated.of(one.gram.with_instability(TAU), SET, np.full(4, 1e-6))
+    assert most_probable_size(state, np.array([0]), 1e-6)[1] == pytest.approx(0.1**-0.5)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -80,8 +82,10 @@ def test_the_size_of_one_axis_of_several_by_dense_rows(seed: int) -> None:
     """Of two columns that have one size in a set, each may have more or less of it."""
     one, v, middle, part = case(seed), 0.8, 1.1, 0.4
     typical = np.array([0.7, 2.0, 1.0, 0.5])
-    state = Eliminated.of(one.gram.weighed(TAU), SET, typical * [1.0, v, v, 1.0])
-    best, unsure = likeliest_of_axis(state, np.array([2]), v, (middle, part))
+    state = Eliminated.of(
+        one.gram.with_instability(TAU), SET, typical * [1.0, v, v, 1.0]
+    )
+    best, unsure = most_probable_axis_size(state, np.array([2]), v, (middle, part))
     apart = np.linspace(-4.0, 4.0, 129)
     near = middle * np.exp(apart * priors.UNLIKE)
     score = [one.dense.evidence(SET, typical * [1.0, v, u, 1.0]) for u in near]
@@ -97,7 +101,9 @@ def test_the_size_of_one_axis_of_several_by_dense_rows(seed: int) -> None:
 
 def test_gains_at_sizes_by_hand() -> None:
     """(3) of two directions at two sizes."""
-    found = gained(np.array([4.0, 0.0]), np.array([9.0, 1.0]), np.array([0.5, 2.0]))
+    found = gains_from_eigenvalues(
+        np.array([4.0, 0.0]), np.array([9.0, 1.0]), np.array([0.5, 2.0])
+    )
     first = 0.5 * (0.25 * 9 / 2 - np.log(2.0)) + 0.5 * 0.25
     second = 0.5 * (4 * 9 / 17 - np.log(17.0)) + 0.5 * 4
     np.testing.assert_allclose(found, [first, second])
@@ -105,32 +111,36 @@ def test_gains_at_sizes_by_hand() -> None:
 
 def test_how_alike_instabilities_are_by_hand() -> None:
     unstable = np.array([1.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0])
-    found = alike((10, 14, 99, 20, 99, 99, 16), unstable)
+    found = instability_log_prior((10, 14, 99, 20, 99, 99, 16), unstable)
     apart = 2 * (2 * STEP / priors.UNLIKE) ** 2 / 2
     assert found == pytest.approx(UNSTEADY[12] + UNSTEADY[20] + UNSTEADY[16] - apart)
-    between = alike((10, 11, 0, 20, 0, 0, 16), unstable)
+    between = instability_log_prior((10, 11, 0, 20, 0, 0, 16), unstable)
     middle = (UNSTEADY[10] + UNSTEADY[11]) / 2
     apart = 2 * (STEP / 2 / priors.UNLIKE) ** 2 / 2
     assert between == pytest.approx(middle + UNSTEADY[20] + UNSTEADY[16] - apart)
     other = np.linspace(0.0, -1.0, len(SIZES))
-    assert alike((10, 14, 0, 20, 0, 0, 16), unstable, other) == pytest.approx(
+    assert instability_log_prior(
+        (10, 14, 0, 20, 0, 0, 16), unstable, other
+    ) == pytest.approx(
         other[12] + other[20] + other[16] - 2 * (2 * STEP / priors.UNLIKE) ** 2 / 2
     )
-    assert alike((5,) * 7, np.zeros(7)) == 0.0
+    assert instability_log_prior((5,) * 7, np.zeros(7)) == 0.0
 
 
 def found(seed: int) -> tuple[Session, Set]:
     rng = np.random.default_rng(seed)
-    tau = SESSION.dictionary.unstable * 3.0
+    tau = SESSION.dictionary.typical_instability * 3.0
     search = SESSION.search(SESSION.noise(rng, tau))
-    return SESSION, search.evaluated(())
+    return SESSION, search.evaluate(())
 
 
 def profile_of(there: Set, gram_score: Array, kind: int) -> Array:
     """Score of a set over the sizes of one instability, the others as they are."""
     every = np.tile(there.sizes.instability, (len(SIZES), 1))
     every[:, kind] = np.arange(len(SIZES))
-    out: Array = gram_score + alike(every, SESSION.dictionary.unstable)
+    out: Array = gram_score + instability_log_prior(
+        every, SESSION.dictionary.typical_instability
+    )
     return out
 
 
@@ -142,17 +152,21 @@ def test_the_weight_of_a_set_is_its_score_and_what_each_size_leaves_of_it(
     session, there = found(seed)
     d, search = session.dictionary, session.search(np.zeros((27, 6)))
     gram = there.state.rows.gram
-    columns, wide = there.state.columns, there.state.sizes
-    top = there.state.score + alike(there.sizes.instability, d.unstable)
-    free = [i for i, g in enumerate(d.always) if g.fixed is None]
+    columns, wide = there.state.columns, there.state.prior_sigma
+    top = there.state.score + instability_log_prior(
+        there.sizes.instability, d.typical_instability
+    )
+    free = [i for i, g in enumerate(d.always) if g.fixed_size is None]
     top += sum(DENSITY[there.sizes.calibration[i]] for i in free)
     total, starts = top, np.cumsum([0, *(len(g.columns) for g in d.always)])
-    rows = gram.weighed(SIZES[list(there.sizes.instability)] * d.unstable)
+    rows = gram.with_instability(
+        SIZES[list(there.sizes.instability)] * d.typical_instability
+    )
     for i in free:
         scores = []
         for k, v in enumerate(SIZES):
             sizes = wide.copy()
-            sizes[starts[i] : starts[i + 1]] = d.always[i].sizes(float(v))
+            sizes[starts[i] : starts[i + 1]] = d.always[i].prior_sigma(float(v))
             scores.append(Eliminated.of(rows, columns, sizes).score + DENSITY[k])
         own = there.sizes.calibration[i]
         assert int(np.argmax(scores)) == own
@@ -162,80 +176,105 @@ def test_the_weight_of_a_set_is_its_score_and_what_each_size_leaves_of_it(
         for v in range(len(SIZES)):
             each = list(there.sizes.instability)
             each[c] = v
-            tau = SIZES[each] * d.unstable
-            score.append(Eliminated.of(gram.weighed(tau), columns, wide).score)
+            tau = SIZES[each] * d.typical_instability
+            score.append(Eliminated.of(gram.with_instability(tau), columns, wide).score)
         profile = profile_of(there, np.array(score), c)
         total += np.logaddexp.reduce(profile - profile.max())
     assert there.score == pytest.approx(total, rel=1e-6)
-    assert search.evaluated(()).members == ()
+    assert search.evaluate(()).members == ()
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) -> None:
     """Each table's score is that of the set there, with the prior of it."""
     rng = np.random.default_rng(seed)
-    tau = SESSION.dictionary.unstable * 3.0
+    tau = SESSION.dictionary.typical_instability * 3.0
     search = SESSION.search(SESSION.noise(rng, tau))
-    there, d = search.evaluated(()), SESSION.dictionary
+    there, d = search.evaluate(()), SESSION.dictionary
     tables = search.tables(there)
     mode = there.sizes.instability
-    kept = {t.less for t in tables}
+    kept = {t.instability for t in tables}
     expected = {
         mode,
-        *(fallen(mode, some, down) for some in FALLING for down in LEVELS),
+        *(lowered_instability(mode, some, down) for some in FALLING for down in LEVELS),
     }
     assert kept == expected
-    rest = there.score - there.state.score - alike(mode, d.unstable)
-    wide, cost = search.opened(there)
+    rest = (
+        there.score
+        - there.state.score
+        - instability_log_prior(mode, d.typical_instability)
+    )
+    wide, cost = search.with_typical_calibration(there)
     for table in tables:
-        if table.less == mode:
+        if table.instability == mode:
             continue
         scores = []
-        for sizes, more in ((there.state.sizes, 0.0), (wide, cost)):
-            rows = search.gram.weighed(SIZES[list(table.less)] * d.unstable)
+        for sizes, more in ((there.state.prior_sigma, 0.0), (wide, cost)):
+            rows = search.gram.with_instability(
+                SIZES[list(table.instability)] * d.typical_instability
+            )
             one = Eliminated.of(rows, there.state.columns, sizes)
-            scores.append(rest + more + one.score + alike(table.less, d.unstable))
+            scores.append(
+                rest
+                + more
+                + one.score
+                + instability_log_prior(table.instability, d.typical_instability)
+            )
         assert min(abs(table.score - s) for s in scores) < 1e-6
         for offer in table.offers:
-            assert offer.less == table.less
+            assert offer.instability == table.instability
         ranked = [o.score for o in table.offers]
         assert ranked == sorted(ranked, reverse=True)
-    plain, small = (t for t in tables if t.less == mode)
+    plain, small = (t for t in tables if t.instability == mode)
     assert plain.score == pytest.approx(there.score)
     starts = np.cumsum([0, *(len(g.columns) for g in d.always)])
     i = [g.cause for g in d.always].index("scale")
-    wide = there.state.sizes.copy()
-    wide[starts[i] : starts[i + 1]] = d.always[i].sizes(float(SIZES[0]))
-    np.testing.assert_allclose(small.state.sizes, wide)
+    wide = there.state.prior_sigma.copy()
+    wide[starts[i] : starts[i + 1]] = d.always[i].prior_sigma(float(SIZES[0]))
+    np.testing.assert_allclose(small.state.prior_sigma, wide)
     lost = DENSITY[0] - DENSITY[there.sizes.calibration[i]]
     expected = there.score - there.state.score + small.state.score + lost
     assert small.score == pytest.approx(expected)
-    beside = fallen(mode, (0, 1, 2), 6)
+    beside = lowered_instability(mode, (0, 1, 2), 6)
     fresh = SESSION.search(SESSION.noise(np.random.default_rng(seed), tau))
-    again = fresh.evaluated(())
+    again = fresh.evaluate(())
     told = replace(again.sizes, instability=beside)
-    assert {t.less for t in fresh.tables(again, told)} == {mode, beside}
+    assert {t.instability for t in fresh.tables(again, told)} == {mode, beside}
 
 
 def test_sizes_below_what_is_typical_are_opened_at_a_price() -> None:
     search = SESSION.search(SESSION.noise(np.random.default_rng(1)))
-    there, d = search.evaluated(()), SESSION.dictionary
-    small = tuple(EVEN - 3 if i == 0 else EVEN + 2 for i in range(len(d.always)))
+    there, d = search.evaluate(()), SESSION.dictionary
+    small = tuple(
+        UNIT_INDEX - 3 if i == 0 else UNIT_INDEX + 2 for i in range(len(d.always))
+    )
     sizes = replace(there.sizes, calibration=small)
     parts = [
-        g.sizes(float(SIZES[s]) if g.fixed is None else g.fixed)
+        g.prior_sigma(float(SIZES[s]) if g.fixed_size is None else g.fixed_size)
         for g, s in zip(d.always, small, strict=True)
     ]
-    state = replace(there.state, sizes=np.concatenate(parts))
-    wide, cost = search.opened(replace(there, sizes=sizes, state=state))
+    state = replace(there.state, prior_sigma=np.concatenate(parts))
+    wide, cost = search.with_typical_calibration(
+        replace(there, sizes=sizes, state=state)
+    )
     first = len(d.always[0].columns)
-    np.testing.assert_allclose(wide[:first], d.always[0].sizes(float(SIZES[EVEN])))
-    np.testing.assert_array_equal(wide[first:], state.sizes[first:])
-    assert cost == pytest.approx(DENSITY[EVEN] - DENSITY[EVEN - 3])
+    np.testing.assert_allclose(
+        wide[:first], d.always[0].prior_sigma(float(SIZES[UNIT_INDEX]))
+    )
+    np.testing.assert_array_equal(wide[first:], state.prior_sigma[first:])
+    assert cost == pytest.approx(DENSITY[UNIT_INDEX] - DENSITY[UNIT_INDEX - 3])
 
 
 def test_instabilities_fall_no_further_than_the_least() -> None:
-    assert fallen((9, 2, 5, 7, 7, 7, 7), (0, 1, 2), 3) == (6, 0, 2, 7, 7, 7, 7)
+    assert lowered_instability((9, 2, 5, 7, 7, 7, 7), (0, 1, 2), 3) == (
+        6,
+        0,
+        2,
+        7,
+        7,
+        7,
+        7,
+    )
 
 
 def test_the_chance_of_a_set_is_its_causes_each_by_its_variants() -> None:
@@ -244,11 +283,11 @@ def test_the_chance_of_a_set_is_its_causes_each_by_its_variants() -> None:
     offset, drift = causes["angle_offset"], causes["bias_drift:gyr"]
     members = ((offset, offset.variants[0]), (drift, drift.variants[-1]))
     expected = sum(np.log(c.chance / len(c.variants)) for c in (offset, drift))
-    assert search.chance(members) == pytest.approx(expected)
+    assert search.log_chance(members) == pytest.approx(expected)
     key = search.key(members)
     assert key == (("angle_offset", 0), ("bias_drift:gyr", len(drift.variants) - 1))
-    both = search.evaluated(members)
-    assert search.evaluated(members[::-1]) is both, "a set has no order"
+    both = search.evaluate(members)
+    assert search.evaluate(members[::-1]) is both, "a set has no order"
     assert both.keys == {"angle_offset", "bias_drift:gyr"}
     less = search.without(both, 0)
     assert less.keys == {"bias_drift:gyr"}

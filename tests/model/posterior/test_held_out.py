@@ -15,9 +15,9 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.posterior.held_out import HeldOut, folds, held_out
+from fieldcal.model.posterior.held_out import HeldOut, folds, held_out_residuals
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.fitted import Fitted, whole
+from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 
@@ -36,7 +36,7 @@ class Refit:
 
     """
 
-    fitted: Fitted
+    fitted: FittedSet
     dense: Dense
     off: Array
 
@@ -52,7 +52,7 @@ class Refit:
             self.dense.cov[np.ix_(kept, kept)], self.dense.white[kept],
         )  # fmt: skip
         state = self.fitted.set.state
-        mean, _ = rest.posterior(state.columns, state.sizes)
+        mean, _ = rest.posterior(state.columns, state.prior_sigma)
         value = np.zeros(self.dictionary.width)
         first = 0
         for group in self.dictionary.always:
@@ -60,7 +60,9 @@ class Refit:
             if group.random:  # it says nothing of another position
                 mean[own] = 0.0
         np.add.at(value, state.columns, mean)
-        return value, np.sqrt(np.bincount(state.columns, state.sizes**2, len(value)))
+        return value, np.sqrt(
+            np.bincount(state.columns, state.prior_sigma**2, len(value))
+        )
 
 
 def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Refit:
@@ -68,12 +70,12 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     # gravity is as little known as where nobody says the place
     x, rng = ladder(3, free, gravity_sigma=0.015), np.random.default_rng(seed)
     d = dictionary(x, common=2e-4)
-    d.always = [replace(g, fixed=0.3) for g in d.always]
-    d.unstable = np.zeros(7)
+    d.always = [replace(g, fixed_size=0.3) for g in d.always]
+    d.typical_instability = np.zeros(7)
     causes = {c.key: c for c in d.causes}
     members = []
     for key in keys:
-        group = replace(causes[key].variants[0], fixed=0.5)
+        group = replace(causes[key].variants[0], fixed_size=0.5)
         members.append((_with(causes[key], group), group))
     state = nominal()
     y = state.output(x, d.since) + rng.normal(0, 3e-3, (ROWS, 6))
@@ -82,12 +84,12 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     rows.sd[:] *= rng.uniform(0.5, 2.0, rows.sd.shape)
     values = np.zeros(d.width)
     values[d.bias : d.bias + 3] = rng.normal(0, 1e-2, 3)
-    values[d.small_rotation : d.small_rotation + 2 * d.places] = rng.normal(
-        0, 1e-3, 2 * d.places
+    values[d.small_rotation : d.small_rotation + 2 * d.position_count] = rng.normal(
+        0, 1e-3, 2 * d.position_count
     )
     linear = WindowSystem(rows, d).linearised(state)
     search = Search(d, gram(linear, d, values))
-    fitted = Fitted(rows, d, linear, values, search.evaluated(tuple(members)))
+    fitted = FittedSet(rows, d, linear, values, search.evaluate(tuple(members)))
     table = np.zeros((ROWS, 6, d.width))
     for part in linear:
         seen = part.design / part.weight[:, None]
@@ -95,7 +97,7 @@ def refit(keys: Iterable[str], free: tuple[int, ...] = (), seed: int = 0) -> Ref
     at, channel = (i.ravel() for i in np.indices((ROWS, 6)))
     design, sd = table.reshape(ROWS * 6, -1), rows.sd.ravel()
     window = x.position[at]
-    cov = np.diag(sd**2) + shared(window, channel, d.common[window, channel])
+    cov = np.diag(sd**2) + shared(window, channel, d.window_error[window, channel])
     for p in free:
         turns = priors.SMALL_ROTATION * design[:, d.small_rotation + 2 * p :][:, :2]
         cov += turns @ turns.T
@@ -121,7 +123,7 @@ def test_residuals_are_those_of_a_refit_without_the_position(
     keys: tuple[str, ...],
 ) -> None:
     one = refit(keys)
-    found = held_out(one.fitted, [one.fitted.set])
+    found = held_out_residuals(one.fitted, [one.fitted.set])
     for p in range(len(LADDER)):
         left = one.dictionary.x.position == p
         value, _ = one.without(left)
@@ -141,8 +143,8 @@ def test_how_likely_each_position_is_given_the_others(keys: tuple[str, ...]) -> 
             one.dense.y[kept], one.dense.design[kept],
             one.dense.cov[np.ix_(kept, kept)], one.dense.white[kept],
         )  # fmt: skip
-        expected += one.dense.evidence(state.columns, state.sizes)
-        expected -= rest.evidence(state.columns, state.sizes)
+        expected += one.dense.evidence(state.columns, state.prior_sigma)
+        expected -= rest.evidence(state.columns, state.prior_sigma)
     found = HeldOut(one.fitted, [one.fitted.set]).density(one.fitted.set)
     assert found == pytest.approx(expected, rel=1e-8)
 
@@ -150,7 +152,7 @@ def test_how_likely_each_position_is_given_the_others(keys: tuple[str, ...]) -> 
 def test_squares_of_what_is_predicted_count_what_the_prediction_does_not_know() -> None:
     one, expected = refit(("cross_coupling",)), 0.0
     state, dense = one.fitted.set.state, one.dense
-    total = dense.total(state.columns, state.sizes)
+    total = dense.total(state.columns, state.prior_sigma)
     for p in range(len(LADDER)):
         left = np.repeat(one.dictionary.x.position == p, 6)
         across = total[np.ix_(left, ~left)]
@@ -166,7 +168,7 @@ def test_squares_of_what_is_predicted_count_what_the_prediction_does_not_know() 
 def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
     """Those it was set at, or those that nobody knows; nothing else is."""
     one = refit(() if free else ("misset",), free)
-    d, found = one.dictionary, held_out(one.fitted, [one.fitted.set])
+    d, found = one.dictionary, held_out_residuals(one.fitted, [one.fitted.set])
     for p in range(len(LADDER)):
         left = d.x.position == p
         value, sizes = one.without(left)
@@ -196,11 +198,11 @@ def test_sets_are_chosen_again() -> None:
     linear = WindowSystem(rows, d).linearised(state)
     search = Search(d, gram(linear, d, np.zeros(d.width)))
     misset = next(c for c in d.causes if c.key == "misset")
-    sets = [search.evaluated(m) for m in ((), ((misset, misset.variants[4]),))]
+    sets = [search.evaluate(m) for m in ((), ((misset, misset.variants[4]),))]
     assert sets[1].score > sets[0].score + 100
-    best = Fitted(rows, d, linear, np.zeros(d.width), sets[1])
-    found = held_out(best, sets)
-    none, there = (held_out(best, [one]) for one in sets)
+    best = FittedSet(rows, d, linear, np.zeros(d.width), sets[1])
+    found = held_out_residuals(best, sets)
+    none, there = (held_out_residuals(best, [one]) for one in sets)
     left = x.position == 4
     np.testing.assert_allclose(found[left], none[left], rtol=1e-9)
     np.testing.assert_allclose(found[~left], there[~left], rtol=1e-9)
@@ -221,16 +223,18 @@ def test_residuals_of_what_is_fitted_are_those_of_a_dense_fit(
     """Turns that nobody knows are those that fit each position best."""
     one = refit(("cross_coupling",), free)
     d, state = one.dictionary, one.fitted.set.state
-    mean, _ = one.dense.posterior(state.columns, state.sizes)
+    mean, _ = one.dense.posterior(state.columns, state.prior_sigma)
     value = np.zeros(d.width)
     np.add.at(value, state.columns, mean)
-    wide = one.dense.design[:, state.columns] * state.sizes
+    wide = one.dense.design[:, state.columns] * state.prior_sigma
     total = one.dense.cov + wide @ wide.T
     back = np.linalg.solve(total, one.dense.y)
     for p in free:
         at = d.small_rotation + 2 * p + np.arange(2)
         value[at] += priors.SMALL_ROTATION**2 * one.dense.design[:, at].T @ back
-    np.testing.assert_allclose(whole(state, d), value, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(
+        estimates_by_column(state, d), value, rtol=1e-5, atol=1e-9
+    )
     rest = (one.dense.y - one.dense.design @ value).reshape(ROWS, 6)
     assert_agree(one.fitted.residual(), rest)
 

@@ -8,8 +8,12 @@ from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.sizing import alike
-from fieldcal.model.posterior.mixture import DEVICES, UNSTEADY, Mixing
+from fieldcal.model.evidence.sizing import instability_log_prior
+from fieldcal.model.posterior.mixture import (
+    DEVICE_LOG_DENSITY,
+    GIVEN_SET_LOG_DENSITY,
+    Mixing,
+)
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
@@ -27,12 +31,14 @@ def mixing(off: Array, given: bool = True) -> Mixing:
         nominal()
     )
     search = Search(D, gram(linear, D, np.zeros(D.width)))
-    return Mixing(D, search.gram, search.evaluated(()), search.unstable, given)
+    return Mixing(
+        D, search.gram, search.evaluate(()), search.typical_instability, given
+    )
 
 
 def wandering(seed: int) -> Array:
     rng = np.random.default_rng(seed)
-    each = 3.0 * D.unstable[:6] * rng.standard_normal((9, 6))
+    each = 3.0 * D.typical_instability[:6] * rng.standard_normal((9, 6))
     off: Array = SD * rng.standard_normal((len(X), 6)) + each[X.position]
     return off
 
@@ -43,7 +49,7 @@ def test_what_cannot_be_seen_beside_the_noise_is_one_instability(
 ) -> None:
     one = mixing(wandering(1))
     noise = SD[triad[0]] / np.sqrt(ROWS)
-    typical = D.unstable[triad[0]]
+    typical = D.typical_instability[triad[0]]
     least = int(np.argmax(SIZES * typical >= 0.2 * noise))
     assert one._showing(triad) == least
     sizes, chance = one._shifted(triad)
@@ -54,8 +60,12 @@ def test_what_cannot_be_seen_beside_the_noise_is_one_instability(
     every = []
     for s in steps:
         moved = [np.clip(m + s, 0, 32) if c in triad else m for c, m in enumerate(mode)]
-        prior = alike(np.array(moved), one.unstable, one.density)
-        every.append(prior - alike(mode, one.unstable, one.density))
+        prior = instability_log_prior(
+            np.array(moved), one.typical_instability, one.density
+        )
+        every.append(
+            prior - instability_log_prior(mode, one.typical_instability, one.density)
+        )
     assert len(sizes) == len(every) - max(0, least - 1)
     np.testing.assert_allclose(chance[1:], every[len(every) - len(sizes) + 1 :])
     total = np.logaddexp.reduce(np.array(every))
@@ -64,12 +74,14 @@ def test_what_cannot_be_seen_beside_the_noise_is_one_instability(
 
 def test_nobody_who_looked_for_causes_doubts_windows() -> None:
     asked, found = mixing(wandering(2)), mixing(wandering(2), False)
-    np.testing.assert_allclose(np.exp(UNSTEADY), priors.loosely())
-    np.testing.assert_allclose(np.exp(DEVICES), priors.density(8.0))
+    np.testing.assert_allclose(
+        np.exp(GIVEN_SET_LOG_DENSITY), priors.instability_density_of_given_set()
+    )
+    np.testing.assert_allclose(np.exp(DEVICE_LOG_DENSITY), priors.density(8.0))
     assert not found.run().bad.any() and asked.run().bad.any()
     assert len(asked.doubted) == 9
     for i, at in asked.doubted:
-        expected = [D.window(c)[i] for c in range(3)]
+        expected = [D.window_columns(c)[i] for c in range(3)]
         assert at.tolist() == expected
     hypotheses = asked._of_triad((3, 4, 5))
     assert {h.window for h in hypotheses} == {-1}

@@ -11,7 +11,7 @@ from small_sessions import Session, ladder
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior import probabilities
-from fieldcal.model.posterior.probabilities import Posterior, Standing
+from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
 from fieldcal.model.search.selection import Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "temperature_bias:acc",
@@ -34,10 +34,10 @@ def drifting(size: float = 0.3, gyr: float = 0.3) -> tuple[Search, Set]:
 def test_an_evidence_is_a_score_without_the_chances() -> None:
     search, best = drifting()
     posterior = Posterior(search, best)
-    empty = search.evaluated(())
+    empty = search.evaluate(())
     assert posterior.evidence(empty) == pytest.approx(empty.score)
     settling = CAUSES["settling:acc"]
-    one = search.evaluated(((settling, settling.variants[0]),))
+    one = search.evaluate(((settling, settling.variants[0]),))
     assert posterior.evidence(one) == pytest.approx(one.score - np.log(settling.chance))
 
 
@@ -45,15 +45,15 @@ def test_what_stands_in_a_cause_s_place_stands_on_both_triads() -> None:
     search, best = drifting()
     assert len(best.members) == 2
     posterior = Posterior(search, best)
-    (name,) = posterior.names(best)
+    (name,) = posterior.cause_names(best)
     other = {"bias_drift": "temperature_bias", "temperature_bias": "bias_drift"}[name]
-    assert set(posterior.instead[name]) == {other}
-    alias = posterior.instead[name][other]
+    assert set(posterior.alternatives[name]) == {other}
+    alias = posterior.alternatives[name][other]
     assert alias.keys == {f"{other}:acc", f"{other}:gyr"}
     near = posterior.evidence(best) - posterior.evidence(alias)
     assert abs(near) < thresholds.SAME
     assert posterior.without(name).members == ()
-    (found,) = posterior.standing()
+    (found,) = posterior.probable_causes()
     assert (found.name, found.aliases) == (name, (other,))
     assert found.triads == {"acc", "gyr"} and found.kind == "effect"
     assert found.members == best.members
@@ -74,9 +74,9 @@ def test_what_its_chance_brings_near_counts_though_its_evidence_is_behind(
     free = next(c for c in session.dictionary.causes if c.name == "time")
     for patience, counts in ((1.0, True), (-3.0, False)):
         search = session.search(off)
-        best = max((search.evaluated(((free, v),)) for v in free.variants),
+        best = max((search.evaluate(((free, v),)) for v in free.variants),
                    key=lambda s: s.score)  # fmt: skip
-        monkeypatch.setattr(probabilities, "OTHERWISE", patience)
+        monkeypatch.setattr(probabilities, "ALTERNATIVE_MARGIN", patience)
         walks = {s.keys: w for s, w in Posterior(search, best).weights}
         assert (frozenset({"random_walk:acc"}) in walks) == counts
         assert not counts or walks[frozenset({"random_walk:acc"})] > 0.5
@@ -98,8 +98,8 @@ def test_what_fades_is_looked_at_between_the_points_of_its_grid() -> None:
     search, best = drifting()
     settling = CAUSES["settling:acc"]
     group = settling.variants[5]
-    assert probabilities._fades(group)
-    assert not probabilities._fades(CAUSES["cross_coupling"].variants[0])
+    assert probabilities._has_time_constant(group)
+    assert not probabilities._has_time_constant(CAUSES["cross_coupling"].variants[0])
     asked: list[Set] = []
 
     def refined(there: Set) -> Set:
@@ -108,31 +108,33 @@ def test_what_fades_is_looked_at_between_the_points_of_its_grid() -> None:
 
     posterior = Posterior(search, best, refined)
     asked.clear()
-    there = search.evaluated((*best.members, (settling, group)))
+    there = search.evaluate((*best.members, (settling, group)))
     bare = posterior.evidence(there)
-    assert posterior._at_best(there, bare + 4.0) == pytest.approx(bare)
+    assert posterior._refined_evidence(there, bare + 4.0) == pytest.approx(bare)
     assert asked == []
-    assert posterior._at_best(there, bare + 10.0) == pytest.approx(bare + 50.0)
+    assert posterior._refined_evidence(there, bare + 10.0) == pytest.approx(bare + 50.0)
     assert asked == [there]
-    assert posterior._at_best(best, 1e9) == pytest.approx(posterior.evidence(best))
+    assert posterior._refined_evidence(best, 1e9) == pytest.approx(
+        posterior.evidence(best)
+    )
     assert asked == [there], "nothing in it fades"
     plain = Posterior(search, best)
-    assert plain._at_best(there, bare + 10.0) == pytest.approx(bare)
+    assert plain._refined_evidence(there, bare + 10.0) == pytest.approx(bare)
 
 
 def test_what_is_hardly_there_is_not_said() -> None:
     search, best = drifting(0.0, 0.0)
     assert best.members == ()
-    assert Posterior(search, best).standing() == []
-    there = search.evaluated(((CAUSES["cross_coupling"],
+    assert Posterior(search, best).probable_causes() == []
+    there = search.evaluate(((CAUSES["cross_coupling"],
                                CAUSES["cross_coupling"].variants[0]),))  # fmt: skip
-    assert Posterior(search, there).standing() == [], "another set is likelier"
+    assert Posterior(search, there).probable_causes() == [], "another set is likelier"
 
 
 def test_an_effect_of_everything_is_on_both_triads() -> None:
     cause = CAUSES["cross_coupling"]
-    one = Standing("a", ((cause, cause.variants[0]),), 1.0, ())
+    one = ProbableCause("a", ((cause, cause.variants[0]),), 1.0, ())
     assert one.triads == {"acc", "gyr"}
     acc = CAUSES["bias_drift:acc"]
-    assert Standing("a", ((acc, acc.variants[0]),), 1.0, ()).triads == {"acc"}
+    assert ProbableCause("a", ((acc, acc.variants[0]),), 1.0, ()).triads == {"acc"}
     assert replace(one, members=((acc, acc.variants[0]),)).kind == "effect"

@@ -55,8 +55,8 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
         nominal, np.zeros(d.width), None
     )
     search = Search(d, gram)
-    there = search.evaluated(())
-    found = Mixing(d, gram, there, search.unstable).run()
+    there = search.evaluate(())
+    found = Mixing(d, gram, there, search.typical_instability).run()
     names = [f"acc_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
     assert found.columns.tolist() == [int(d.columns_for(n)[0]) for n in names]
     design = np.zeros((len(places), 3, 6))

@@ -14,9 +14,13 @@ from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.mixture import KEPT
-from fieldcal.model.posterior.model_average import ModelAverage, averaged, of_columns
+from fieldcal.model.posterior.model_average import (
+    ModelAverage,
+    average_of_columns,
+    average_over_sets,
+)
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.reported import average_over_sizes
 from fieldcal.model.search.selection import Search
 
 SESSION = Session.of(ladder(), ("quadratic", "scale_asymmetry"), 1.0)
@@ -34,17 +38,19 @@ def search_of(value: Array, seed: int) -> Search:
 
 def average_of(search: Search) -> tuple[ModelAverage, Set]:
     best = search.run()
-    return ModelAverage(Posterior(search, best), [reported(search, best)]), best
+    return ModelAverage(
+        Posterior(search, best), [average_over_sizes(search, best)]
+    ), best
 
 
 def test_averages_are_those_of_draws_from_the_sets() -> None:
     """A quantity that a set has twice is the sum there, one that it lacks is 0."""
     search, rng = search_of(np.array([3e-5, 0.0, 1e-5]), 1), np.random.default_rng(2)
-    one = search.evaluated(((QUADRATIC, QUADRATIC.variants[0]),))
-    two = search.evaluated(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    one = search.evaluate(((QUADRATIC, QUADRATIC.variants[0]),))
+    two = search.evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
     sets = [(one, 0.3), (two, 0.1)]
     first, last = one.state.columns[0], one.state.columns[-1]
-    mean, cov = averaged(
+    mean, cov = average_over_sets(
         sets,
         lambda s: [np.flatnonzero(np.isin(s.state.columns, [first, last])),
                    np.flatnonzero(s.state.columns == last)],
@@ -68,8 +74,8 @@ def test_what_a_set_was_not_given_makes_its_numbers_uncertain() -> None:
     average, best = average_of(search_of(np.array([6e-5, 2e-6, -6e-5]), 5))
     ((_, group),) = best.members
     assert 1 not in group.params
-    own = of_columns([(average.best[0], 1.0)], BIAS)[1]
-    whole = of_columns(average.sets, BIAS)[1]
+    own = average_of_columns([(average.best[0], 1.0)], BIAS)[1]
+    whole = average_of_columns(average.sets, BIAS)[1]
     assert whole[1, 1] > 2.0 * own[1, 1]
 
 
@@ -80,17 +86,17 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
     left = ASYMMETRY.variants[0]
     left = replace(left, part=ASYMMETRY.name, typical=np.full(len(left.columns), 2e-3))
     off = SESSION.noise(rng) + SESSION.design[:, :, group.columns] @ np.full(3, 1e-5)
-    first = SESSION.search(off).evaluated(((cause, group),))
-    columns, sizes = first.state.columns, first.state.sizes
+    first = SESSION.search(off).evaluate(((cause, group),))
+    columns, sizes = first.state.columns, first.state.prior_sigma
     at = [int(np.flatnonzero(columns == c)[0]) for c in told]
     steady, pulls = (0,) * len(first.sizes.instability), []
     for _ in range(200):
         drawn, more = (s * rng.standard_normal(len(s)) for s in (sizes, left.typical))
         off = SESSION.noise(rng) + SESSION.design[:, :, columns] @ drawn
         off += SESSION.design[:, :, left.columns] @ more
-        rows = SESSION.search(off).weighed(steady)
+        rows = SESSION.search(off).gram_at(steady)
         there = replace(first, state=Eliminated.of(rows, columns, sizes))
-        mean, cov = of_columns([(there, 1.0)], told, [left])
+        mean, cov = average_of_columns([(there, 1.0)], told, [left])
         wrong = mean - drawn[at]
         pulls.append(wrong @ np.linalg.solve(cov, wrong) / len(told))
     assert np.mean(pulls) == pytest.approx(1.0, abs=0.15)
@@ -101,13 +107,13 @@ def test_what_is_in_no_set_counts_as_if_it_were() -> None:
     )
     np.testing.assert_allclose(mean, whole.estimate[at], rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(cov, whole.inverse[np.ix_(at, at)], rtol=1e-6)
-    plain = of_columns([(there, 1.0)], told)[1]
+    plain = average_of_columns([(there, 1.0)], told)[1]
     ratio = np.diag(cov) / np.diag(plain)
     assert ratio.max() > 1.5
     # a set that has it knows it
-    has = SESSION.search(off).evaluated(((ASYMMETRY, ASYMMETRY.variants[0]),))
-    known = of_columns([(has, 1.0)], told, [left])[1]
-    np.testing.assert_array_equal(known, of_columns([(has, 1.0)], told)[1])
+    has = SESSION.search(off).evaluate(((ASYMMETRY, ASYMMETRY.variants[0]),))
+    known = average_of_columns([(has, 1.0)], told, [left])[1]
+    np.testing.assert_array_equal(known, average_of_columns([(has, 1.0)], told)[1])
 
 
 def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:
@@ -115,7 +121,7 @@ def test_numbers_of_a_member_are_those_of_the_sets_that_have_it() -> None:
     average, best = average_of(search)
     ((cause, group),) = best.members
     there = [(s, w) for s, w in average.sets if cause.key in s.keys]
-    mean, cov = average.of_member((cause, group))
+    mean, cov = average.average_of_member((cause, group))
     total = sum(w for _, w in there)
     by_hand = np.zeros(len(group.params))
     for one, w in there:
@@ -135,24 +141,24 @@ def test_where_axes_may_be_turned_other_parameters_are_the_same_device(
     search = search_of(np.array([3e-5, 2e-5, -3e-5]), 7)
     average, _ = average_of(search)
     by = {group.params: group for group in QUADRATIC.variants}
-    first, last = (search.evaluated(((QUADRATIC, by[p]),)) for p in ((0, 1), (1, 2)))
+    first, last = (search.evaluate(((QUADRATIC, by[p]),)) for p in ((0, 1), (1, 2)))
     monkeypatch.setitem(vars(average), "sets", [(first, 0.6), (last, 0.4)])
     member = QUADRATIC, by[0, 1]
     at = [np.flatnonzero(first.state.columns == c)[-1] for c in by[0, 1].columns]
     own = first.state.estimate[at]
-    assert average.of_member(member)[0][0] == pytest.approx(0.6 * own[0])
-    free = np.ones_like(search.dictionary.free)
-    monkeypatch.setattr(search.dictionary, "free", free)
-    np.testing.assert_allclose(average.of_member(member)[0], own)
+    assert average.average_of_member(member)[0][0] == pytest.approx(0.6 * own[0])
+    free = np.ones_like(search.dictionary.unoriented)
+    monkeypatch.setattr(search.dictionary, "unoriented", free)
+    np.testing.assert_allclose(average.average_of_member(member)[0], own)
 
 
 def test_only_sets_count_that_are_likely_beside_the_best() -> None:
     search = search_of(np.array([1e-4, 1e-4, -1e-4]), 9)
     average, _ = average_of(search)
-    top = max(w for _, w in average.posterior.at_points)
+    top = max(w for _, w in average.posterior.weights_on_grid)
     weights = [w for _, w in average.sets]
     assert min(weights) > np.exp(-KEPT) * top
-    kept = [w for _, w in average.posterior.at_points if w > np.exp(-KEPT) * top]
+    kept = [w for _, w in average.posterior.weights_on_grid if w > np.exp(-KEPT) * top]
     assert sorted(weights) == sorted(kept)
 
 
@@ -172,13 +178,13 @@ def pulls() -> tuple[Array, Array]:
         cause = (QUADRATIC, ASYMMETRY)[int(rng.integers(2))]
         group = cause.variants[int(rng.integers(len(cause.variants)))]
         off = SESSION.noise(rng)
-        size = group.sizes(float(rng.choice(shown)))
+        size = group.prior_sigma(float(rng.choice(shown)))
         off += design[:, :, group.columns] @ (size * rng.standard_normal(len(size)))
         true = 0.1 * noise[0].typical * rng.standard_normal(3)
         off += design[:, :, BIAS] @ true
         average, best = average_of(SESSION.search(off))
         for out, sets in ((mean, average.sets), (alone, [(average.best[0], 1.0)])):
-            value, cov = of_columns(sets, BIAS)
+            value, cov = average_of_columns(sets, BIAS)
             out.append((value - true) / np.sqrt(np.diag(cov)))
     return np.array(mean), np.array(alone)
 
@@ -198,10 +204,10 @@ def test_variants_that_come_near_are_visited(times: float) -> None:
     search = search_of(np.array([3e-5, 4e-6, -3e-5]) * times, 5)
     best = search.run()
     before = set(search.visited)
-    search.vary(best, best.score)
+    search.visit_variations(best, best.score)
     ((cause, _),) = best.members
     new = [s for key, s in search.visited.items() if key not in before]
     assert {c for s in new for c, _ in s.members} <= {cause}
-    every = [search.evaluated(((cause, v),)) for v in cause.variants]
+    every = [search.evaluate(((cause, v),)) for v in cause.variants]
     near = {search.key(s.members) for s in every if s.score > best.score - 2.0}
     assert near <= before | {search.key(s.members) for s in new}

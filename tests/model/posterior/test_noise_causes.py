@@ -17,7 +17,7 @@ def drawn(key: str, size: float, seed: int) -> Posterior:
     rng = np.random.default_rng(seed)
     (cause,) = (c for c in SESSION.dictionary.causes if c.key == key)
     group = cause.variants[0]
-    value = group.sizes(size) * rng.standard_normal(len(group.columns))
+    value = group.prior_sigma(size) * rng.standard_normal(len(group.columns))
     off = SESSION.noise(rng, np.zeros(7)) + SESSION.design[:, :, group.columns] @ value
     search = SESSION.search(off)
     return Posterior(search, search.run())
@@ -27,8 +27,8 @@ def drawn(key: str, size: float, seed: int) -> Posterior:
 def test_flicker_is_nothing_that_is_left_out(seed: int) -> None:
     found = drawn("flicker:acc", 3.0, seed)
     assert "flicker:acc" in found.best.keys
-    assert found.standing() == [] and found.nothing > 0.5
-    assert "flicker" not in dict(found.suspects())
+    assert found.probable_causes() == [] and found.probability_of_noise_alone > 0.5
+    assert "flicker" not in dict(found.ranked_causes())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -37,7 +37,7 @@ def test_a_set_with_flicker_instead_takes_from_what_is_named(seed: int) -> None:
     found = drawn("random_walk:acc", 2.0, seed)
     instead = [s for s, _ in found.weights if s.keys == {"flicker:acc"}]
     assert len(instead) == 1
-    for standing in found.standing():
+    for standing in found.probable_causes():
         assert "flicker" not in standing.aliases
     named = found.probability(["random_walk"]) + found.probability(["bias_drift"])
-    assert found.nothing + named >= 1 - 1e-9
+    assert found.probability_of_noise_alone + named >= 1 - 1e-9

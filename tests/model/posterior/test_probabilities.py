@@ -21,7 +21,7 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.mixture import Mixing
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import reported
+from fieldcal.model.posterior.reported import average_over_sizes
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 
@@ -71,12 +71,12 @@ THREE = np.stack(np.unravel_index(np.arange(len(SIZES) ** 3), (len(SIZES),) * 3)
 
 
 def alike(search: Search) -> list[Array]:
-    """Probabilities of the sizes of each triad by `Search.alike`, (n,)."""
+    """Probabilities of the sizes of each triad, by `instability_log_prior`, (n,)."""
     found = []
     for first in (0, 3):
         every = np.zeros((len(THREE), 7))
         every[:, first : first + 3] = THREE
-        log = np.asarray(search.alike(every))
+        log = np.asarray(search.instability_log_prior(every))
         found.append(np.exp(log - np.logaddexp.reduce(log)))
     return found
 
@@ -103,15 +103,15 @@ def draws() -> tuple[Draw, ...]:
         columns = np.concatenate([g.columns for g in groups])
         drawn = [float(rng.choice(SIZES, p=DENSITY)) for _ in groups]
         wide = np.concatenate([
-            g.sizes(v if g.fixed is None else g.fixed)
+            g.prior_sigma(v if g.fixed_size is None else g.fixed_size)
             for g, v in zip(groups, drawn, strict=True)
         ])  # fmt: skip
         value = wide * rng.standard_normal(len(wide))
-        tau = instabilities(rng, shares) * empty.unstable
+        tau = instabilities(rng, shares) * empty.typical_instability
         off = SESSION.noise(rng, tau) + design[:, :, columns] @ value
         search = SESSION.search(off)
-        known = Eliminated.of(search.gram.weighed(tau), columns, wide)
-        found = search.evaluated(members)
+        known = Eliminated.of(search.gram.with_instability(tau), columns, wide)
+        found = search.evaluate(members)
         true = frozenset(c.name for c, _ in members)
         out.append(Draw(true, value, search, search.run(), known, found))
     return tuple(out)
@@ -122,7 +122,7 @@ def said() -> tuple[Array, Array]:
     """Probabilities that were said, and whether it was so."""
     found = []
     for one in draws():
-        for standing in one.posterior.standing():
+        for standing in one.posterior.probable_causes():
             so = bool(one.true & {standing.name, *standing.aliases})
             found.append((standing.probability, so))
     share, true = zip(*found, strict=True)
@@ -143,7 +143,11 @@ def test_that_nothing_is_there_is_as_unlikely_as_is_said() -> None:
     """Above one half it is that nothing shows: what is too small may be there."""
     every = [(one.posterior, not one.true) for one in draws()]
     for low, high in ((0.0, 0.01), (0.01, 0.6)):
-        some = [(p.nothing, so) for p, so in every if low <= p.nothing < high]
+        some = [
+            (p.probability_of_noise_alone, so)
+            for p, so in every
+            if low <= p.probability_of_noise_alone < high
+        ]
         mean = float(np.mean([p for p, _ in some]))
         true = sum(so for _, so in some)
         assert len(some) >= 8
@@ -153,13 +157,13 @@ def test_that_nothing_is_there_is_as_unlikely_as_is_said() -> None:
 def test_suspects_have_their_probability_and_the_likeliest_is_first() -> None:
     one = draws()[0]
     posterior = Posterior(one.search, one.best)
-    suspects = posterior.suspects()
+    suspects = posterior.ranked_causes()
     assert {n for n, _ in suspects} <= {key.split(":")[0] for key in KEYS}
     for name, probability in suspects:
         assert probability == pytest.approx(posterior.probability([name]))
     shares = [p for _, p in suspects]
     assert shares == sorted(shares, reverse=True)
-    assert max(shares) <= 1 - posterior.nothing + 1e-9
+    assert max(shares) <= 1 - posterior.probability_of_noise_alone + 1e-9
 
 
 def test_what_is_large_is_said() -> None:
@@ -167,7 +171,7 @@ def test_what_is_large_is_said() -> None:
     missed, shown = 0, 0
     for one in draws():
         state = one.known
-        names = {s.name for s in one.posterior.standing()}
+        names = {s.name for s in one.posterior.probable_causes()}
         for cause, group in one.found.members:
             at = np.isin(state.columns, group.columns)
             pull = state.estimate[at] / np.sqrt(np.diag(state.inverse)[at])
@@ -189,8 +193,10 @@ def test_with_known_sizes_estimates_are_as_near_as_they_say() -> None:
     assert 0.93 < np.mean(np.abs(away) < 1.96) < 0.97
     square, freedom = 0.0, 0
     for one in draws():
-        root = np.linalg.cholesky(one.known.inverse / np.outer(*[one.known.sizes] * 2))
-        off = (one.known.estimate - one.value) / one.known.sizes
+        root = np.linalg.cholesky(
+            one.known.inverse / np.outer(*[one.known.prior_sigma] * 2)
+        )
+        off = (one.known.estimate - one.value) / one.known.prior_sigma
         square += float(np.sum(np.linalg.solve(root, off) ** 2))
         freedom += len(off)
     assert chi2.ppf(0.005, freedom) < square < chi2.ppf(0.995, freedom)
@@ -201,19 +207,19 @@ def test_with_sizes_found_estimates_are_as_near_as_they_say() -> None:
     away = []
     for one in draws():
         count = sum(len(g.columns) for g in SESSION.dictionary.always)
-        state = reported(one.search, one.found).state
+        state = average_over_sizes(one.search, one.found).state
         away.append(pulls(state, one.value)[:count])
     assert 0.93 < np.mean(np.abs(np.concatenate(away)) < 1.96) < 0.97
 
 
 def test_what_is_reported_is_the_mean_over_instabilities() -> None:
     one = draws()[1]
-    found = reported(one.search, one.found)
-    wide, _ = one.search.opened(one.found)
+    found = average_over_sizes(one.search, one.found)
+    wide, _ = one.search.with_typical_calibration(one.found)
     state = Eliminated.of(one.found.state.rows, one.found.state.columns, wide)
     opened = replace(one.found, state=state)
-    mixed = Mixing(SESSION.dictionary, one.search.gram, opened, one.search.unstable,
-                   False).run()  # fmt: skip
+    mixed = Mixing(SESSION.dictionary, one.search.gram, opened,
+                   one.search.typical_instability, False).run()  # fmt: skip
     np.testing.assert_allclose(found.state.estimate, mixed.mean)
     np.testing.assert_allclose(found.state.inverse, mixed.covariance)
     half = found.state.half
@@ -231,9 +237,9 @@ def test_what_does_the_same_stands_in_its_place() -> None:
     for seed in range(5):
         rng = np.random.default_rng(seed)
         rise = drift.typical * 0.3 * rng.choice([-1.0, 1.0], 3)
-        off = session.noise(rng, session.dictionary.unstable)
+        off = session.noise(rng, session.dictionary.typical_instability)
         search = session.search(off + session.design[:, :, drift.columns] @ rise)
-        (found,) = Posterior(search, search.run()).standing()
+        (found,) = Posterior(search, search.run()).probable_causes()
         assert {found.name, *found.aliases} == same
         assert found.probability > 0.99
 
@@ -247,7 +253,7 @@ def test_probabilities_are_shares_of_the_sets_that_were_visited() -> None:
     assert best is one.best
     for other, part in posterior.weights:
         assert np.log(part / share) == pytest.approx(other.score - best.score, abs=1e-6)
-    with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.names(s)]
+    with_one = [w for s, w in posterior.weights if KEYS[0] in posterior.cause_names(s)]
     assert posterior.probability([KEYS[0]]) == pytest.approx(sum(with_one))
 
 
@@ -260,18 +266,18 @@ def test_no_probability_is_above_one_however_large_the_evidence() -> None:
     posterior.search.visited = far
     every = {c.name for s in far.values() for c, _ in s.members}
     said = [posterior.probability([name]) for name in every]
-    assert max(said) <= 1.0 and posterior.nothing <= 1.0
+    assert max(said) <= 1.0 and posterior.probability_of_noise_alone <= 1.0
     assert sum(w for _, w in posterior.weights) == pytest.approx(1.0, abs=1e-14)
 
 
 def test_what_accelerometers_show_stands_for_nothing_on_gyroscopes() -> None:
     d = SESSION.dictionary
     drift = next(c for c in d.causes if c.key == "bias_drift:acc").variants[0]
-    there = SESSION.design[:, :, drift.columns] @ drift.sizes(1.0)
+    there = SESSION.design[:, :, drift.columns] @ drift.prior_sigma(1.0)
     rng = np.random.default_rng(4)
     search = SESSION.search(SESSION.noise(rng, np.zeros(7)) + there)
     posterior = Posterior(search, search.run())
-    (one,) = posterior.standing()
+    (one,) = posterior.probable_causes()
     assert (one.name, one.triads) == ("bias_drift", frozenset({"acc"}))
     assert posterior.probability(["bias_drift"], frozenset({"acc"})) > 0.99
     assert posterior.probability(["bias_drift"], frozenset({"gyr"})) < 0.05
@@ -296,7 +302,7 @@ def test_a_cause_that_is_not_excluded_counts_though_the_search_left_it_out() -> 
         for cause in session.dictionary.causes:
             if cause.key in best.keys:
                 continue
-            more = max((session.search(off).evaluated((*best.members, (cause, v)))
+            more = max((session.search(off).evaluate((*best.members, (cause, v)))
                         for v in cause.variants), key=lambda s: s.score)  # fmt: skip
             if more.score > best.score - near:
                 near_ones.append(more.keys in counts)
@@ -313,5 +319,5 @@ def test_what_no_row_tells_from_the_calibration_is_not_shown() -> None:
     for group, size in ((there["gravity_error"], 5.0), (there["bias_drift:acc"], 1.0)):
         off += session.design[:, :, group.columns] @ (size * group.typical)
     search = session.search(off)
-    shown = search.shown_by(search.evaluated(()))
+    shown = search.shown_beside(search.evaluate(()))
     assert not shown(there["gravity_error"]) and shown(there["bias_drift:acc"])

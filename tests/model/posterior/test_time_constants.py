@@ -9,10 +9,10 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
-from fieldcal.model.posterior.model_average import averaged, of_columns
-from fieldcal.model.posterior.reported import reported
-from fieldcal.model.posterior.time_constants import elsewhere
-from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.posterior.model_average import average_of_columns, average_over_sets
+from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
+from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
 
@@ -21,7 +21,7 @@ TAU, SIZE = 9.0, 3e-3
 
 
 @cache
-def fading(seed: int, both: bool = False) -> Inferred:
+def fading(seed: int, both: bool = False) -> InferenceResult:
     """A device that settles on one axis, and perhaps on one of the gyroscopes."""
     sizes = np.array([SIZE, 0.0, 0.0, SIZE / 20 * both, 0.0, 0.0])
     term = Term(catalogue()["settling"], sizes, {"tau_s": TAU})
@@ -45,10 +45,10 @@ def test_each_time_constant_is_elsewhere_once_up_and_once_down() -> None:
     for both in (False, True):
         found = fading(3, both)
         n = len(found.best.members)
-        moved = elsewhere(found)
+        moved = sets_at_other_time_constants(found)
         assert len(moved) == 2 * n == 2 * (1 + both)
         for i, (_, group) in enumerate(found.best.members):
-            step = np.sqrt(n) * group.unsure / group.shape["tau_s"]
+            step = np.sqrt(n) * group.shape_sigma / group.shape["tau_s"]
             own = [s.members[i][1].shape["tau_s"] for s in moved]
             there = sorted({float(np.log(t / group.shape["tau_s"])) for t in own})
             np.testing.assert_allclose(there, [-step, 0.0, step][:: 1 + (n == 1)],
@@ -58,7 +58,7 @@ def test_each_time_constant_is_elsewhere_once_up_and_once_down() -> None:
 def test_what_is_found_keeps_its_columns() -> None:
     found = fading(3)
     width = found.inference.dictionary.width
-    elsewhere(found)
+    sets_at_other_time_constants(found)
     assert found.inference.dictionary.width == width
 
 
@@ -67,12 +67,12 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
     found = fading(3)
     ((_, group),) = found.best.members
     at = group.columns[:1]
-    own = reported(found.search, found.best)
-    (alone,) = np.diag(of_columns([(own, 1.0)], at)[1])
-    sets = [(s, 0.5) for s in elsewhere(found)]
-    (whole,) = np.diag(averaged(sets, lambda s: [
+    own = average_over_sizes(found.search, found.best)
+    (alone,) = np.diag(average_of_columns([(own, 1.0)], at)[1])
+    sets = [(s, 0.5) for s in sets_at_other_time_constants(found)]
+    (whole,) = np.diag(average_over_sets(sets, lambda s: [
         np.flatnonzero(s.state.columns == s.members[0][1].columns[0])])[1])  # fmt: skip
-    tau, sigma = group.shape["tau_s"], group.unsure
+    tau, sigma = group.shape["tau_s"], group.shape_sigma
     system = found.inference.system
     assert isinstance(system, WindowSystem)
     y = system.rows.y[:, 0]
@@ -85,4 +85,9 @@ def test_an_amplitude_is_uncertain_by_what_the_time_constant_moves_it() -> None:
 def test_what_does_not_fade_is_nowhere_else() -> None:
     d = dictionary(X)
     y = np.hstack([X.f, X.w]) + SD * np.random.default_rng(1).standard_normal((54, 6))
-    assert elsewhere(Inference(WindowSystem(rows_of(X, y), d), nominal()).run()) == []
+    assert (
+        sets_at_other_time_constants(
+            Inference(WindowSystem(rows_of(X, y), d), nominal()).run()
+        )
+        == []
+    )

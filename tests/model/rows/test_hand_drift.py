@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.hand_drift import TREMBLES, WALKS, ForceTurn, drift, turning
+from fieldcal.model.rows.hand_drift import (
+    TREMBLES,
+    WALKS,
+    ForceTurn,
+    drift_factor,
+    force_turn_rate,
+)
 
 RATE, SECONDS, G = 100.0, 6.0, 9.81
 T = np.arange(0.0, SECONDS, 1 / RATE)
@@ -21,14 +27,14 @@ def test_an_even_turn_is_seen_about_both_axes_across_gravity() -> None:
     rng, rate = np.random.default_rng(1), np.array([3e-3, -1e-3, 2e-3])
     up = np.array([0.36, 0.48, 0.8])
     across = rate - up * (rate @ up)
-    told = turning(force(np.outer(T, rate), 0.0, rng), SECONDS)
+    told = force_turn_rate(force(np.outer(T, rate), 0.0, rng), SECONDS)
     assert told.square == pytest.approx(across @ across / 2, rel=0.01)
     assert told.noise < 1e-12
 
 
 def test_of_a_device_at_rest_what_is_seen_is_noise() -> None:
     rng = np.random.default_rng(2)
-    still = [turning(force(np.zeros((len(T), 3)), 0.05, rng), SECONDS)
+    still = [force_turn_rate(force(np.zeros((len(T), 3)), 0.05, rng), SECONDS)
              for _ in range(2000)]  # fmt: skip
     square, noise = np.mean(still, axis=0)
     assert square == pytest.approx(noise, rel=0.1)
@@ -37,11 +43,11 @@ def test_of_a_device_at_rest_what_is_seen_is_noise() -> None:
 def test_samples_that_are_missing_change_nothing_else() -> None:
     rng = np.random.default_rng(3)
     acc = force(np.outer(T, [2e-3, 0.0, 0.0]), 1e-4, rng)
-    whole = turning(acc, SECONDS)
+    whole = force_turn_rate(acc, SECONDS)
     acc[50:150, 1] = np.nan
-    assert turning(acc, SECONDS).square == pytest.approx(whole.square, rel=0.02)
+    assert force_turn_rate(acc, SECONDS).square == pytest.approx(whole.square, rel=0.02)
     acc[5:] = np.nan
-    assert turning(acc, SECONDS) == ForceTurn(0.0, np.inf)
+    assert force_turn_rate(acc, SECONDS) == ForceTurn(0.0, np.inf)
 
 
 def hands(kind: str, seed: int) -> tuple[list[ForceTurn], Array]:
@@ -57,14 +63,14 @@ def hands(kind: str, seed: int) -> tuple[list[ForceTurn], Array]:
             angle = 2e-4 * rng.normal(size=(len(T), 3)).cumsum(axis=0)
         about = angle - line @ (line.T @ angle)
         trembles.append((about**2).mean() / SECONDS**2)
-        seen.append(turning(force(angle, 0.003, rng), SECONDS))
+        seen.append(force_turn_rate(force(angle, 0.003, rng), SECONDS))
     return seen, np.array(trembles)
 
 
 def test_one_that_trembles_is_told_from_one_that_walks() -> None:
     """A random walk has 15 in the mean of a^2 and of the mean rate's square."""
-    quiet = [drift(*hands("trembles", seed)) for seed in range(12)]
-    walks = [drift(*hands("walks", seed)) for seed in range(12)]
+    quiet = [drift_factor(*hands("trembles", seed)) for seed in range(12)]
+    walks = [drift_factor(*hands("walks", seed)) for seed in range(12)]
     assert np.mean(quiet) < 3.0
     assert 9.0 < np.mean(walks) < 21.0
     assert min(walks) > max(quiet)
@@ -72,6 +78,6 @@ def test_one_that_trembles_is_told_from_one_that_walks() -> None:
 
 def test_if_nothing_tells_it_is_taken_to_walk() -> None:
     blind = [ForceTurn(0.0, np.inf)] * 3
-    assert drift(blind, np.full(3, 1e-8)) == pytest.approx(WALKS)
-    assert drift(blind, np.zeros(3)) == WALKS
-    assert drift([ForceTurn(1e-9, 1e-9)] * 500, np.full(500, 1e-6)) == TREMBLES
+    assert drift_factor(blind, np.full(3, 1e-8)) == pytest.approx(WALKS)
+    assert drift_factor(blind, np.zeros(3)) == WALKS
+    assert drift_factor([ForceTurn(1e-9, 1e-9)] * 500, np.full(500, 1e-6)) == TREMBLES

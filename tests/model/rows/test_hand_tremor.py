@@ -10,9 +10,9 @@ import pytest
 from small_sessions import LADDER, SD, ladder, rows_of
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.hand_tremor import rows_of as rows_in_a_hand
-from fieldcal.model.rows.hand_tremor import turned_force, wander
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce
+from fieldcal.model.rows.hand_tremor import force_wander_angle, turned_force
+from fieldcal.model.rows.hand_tremor import rows_of_recording as rows_in_a_hand
+from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import parse
 
@@ -30,19 +30,19 @@ def held(angle: float, free: tuple[int, ...] = EVERY, rows: int = 12) -> Rows:
 
 @pytest.mark.parametrize("angle", [2e-3, 1e-2])
 def test_the_angle_is_measured(angle: float) -> None:
-    assert wander(held(angle)) == pytest.approx(angle, rel=0.1)
+    assert force_wander_angle(held(angle)) == pytest.approx(angle, rel=0.1)
 
 
 def test_on_a_table_there_is_none() -> None:
-    assert wander(held(0.0)) == 0.0
-    assert wander(held(5e-6)) == 0.0, "within the noise"
+    assert force_wander_angle(held(0.0)) == 0.0
+    assert force_wander_angle(held(5e-6)) == 0.0, "within the noise"
 
 
 def test_it_is_sought_where_orientations_are_not_known() -> None:
-    assert wander(held(1e-2, ())) == 0.0
-    assert wander(held(1e-2, (0, 1, 2))) == 0.0, "of so few nobody can tell"
-    assert wander(held(1e-2, (0, 1, 2, 3))) > 8e-3
-    assert wander(held(1e-2, rows=1)) == 0.0
+    assert force_wander_angle(held(1e-2, ())) == 0.0
+    assert force_wander_angle(held(1e-2, (0, 1, 2))) == 0.0, "of so few nobody can tell"
+    assert force_wander_angle(held(1e-2, (0, 1, 2, 3))) > 8e-3
+    assert force_wander_angle(held(1e-2, rows=1)) == 0.0
 
 
 def test_what_scatters_along_the_force_as_well_is_no_hand() -> None:
@@ -50,18 +50,18 @@ def test_what_scatters_along_the_force_as_well_is_no_hand() -> None:
     rng = np.random.default_rng(3)
     y = one.y.copy()
     y[:, :3] += 1e-2 * rng.standard_normal((len(y), 3))
-    assert wander(replace(one, y=y)) == 0.0
+    assert force_wander_angle(replace(one, y=y)) == 0.0
 
 
 def test_a_course_that_windows_share_is_none_of_a_hand() -> None:
     one = held(0.0)
     y = one.y.copy()
     y[:, :3] += 0.1 * np.exp(-one.x.since_turn / 5.0)[:, None] * [1.0, -2.0, 0.5]
-    assert wander(replace(one, y=y)) == 0.0
+    assert force_wander_angle(replace(one, y=y)) == 0.0
     cut = one.x.position != 4
     cut |= one.x.since_turn < 20.0  # windows may be of different lengths
     sd = np.where(cut[:, None], one.sd, np.nan)
-    assert wander(replace(one, y=y, sd=sd)) == 0.0
+    assert force_wander_angle(replace(one, y=y, sd=sd)) == 0.0
 
 
 RATE, SECONDS = 50.0, 10.0
@@ -125,9 +125,11 @@ def test_in_a_hand_each_window_is_one_row() -> None:
         np.testing.assert_allclose(found.x.variance[i], some.acc.var(axis=0))
     np.testing.assert_allclose(found.sd[:, :3], np.tile(found.noise[:3], (5, 1))
                                / 500**0.5, rtol=1e-9)  # fmt: skip
-    assert found.wander.shape == (5, 3)
-    assert np.sqrt((found.wander**2).mean(axis=1)) == pytest.approx(angle, rel=0.3)
-    assert found.common.shape == (5, 6) and (found.common[:, 3:] > 4e-5).all()
+    assert found.hand_angle.shape == (5, 3)
+    assert np.sqrt((found.hand_angle**2).mean(axis=1)) == pytest.approx(angle, rel=0.3)
+    assert (
+        found.window_error.shape == (5, 6) and (found.window_error[:, 3:] > 4e-5).all()
+    )
 
 
 def off_and_told(angles: Array, seeds: range) -> tuple[Array, Array]:
@@ -136,7 +138,7 @@ def off_and_told(angles: Array, seeds: range) -> tuple[Array, Array]:
     Of the recordings that show a hand.
     """
     found = [rows_in_a_hand(recording(angles, seed)) for seed in seeds]
-    shown = [one for one in found if one.wander.all()]
+    shown = [one for one in found if one.hand_angle.all()]
     assert len(shown) > len(seeds) / 2
     off = np.array([one.y[:, 3:] for one in shown])
     return off, np.array([one.sd[:, 3:] for one in shown])
@@ -162,12 +164,15 @@ def test_a_hand_that_is_calm_most_of_the_time_is_one() -> None:
     """What one window does is no course that windows share."""
     angles = np.full((5, 3), 2e-4)
     angles[4] = 2e-2
-    assert all(wander(reduce(recording(angles, seed))) > 0 for seed in range(20))
+    assert all(
+        force_wander_angle(reduce_to_rows(recording(angles, seed))) > 0
+        for seed in range(20)
+    )
 
 
 def test_on_a_table_rows_are_as_ever() -> None:
     found = rows_in_a_hand(recording(np.zeros((5, 3))))
-    assert len(found.x) == 50 and found.wander.max() == 0.0
+    assert len(found.x) == 50 and found.hand_angle.max() == 0.0
 
 
 def test_a_quick_hand_is_no_noise_of_the_sensors() -> None:
@@ -176,7 +181,7 @@ def test_a_quick_hand_is_no_noise_of_the_sensors() -> None:
     for seed in range(6):
         angles = np.full((5, 3), 1e-3)
         found = rows_in_a_hand(recording(angles, seed, QUICKLY))
-        assert len(found.x) == 5 and 0.5e-3 < found.wander.mean() < 1.5e-3
+        assert len(found.x) == 5 and 0.5e-3 < found.hand_angle.mean() < 1.5e-3
         assert (found.noise < 30 * NOISE).all()
         loud = rows_of_seed(seed).noise
         assert (found.noise[3:] < 0.3 * loud[3:]).all(), "what trembles is no noise"
@@ -196,7 +201,7 @@ def test_a_table_that_trembles_turns_no_force() -> None:
     for seed in range(6):
         source = recording(np.full((5, 3), 2e-5), seed, (1.0, 8.1))
         found = rows_in_a_hand(source)
-        assert 1e-5 < found.wander.mean() < 3e-5
+        assert 1e-5 < found.hand_angle.mean() < 3e-5
         acc, gyr = found.used[:, :3].all(axis=1), found.used[:, 3:].all(axis=1)
         assert (acc != gyr).all() and acc.sum() == 5 * 10
         assert found.x.position[gyr].tolist() == [0, 1, 2, 3, 4]
@@ -218,7 +223,7 @@ def test_where_it_is_quick_in_some_windows_the_others_tell_the_noise() -> None:
 
 
 def rows_of_seed(seed: int) -> Rows:
-    return reduce(recording(np.full((5, 3), 1e-3), seed, QUICKLY))
+    return reduce_to_rows(recording(np.full((5, 3), 1e-3), seed, QUICKLY))
 
 
 def test_only_a_device_that_somebody_holds_trembles() -> None:
@@ -226,8 +231,8 @@ def test_only_a_device_that_somebody_holds_trembles() -> None:
     angles = np.full((5, 3), 1e-3)
     fixed = recording(angles, 4, QUICKLY, alpha_deg=0.0, beta_deg=2.0)
     for held in (fixed, recording(angles, 4, QUICKLY, 3)):
-        assert rows_in_a_hand(held).wander.max() == 0.0
-    assert rows_in_a_hand(recording(angles, 4, QUICKLY, 4)).wander.all()
+        assert rows_in_a_hand(held).hand_angle.max() == 0.0
+    assert rows_in_a_hand(recording(angles, 4, QUICKLY, 4)).hand_angle.all()
 
 
 def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
@@ -240,7 +245,7 @@ def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
         found = rows_in_a_hand(source)
         assert found.x.position.tolist() == list(range(12))
         held = found.x.position == 7
-        np.testing.assert_array_equal(found.noise, reduce(source).noise)
+        np.testing.assert_array_equal(found.noise, reduce_to_rows(source).noise)
         pulls.append(found.y[held, 3:] / found.sd[held, 3:])
         others.append(found.y[~held, 3:] / found.sd[~held, 3:])
     assert 0.3 < np.sqrt(np.mean(np.square(pulls))) < 1.2
@@ -255,10 +260,14 @@ def test_in_a_fixture_a_hand_turns_known_angles_about_its_own_axis() -> None:
         source = recording(angles, seed, QUICKLY, alpha_deg=0.0, beta_deg=0.0)
         found = rows_in_a_hand(source)
         held = found.x.position == 7
-        assert found.wander[held, 0] == pytest.approx(3e-3, rel=0.5)
-        assert (found.wander[held, 1:] < 2e-4).all() and not found.wander[~held].any()
+        assert found.hand_angle[held, 0] == pytest.approx(3e-3, rel=0.5)
+        assert (found.hand_angle[held, 1:] < 2e-4).all() and not found.hand_angle[
+            ~held
+        ].any()
         white = found.noise[:3] / np.sqrt(500.0)
-        off = np.abs(np.cross([found.wander[held][0, 0], 0.0, 0.0], found.x.f[held][0]))
+        off = np.abs(
+            np.cross([found.hand_angle[held][0, 0], 0.0, 0.0], found.x.f[held][0])
+        )
         assert found.sd[held][0, 2] == pytest.approx(2.0 * off[2], rel=0.05)
         np.testing.assert_allclose(found.sd[~held, :3], np.tile(white, (11, 1)), 0.3)
 
@@ -277,7 +286,7 @@ def test_a_table_that_shakes_in_some_windows_is_no_hand() -> None:
         rng, at = np.random.default_rng(seed), source.block.t // 15 == 4
         shaken = source.block.gyr + 1e-3 * at[:, None] * rng.normal(size=(len(at), 3))
         found = rows_in_a_hand(replace(source, block=replace(source.block, gyr=shaken)))
-        assert len(found.x) == 120 and not found.wander.any()
+        assert len(found.x) == 120 and not found.hand_angle.any()
 
 
 def test_a_bump_in_one_window_is_no_hand() -> None:
@@ -288,7 +297,7 @@ def test_a_bump_in_one_window_is_no_hand() -> None:
     swung = np.sin(2 * np.pi * 1.5 * source.block.t)[:, None] * [3e-2, 1e-2, 0.0]
     gyr += swung * at[:, None]
     found = rows_in_a_hand(replace(source, block=replace(source.block, gyr=gyr)))
-    assert len(found.x) == 120 and not found.wander.any()
+    assert len(found.x) == 120 and not found.hand_angle.any()
 
 
 def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
@@ -301,7 +310,7 @@ def test_an_axis_that_tells_nothing_leaves_the_others() -> None:
     block = replace(source.block, gyr=gyr)
     usable = np.hstack([source.usable[:, :3], np.isfinite(gyr)])
     found = rows_in_a_hand(replace(source, block=block, usable=usable))
-    assert found.x.position.tolist() == list(range(12)) and found.wander[7].any()
+    assert found.x.position.tolist() == list(range(12)) and found.hand_angle[7].any()
     block = replace(source.block, gyr=np.zeros_like(gyr))
     assert len(rows_in_a_hand(replace(source, block=block)).x) == 120
 
@@ -313,5 +322,5 @@ def test_gyroscopes_alone_show_a_hand_as_well() -> None:
     block = replace(source.block, acc=np.full_like(source.block.acc, np.nan))
     usable = np.hstack([np.zeros_like(source.usable[:, :3]), source.usable[:, 3:]])
     found = rows_in_a_hand(replace(source, block=block, usable=usable))
-    assert not found.x.f.any() and found.wander[7].any()
+    assert not found.x.f.any() and found.hand_angle[7].any()
     assert np.isfinite(found.sd[:, 3:]).all()

@@ -65,7 +65,7 @@ def test_coefficients_of_some_stretches_are_those_of_their_rows() -> None:
     kept = values.reshape(-1, there.length, 2)[some]
     expected = np.stack([cosines(one) for one in kept])
     expected[:, 0] = cosines(expected[:, 0])
-    found = there.of_stretches(there.cosines(values), some)
+    found = there.select_stretches(there.cosines(values), some)
     np.testing.assert_allclose(found, expected.reshape(found.shape), atol=1e-12)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import (
-    grain_of,
     noise_of,
-    rounding,
-    rounding_alike,
+    rounding_noise,
+    rounding_sigma,
+    shared_rounding_sigma,
 )
 
 RATE = 100.0
@@ -41,21 +41,24 @@ def test_steps_of_each_output() -> None:
     step = np.array([0.05, 0.0, 0.1, 0.0, 1e-3, 0.0])
     some = step > 0
     block = recorded(step)
-    np.testing.assert_allclose(grain_of(block, WINDOWS)[some], step[some] / 12**0.5)
-    np.testing.assert_array_less(grain_of(block, WINDOWS)[~some], 1e-4)
-    off = rounding(block, WINDOWS)
+    np.testing.assert_allclose(
+        rounding_noise(block, WINDOWS)[some], step[some] / 12**0.5
+    )
+    np.testing.assert_array_less(rounding_noise(block, WINDOWS)[~some], 1e-4)
+    off = rounding_sigma(block, WINDOWS)
     assert off.shape == (2, 6), "of windows that hold samples"
     np.testing.assert_array_less(off[:, ~some], 1e-8)
     still = recorded(np.repeat([1.0, 0.5], 3))
     np.testing.assert_allclose(
-        rounding(still, WINDOWS), np.tile(np.repeat([1.0, 0.5], 3) / 12**0.5, (2, 1))
+        rounding_sigma(still, WINDOWS),
+        np.tile(np.repeat([1.0, 0.5], 3) / 12**0.5, (2, 1)),
     )
 
 
 def test_a_step_that_only_a_turn_shows() -> None:
     """A step that the noise nowhere crosses in a window is seen on the way."""
     block = recorded(np.repeat([1.0, 0.0], 3))
-    grain = grain_of(block, WINDOWS)
+    grain = rounding_noise(block, WINDOWS)
     np.testing.assert_allclose(grain[:3], 1.0 / 12**0.5)
     assert (grain[3:] < 1e-6).all()
 
@@ -63,7 +66,7 @@ def test_a_step_that_only_a_turn_shows() -> None:
 def test_the_more_noise_the_less_rounding_is_left() -> None:
     """Sheppard: of noise of a third of a step hardly any is."""
     step = np.repeat([0.03, 1.0], 3) * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    off = rounding(recorded(step), WINDOWS)[0]
+    off = rounding_sigma(recorded(step), WINDOWS)[0]
     assert 3e-4 < off[0] < 0.03 / 12**0.5 and off[1] < 1e-4
 
 
@@ -78,8 +81,8 @@ def test_the_bias_at_rest_is_off_by_the_same_in_all_windows() -> None:
         rates[on_the_way] += 40 * rng.standard_normal((108, 3))
         acc = rng.normal(0, 9, (12, 3)).repeat(200, axis=0)
         block = Block.of(np.arange(2400) / RATE, acc + rates, 0.01 * np.round(rates))
-        off = rounding(block, windows)
-        alike = rounding_alike(block, windows, off)
+        off = rounding_sigma(block, windows)
+        alike = shared_rounding_sigma(block, windows, off)
         assert not alike[:3].any(), "no two rests are the same to accelerometers"
         means = np.array([block.gyr[a:b].mean(axis=0) for a, b in windows])
         own = (off[:, 3:] ** 2).mean(axis=0) / len(windows)
@@ -94,17 +97,21 @@ def test_means_at_different_places_in_a_step_have_nothing_in_common() -> None:
     block = recorded(np.repeat([0.0, 0.5], 3))
     away = block.gyr + np.arange(6000)[:, None] / 6000 * 13.3
     off = np.full((2, 6), 0.1)
-    found = rounding_alike(replace(block, gyr=0.5 * np.round(2 * away)), WINDOWS, off)
+    found = shared_rounding_sigma(
+        replace(block, gyr=0.5 * np.round(2 * away)), WINDOWS, off
+    )
     assert (found < 0.06).all()
-    assert not rounding_alike(block, WINDOWS[:1], off[:1]).any(), "one has its own"
+    assert not shared_rounding_sigma(block, WINDOWS[:1], off[:1]).any(), (
+        "one has its own"
+    )
 
 
 def test_samples_that_are_missing_do_not_hide_what_means_have_in_common() -> None:
     block = recorded(np.repeat([0.0, 0.5], 3))
-    off = rounding(block, WINDOWS)
-    told = rounding_alike(block, WINDOWS, off)
+    off = rounding_sigma(block, WINDOWS)
+    told = shared_rounding_sigma(block, WINDOWS, off)
     assert (told[3:] > 0.1).all()
     block.gyr[50:100, :2] = np.nan
-    np.testing.assert_allclose(rounding_alike(block, WINDOWS, off), told)
+    np.testing.assert_allclose(shared_rounding_sigma(block, WINDOWS, off), told)
     block.gyr[:2000, 2] = np.nan
-    assert rounding_alike(block, WINDOWS, off)[5] == 0, "one window is left"
+    assert shared_rounding_sigma(block, WINDOWS, off)[5] == 0, "one window is left"

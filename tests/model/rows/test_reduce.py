@@ -9,8 +9,8 @@ import pytest
 from still_samples import FORCE, G, about, place, samples, source
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.model.rows.orientation import readings
-from fieldcal.model.rows.reduce import averaged, reduce
+from fieldcal.model.rows.orientation import gyro_readings
+from fieldcal.model.rows.reduce import average_rows, reduce_to_rows
 
 
 def test_rows_are_means_over_a_second_with_their_noise() -> None:
@@ -19,7 +19,7 @@ def test_rows_are_means_over_a_second_with_their_noise() -> None:
     acc[block.t > 20.0] += np.subtract(FORCE[90.0], FORCE[0.0])
     block = replace(block, acc=acc)
     known = about(place(3.0, 13.0), place(25.0, 35.0, 90.0))
-    rows = reduce(source(block, known))
+    rows = reduce_to_rows(source(block, known))
     assert rows.x.position.tolist() == [0] * 10 + [1] * 10
     for i, first in enumerate([*range(50, 550, 50), *range(1150, 1650, 50)]):
         some = slice(first, first + 50)
@@ -36,7 +36,7 @@ def test_rows_are_means_over_a_second_with_their_noise() -> None:
     np.testing.assert_allclose(rows.noise, white, rtol=0.1)
     np.testing.assert_allclose(rows.sd, np.tile(rows.noise / 50**0.5, (20, 1)))
     np.testing.assert_allclose(rows.x.variance, np.tile(rows.noise[:3] ** 2, (20, 1)))
-    assert (rows.common < 1e-6).all() and not rows.wander.any()
+    assert (rows.window_error < 1e-6).all() and not rows.hand_angle.any()
     assert rows.used.all() and not rows.x.base_rate.any()
     np.testing.assert_allclose(rows.x.warming, 0.01 * (rows.x.t - 2.0), atol=1e-6)
     np.testing.assert_allclose(rows.x.heating, 0.01, rtol=1e-3)
@@ -47,8 +47,8 @@ def test_rows_are_means_over_a_second_with_their_noise() -> None:
 def test_the_time_since_a_turn_counts_from_the_arrival() -> None:
     block = samples(40.0)
     known = about(place(3.0, 13.0), place(25.0, 35.0))
-    one = replace(source(block, known), arrived=np.array([2.5, 21.0]))
-    x = reduce(one).x
+    one = replace(source(block, known), rest_began=np.array([2.5, 21.0]))
+    x = reduce_to_rows(one).x
     since = x.t - np.where(x.position == 1, 21.0, 2.5)
     np.testing.assert_allclose(x.since_turn, since)
 
@@ -57,18 +57,22 @@ def test_joints_are_those_of_angles_that_were_set_and_not_measured() -> None:
     block = samples(60.0)
     known = about(place(3.0, 13.0), place(25.0, 35.0, 90.0), place(40.0, 50.0))
     arrived = np.array([2.5, 21.0, 38.0])
-    turns = reduce(replace(source(block, known), arrived=arrived)).x.joint_turns
+    turns = reduce_to_rows(
+        replace(source(block, known), rest_began=arrived)
+    ).x.joint_turns
     assert turns.at.tolist() == [21.0, 38.0]
     assert turns.side[:, 0].tolist() == [1.0, -1.0]
     first, *rest = known.positions
     measured = replace(known, positions=(replace(first, sigma=1e-3), *rest))
-    turns = reduce(replace(source(block, measured), arrived=arrived)).x.joint_turns
+    turns = reduce_to_rows(
+        replace(source(block, measured), rest_began=arrived)
+    ).x.joint_turns
     assert turns.at.tolist() == [38.0] and turns.side[:, 0].tolist() == [-1.0]
 
 
 def test_a_device_that_sees_the_earth_has_its_rate() -> None:
     block, device = samples(20.0), {"grade": "navigation", "name": "a"}
-    x = reduce(source(block, about(place(3.0, 13.0), device=device))).x
+    x = reduce_to_rows(source(block, about(place(3.0, 13.0), device=device))).x
     angle = np.deg2rad(50.0)
     expected = EARTH_RATE * np.array([0.0, -np.sin(angle), np.cos(angle)])
     np.testing.assert_allclose(x.base_rate, expected)
@@ -81,7 +85,7 @@ def test_rows_of_samples_that_are_missing() -> None:
     block = replace(block, gyr=gyr)
     one = source(block, about(place(2.0, 12.0)))
     one.usable[:25, 0] = False
-    rows = reduce(one)
+    rows = reduce_to_rows(one)
     assert rows.y[0, 0] == pytest.approx(block.acc[25:50, 0].mean(), abs=1e-12)
     assert rows.sd[0, 0] == pytest.approx(rows.noise[0] / 5.0)
     kept = [*range(50, 60), *range(70, 100)]
@@ -99,14 +103,16 @@ def test_what_never_changes_tells_nothing() -> None:
     block = samples(12.0)
     gyr = block.gyr.copy()
     gyr[:, 0] = 0.01
-    rows = reduce(source(replace(block, gyr=gyr), about(place(2.0, 12.0))))
+    rows = reduce_to_rows(source(replace(block, gyr=gyr), about(place(2.0, 12.0))))
     np.testing.assert_array_equal(
         rows.used.all(axis=0), [True] * 3 + [False, True, True]
     )
 
 
 def test_a_window_of_one_sample_has_no_row() -> None:
-    rows = reduce(source(samples(12.0), about(place(2.0, 2.01), place(3.0, 9.0))))
+    rows = reduce_to_rows(
+        source(samples(12.0), about(place(2.0, 2.01), place(3.0, 9.0)))
+    )
     assert set(rows.x.position) == {1}
 
 
@@ -117,7 +123,7 @@ def test_of_unknown_orientation_the_force_is_along_what_is_read() -> None:
         "acc_bias": [0.0, 1.0, 0.5], "acc_scale": [1.0, 2.0, 1.0],
         "gyr_scale": [1.0, -2.0, 1.0],
     })  # fmt: skip
-    rows = reduce(source(block, known))
+    rows = reduce_to_rows(source(block, known))
     free = rows.x.position == 0
     read = (np.subtract(FORCE[0.0], [0.0, 1.0, 0.5])) / [1.0, 2.0, 1.0]
     along = G * read / np.linalg.norm(read)
@@ -125,13 +131,15 @@ def test_of_unknown_orientation_the_force_is_along_what_is_read() -> None:
     np.testing.assert_allclose(rows.x.f[~free], np.tile(FORCE[0.0], (10, 1)))
     earth = EARTH_RATE / 3**0.5 * np.array([1.0, 2.0, 1.0])
     np.testing.assert_allclose(
-        rows.common[free, 3:], np.tile(earth, (10, 1)), rtol=0.01
+        rows.window_error[free, 3:], np.tile(earth, (10, 1)), rtol=0.01
     )
-    assert (rows.common[~free] < 1e-6).all() and (rows.common[:, :3] < 1e-4).all()
-    alone = reduce(source(block, about(place(3.0, 13.0, None))))
-    assert (alone.common < 1e-6).all()
-    nowhere = reduce(source(block, about()))
-    assert not nowhere.x.oriented.any() and (nowhere.common < 1e-6).all()
+    assert (rows.window_error[~free] < 1e-6).all() and (
+        rows.window_error[:, :3] < 1e-4
+    ).all()
+    alone = reduce_to_rows(source(block, about(place(3.0, 13.0, None))))
+    assert (alone.window_error < 1e-6).all()
+    nowhere = reduce_to_rows(source(block, about()))
+    assert not nowhere.x.oriented.any() and (nowhere.window_error < 1e-6).all()
 
 
 def test_coarse_outputs_may_be_off_all_through_a_window() -> None:
@@ -139,9 +147,9 @@ def test_coarse_outputs_may_be_off_all_through_a_window() -> None:
     acc = block.acc.copy()
     acc[:, 0] = 0.05 * np.round(block.acc[:, 0] / 0.05)
     acc[30, 0] = 0.05
-    rows = reduce(source(replace(block, acc=acc), about(place(2.0, 12.0))))
-    np.testing.assert_allclose(rows.common[:, 0], 0.05 / 12**0.5, rtol=0.02)
-    assert (rows.common[:, 1:] < 1e-6).all()
+    rows = reduce_to_rows(source(replace(block, acc=acc), about(place(2.0, 12.0))))
+    np.testing.assert_allclose(rows.window_error[:, 0], 0.05 / 12**0.5, rtol=0.02)
+    assert (rows.window_error[:, 1:] < 1e-6).all()
 
 
 def test_averages_between_any_bounds() -> None:
@@ -150,14 +158,14 @@ def test_averages_between_any_bounds() -> None:
     bound = np.array([[10, 20], [20, 60], [200, 204]])
     level, noise = np.full((3, 6), 2.0), np.full(6, 7.0)
     variance = np.arange(9.0).reshape(3, 3)
-    rows = averaged(one, bound, np.array([0, 0, 1]), level, noise, variance)
+    rows = average_rows(one, bound, np.array([0, 0, 1]), level, noise, variance)
     for i, (a, b) in enumerate(bound):
         np.testing.assert_allclose(rows.y[i], block.six[a:b].mean(axis=0), atol=1e-12)
         np.testing.assert_allclose(rows.sd[i], 2.0 / np.sqrt(b - a))
     np.testing.assert_allclose(rows.length, [0.2, 0.8, 0.08])
     np.testing.assert_array_equal(rows.noise, noise)
     np.testing.assert_array_equal(rows.x.variance, variance)
-    assert not rows.common.any()
+    assert not rows.window_error.any()
 
 
 def test_a_table_that_turns_hides_the_force_across_its_axis() -> None:
@@ -166,13 +174,13 @@ def test_a_table_that_turns_hides_the_force_across_its_axis() -> None:
     ]
     turned[1] |= {"start_s": 15.0, "end_s": 25.0}
     known = about(*turned)
-    rows = reduce(source(samples(30.0), known))
+    rows = reduce_to_rows(source(samples(30.0), known))
     upright = rows.x.position == 0
     assert rows.used[upright].all() and not rows.used[~upright, :3].any()
-    rates = readings(known, rows.x.position, rows.y[:, 3:]).rates(np.eye(3))
+    rates = gyro_readings(known, rows.x.position, rows.y[:, 3:]).rates(np.eye(3))
     expected = np.deg2rad(np.where(upright[:, None], [0, 90.0, 0], [30.0, 0, 0]))
     np.testing.assert_allclose(rates, expected)
-    none = readings(about(), np.zeros(4, int), np.zeros((4, 3)))
+    none = gyro_readings(about(), np.zeros(4, int), np.zeros((4, 3)))
     np.testing.assert_array_equal(none.rates(np.eye(3)), np.zeros((4, 3)))
 
 
@@ -185,7 +193,7 @@ def test_what_goes_round_with_a_table_is_taken_out_of_its_window_alone() -> None
     gyr += round_
     gyr[:, 1] += np.where(block.t < 20.0, np.pi / 2, 0.0)
     known = about(place(3.0, 18.3) | {"rate_deg_s": [0, 90.0, 0]}, place(22.0, 35.0))
-    rows = reduce(source(replace(block, gyr=gyr), known))
+    rows = reduce_to_rows(source(replace(block, gyr=gyr), known))
     on = rows.x.position == 0
     assert np.abs(rows.y[on][:, [3, 5]]).max() < 1e-6
     assert np.abs(rows.y[~on][:, [3, 5]]).max() > 2e-5

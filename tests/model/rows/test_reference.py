@@ -26,11 +26,11 @@ REFERENCE = Reference(Block.of(T, waves(T)[:, :3], waves(T)[:, 3:]))
 
 
 def followed(tau: float, by: Reference = REFERENCE) -> Reference:
-    return by.through(partial(first_order, tau=tau))
+    return by.filtered_by(partial(first_order, tau=tau))
 
 
 def smoothed(tau: float, by: Reference = REFERENCE) -> Reference:
-    return by.through(partial(second_order, tau=tau))
+    return by.filtered_by(partial(second_order, tau=tau))
 
 
 def after_butterworth(t: Array, tau: float) -> Array:
@@ -89,16 +89,16 @@ def test_the_bend_is_what_an_output_loses_in_the_second_order(tau: float) -> Non
 def test_a_step_from_nothing_leads_to_the_low_pass_that_shows_as_much() -> None:
     """Beyond a delay it shows by the cube of tau, or by the square of first order."""
     plain = Response.of(REFERENCE)
-    there = plain.towards(REFERENCE, 0.0, 0.0, 0.03**3 / (3 * LEAST_SECOND**2))
+    there = plain.step_towards(REFERENCE, 0.0, 0.0, 0.03**3 / (3 * LEAST_SECOND**2))
     assert there.second == pytest.approx(0.03)
     early = there.late + np.sqrt(2) * there.second
     assert early == pytest.approx(np.sqrt(2) * 0.03**3 / (3 * LEAST_SECOND**2))
-    first = plain.towards(REFERENCE, 0.0, 0.03**2 / LEAST, 0.0)
+    first = plain.step_towards(REFERENCE, 0.0, 0.03**2 / LEAST, 0.0)
     assert first.tau == pytest.approx(0.03)
-    assert plain.towards(REFERENCE, 0.01, 0.0, 0.0).sensed is REFERENCE
-    exact = plain.towards(REFERENCE, 0.01, 0.02, 0.03, free=False)
+    assert plain.step_towards(REFERENCE, 0.01, 0.0, 0.0).sensed is REFERENCE
+    exact = plain.step_towards(REFERENCE, 0.01, 0.02, 0.03, free=False)
     assert (exact.late, exact.tau, exact.second) == (0.01, 0.02, 0.03)
-    assert there.apart(first) == pytest.approx(0.03 / LEAST)
+    assert there.distance_to(first) == pytest.approx(0.03 / LEAST)
 
 
 def test_a_wave_passes_low_passes_of_both_orders_in_turn() -> None:
@@ -132,7 +132,7 @@ def test_channels_sampled_at_other_instants_are_each_followed_by_their_own() -> 
     six[:, 1] = np.nan
     found = Reference(Block.of(T, six[:, :3], six[:, 3:]))
     np.testing.assert_array_equal(found.observed, [1, 0, 1, 1, 1, 1])
-    np.testing.assert_array_equal(found.lost, [1])
+    np.testing.assert_array_equal(found.missing_channels, [1])
     expected = waves(INSIDE, np.arctan(W * 0.02) / W, np.hypot(1, W * 0.02) ** -1)
     expected[:, 1] = 0.0
     np.testing.assert_allclose(followed(0.02, found).at(INSIDE), expected, atol=3e-4)

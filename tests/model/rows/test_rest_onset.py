@@ -9,7 +9,7 @@ import pytest
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
-from fieldcal.model.rows.rest_onset import arrivals, beginnings
+from fieldcal.model.rows.rest_onset import rest_instants, window_starts
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.session.description import Description, parse
 
@@ -45,7 +45,9 @@ def recorded(moving: Array, size: float, channel: int) -> Block:
 def test_the_last_sign_of_motion_is_the_arrival(
     channel: int, size: float, until: float
 ) -> None:
-    found = arrivals(recorded(np.array([11.0, until]), size, channel), KNOWN, NOISE)
+    found = rest_instants(
+        recorded(np.array([11.0, until]), size, channel), KNOWN, NOISE
+    )
     assert found[0] == 1.0, "with nothing before it the first rests from the start"
     assert until - 0.02 <= found[1] <= until + PIECE + 0.02
 
@@ -58,7 +60,7 @@ def test_the_last_sign_of_motion_is_the_arrival(
     ],
 )
 def test_what_is_no_motion(channel: int, size: float) -> None:
-    found = arrivals(recorded(np.array([11.0, 15.0]), size, channel), KNOWN, NOISE)
+    found = rest_instants(recorded(np.array([11.0, 15.0]), size, channel), KNOWN, NOISE)
     assert found[1] == pytest.approx(10.0)
 
 
@@ -66,7 +68,7 @@ def test_what_is_no_motion(channel: int, size: float) -> None:
 def test_noisy_gyroscopes_have_to_show_more(size: float, moves: bool) -> None:
     """Seven deviations of a mean of twenty: 7 * 0.0125 / sqrt(20) is 0.0196."""
     noise = np.repeat([1e-2, 1.25e-2], 3)
-    found = arrivals(recorded(np.array([11.0, 15.0]), size, 4), KNOWN, noise)
+    found = rest_instants(recorded(np.array([11.0, 15.0]), size, 4), KNOWN, noise)
     assert (found[1] > 14.9) == moves
 
 
@@ -74,12 +76,12 @@ def test_noisy_gyroscopes_have_to_show_more(size: float, moves: bool) -> None:
 def test_without_gyroscopes_the_force_tells(size: float, moves: bool) -> None:
     block = recorded(np.array([11.0, 15.0]), size, 2)
     bare = Block.of(block.t, block.acc)
-    found = arrivals(bare, KNOWN, NOISE)
+    found = rest_instants(bare, KNOWN, NOISE)
     assert found[1] == pytest.approx(15.1 if moves else 10.0, abs=0.12)
 
 
 def test_one_that_moves_until_the_window_begins_has_just_arrived() -> None:
-    found = arrivals(recorded(np.array([11.0, 20.0]), 0.5, 3), KNOWN, NOISE)
+    found = rest_instants(recorded(np.array([11.0, 20.0]), 0.5, 3), KNOWN, NOISE)
     assert found[1] == pytest.approx(20.0, abs=0.02)
 
 
@@ -89,13 +91,13 @@ def test_of_slow_samples_a_piece_has_two() -> None:
     six = NOISE * np.random.default_rng(0).standard_normal((len(t), 6))
     six[(t >= 11.0) & (t < 13.1), 3] += 0.5
     block = Block.of(t, six[:, :3], six[:, 3:])
-    assert arrivals(block, KNOWN, NOISE)[1] == pytest.approx(13.2)
+    assert rest_instants(block, KNOWN, NOISE)[1] == pytest.approx(13.2)
 
 
 def test_between_windows_that_touch_there_is_no_turn_to_see() -> None:
     known = about((4.0, 10.0), (10.0, 20.0), (20.05, 25.0))
     block = recorded(np.array([0.0, 0.0]), 0.0, 3)
-    np.testing.assert_allclose(arrivals(block, known, NOISE), [1.0, 10.0, 20.05])
+    np.testing.assert_allclose(rest_instants(block, known, NOISE), [1.0, 10.0, 20.05])
 
 
 def test_a_window_begins_where_it_is_said_to_or_with_the_arrival() -> None:
@@ -104,7 +106,7 @@ def test_a_window_begins_where_it_is_said_to_or_with_the_arrival() -> None:
     usable = np.ones((len(block), 6), dtype=bool)
     arrived = np.array([2.5, 16.0])
     source = RowSource(block, known, usable, arrived, Thermometer.of(block))
-    np.testing.assert_allclose(beginnings(source), [4.0, 16.0])
+    np.testing.assert_allclose(window_starts(source), [4.0, 16.0])
     whole = RowSource(block, about(), usable, arrived[:1], Thermometer.of(block))
-    np.testing.assert_allclose(beginnings(whole), [1.0])
-    assert arrivals(block, known, NOISE)[1] == 1.0, "nobody knows without a window"
+    np.testing.assert_allclose(window_starts(whole), [1.0])
+    assert rest_instants(block, known, NOISE)[1] == 1.0, "nobody knows without a window"

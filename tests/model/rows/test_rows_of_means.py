@@ -63,11 +63,13 @@ def test_of_means_that_nobody_timed_none_is_later() -> None:
 
 
 def test_the_earth_turns_a_device_of_unknown_orientation() -> None:
-    common = rows(True).common
+    common = rows(True).window_error
     earth = EARTH_RATE / 3**0.5 * np.array([1.0, 2.0, 1.0])
     np.testing.assert_allclose(common[2], [0.0] * 3 + earth.tolist())
     assert not common[:2].any()
-    assert not rows(True, known=0, places=1).common.any(), "it is in the bias of one"
+    assert not rows(True, known=0, places=1).window_error.any(), (
+        "it is in the bias of one"
+    )
 
 
 def test_the_median_is_that_of_what_is_known() -> None:

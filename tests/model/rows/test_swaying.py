@@ -20,7 +20,7 @@ from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession, solve_session
-from fieldcal.model.rows.swaying import swaying
+from fieldcal.model.rows.swaying import find_base_sway
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session
@@ -181,7 +181,7 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held]}
     )  # fmt: skip
-    found = swaying(block, about)
+    found = find_base_sway(block, about)
     assert found is not None
     for (_, end), (start, _) in pairwise(held):
         gap = slice(*np.searchsorted(t, [end, start]))
@@ -213,8 +213,11 @@ def test_a_window_too_short_to_show_it_is_as_uncertain_as_its_ends(
     places = positions()
     places[2]["end_s"] = places[2]["start_s"] + 8.0
     short = Session.open(write_session(tmp_path / "s", block, places))
-    found = swaying(block, short.about)
-    assert found is not None and found.left[2, 0] > 100 * found.left[1, 0]
+    found = find_base_sway(block, short.about)
+    assert (
+        found is not None
+        and found.excess_variance[2, 0] > 100 * found.excess_variance[1, 0]
+    )
     still = usable_windows(short)  # eight seconds of it creep, and are no rest
     assert 2 not in still.position_numbers and any(
         "position 3" in w for w in still.warnings
@@ -245,7 +248,7 @@ def test_waves_take_slow_noise_with_them_and_the_rows_know_it(tmp_path: Path) ->
     """In the band of the waves hardly any noise is left: it is in their uncertainty."""
     block = played(8, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))
     one = session(tmp_path / "pier", block)
-    found = swaying(one.block, one.about)
+    found = find_base_sway(one.block, one.about)
     assert found is not None
     assert found.white == pytest.approx(NOISE, rel=0.05)
     rows = prepare_recording(one.block, one.about).rows

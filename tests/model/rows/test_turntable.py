@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.rotation import exponential
 from fieldcal.core.samples import Array
-from fieldcal.model.rows.turntable import going_round
+from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 
 AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
 SPEED = 0.5
@@ -31,7 +31,9 @@ def outputs(t: Array, length: float) -> tuple[Array, Array]:
 def test_it_is_found_beside_the_mean(length: float) -> None:
     t = 5.0 + np.arange(0.0, 30.0, 1.0)
     gyr, round_ = outputs(t, length)
-    found = going_round(t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, length)
+    found = fit_rotating_earth_rate(
+        t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, length
+    )
     np.testing.assert_allclose(found.values, round_, atol=2e-9)
     assert np.abs(round_).max() > 2e-5
 
@@ -44,7 +46,7 @@ def test_its_uncertainty_is_that_of_the_mean_that_is_left() -> None:
     off = []
     for _ in range(1000):
         noisy = gyr + sd * rng.standard_normal(gyr.shape)
-        found = going_round(t, SPEED * AXIS, noisy, sd, SCALE, np.ones(15))
+        found = fit_rotating_earth_rate(t, SPEED * AXIS, noisy, sd, SCALE, np.ones(15))
         off.append((found.values - round_).mean(axis=0))
     spread = np.cov(np.array(off).T)
     size = np.sqrt(np.diag(found.covariance))
@@ -59,10 +61,12 @@ def test_rows_that_are_missing_are_not_asked() -> None:
     sd = np.full((30, 3), SD)
     gyr[4, 1], sd[9, 2] = np.nan, np.nan
     gyr[9] += 1.0
-    found = going_round(t, SPEED * AXIS, gyr, sd, SCALE, 1.0)
+    found = fit_rotating_earth_rate(t, SPEED * AXIS, gyr, sd, SCALE, 1.0)
     np.testing.assert_allclose(found.values, round_, atol=2e-9)
     gyr[2:] = np.nan
-    assert not going_round(t, SPEED * AXIS, gyr, sd, SCALE, 1.0).values.any()
+    assert not fit_rotating_earth_rate(
+        t, SPEED * AXIS, gyr, sd, SCALE, 1.0
+    ).values.any()
 
 
 @pytest.mark.parametrize("times", [1.5, 1.0, 0.5])
@@ -71,7 +75,9 @@ def test_what_is_larger_than_the_earth_makes_stays(times: float) -> None:
     gyr, round_ = outputs(t, 1.0)
     size = np.linalg.norm(EARTH - AXIS * (EARTH @ AXIS))
     gyr += (times * EARTH_RATE / size - 1.0) * round_
-    found = going_round(t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, 1.0)
+    found = fit_rotating_earth_rate(
+        t, SPEED * AXIS, gyr, np.full((30, 3), SD), SCALE, 1.0
+    )
     assert found.values.any() == (times <= 1.0)
 
 
@@ -82,7 +88,9 @@ def test_of_less_than_a_turn_the_mean_keeps_what_nobody_can_tell(
     """(2): none of it along the axis, whatever the direction across."""
     t = np.linspace(0.0, seconds, 20)
     gyr, _ = outputs(t, 0.1)
-    found = going_round(t, SPEED * AXIS, gyr, np.full((20, 3), SD), SCALE, 0.1)
+    found = fit_rotating_earth_rate(
+        t, SPEED * AXIS, gyr, np.full((20, 3), SD), SCALE, 0.1
+    )
     assert not found.values.any()
     size = 2 / 3 * EARTH_RATE**2 * share
     expected = size * (np.eye(3) - np.outer(AXIS, AXIS))

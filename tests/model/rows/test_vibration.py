@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.vibration import shaking, usual_noise, without_lines
+from fieldcal.model.rows.vibration import (
+    measure_window_noise,
+    quiet_window_noise,
+    without_lines,
+)
 
 RATE = 200.0
 WHITE = np.repeat([1e-2, 1e-4], 3)
@@ -32,7 +36,7 @@ def line(hz: float, size: Array, window: int) -> Array:
 
 
 def test_windows_alike_have_the_usual_noise() -> None:
-    found = shaking(block_of(six_of()), WINDOWS, RATE)
+    found = measure_window_noise(block_of(six_of()), WINDOWS, RATE)
     np.testing.assert_allclose(found.noise, WHITE, rtol=0.1)
     np.testing.assert_array_equal(found.levels, np.tile(found.noise, (5, 1)))
     np.testing.assert_allclose(found.variance, np.tile(found.noise[:3] ** 2, (5, 1)))
@@ -42,7 +46,7 @@ def test_windows_alike_have_the_usual_noise() -> None:
 def test_a_line_in_a_window_is_taken_out_and_its_shaking_kept(hz: float) -> None:
     size = np.array([0.3, 0.1, 0.0, 0.0, 2e-3, 0.0])
     plain = six_of()
-    found = shaking(block_of(plain + line(hz, size, 2)), WINDOWS, RATE)
+    found = measure_window_noise(block_of(plain + line(hz, size, 2)), WINDOWS, RATE)
     np.testing.assert_allclose(found.noise, WHITE, rtol=0.1)
     left = found.block.six - plain
     assert np.abs(left[:, :3]).max() < 3e-3 and np.abs(left[:, 3:]).max() < 3e-5
@@ -59,12 +63,12 @@ def test_a_window_of_more_noise_has_more() -> None:
     six = six_of()
     rng = np.random.default_rng(9)
     six[3 * N : 4 * N, 0] += 0.03 * rng.standard_normal(N)
-    found = shaking(block_of(six), WINDOWS, RATE)
+    found = measure_window_noise(block_of(six), WINDOWS, RATE)
     assert found.levels[3, 0] == pytest.approx(np.hypot(0.01, 0.03), rel=0.1)
     np.testing.assert_allclose(found.levels[3, 1:], found.noise[1:], rtol=0.1)
     np.testing.assert_array_equal(found.levels[0], found.noise)
     assert found.variance[3, 0] == pytest.approx(0.03**2 + 0.01**2, rel=0.15)
-    noise = usual_noise(block_of(six), WINDOWS, RATE)
+    noise = quiet_window_noise(block_of(six), WINDOWS, RATE)
     np.testing.assert_array_equal(noise.white, found.noise)
     np.testing.assert_allclose(noise.quick, WHITE, rtol=0.1)
 
@@ -76,7 +80,7 @@ def test_how_much_louder_counts_depends_on_the_samples(
     """Six standard errors of 2000 samples are 13 per cent."""
     six = six_of()
     six[3 * N : 4 * N, 4] *= 1.0 + share
-    found = shaking(block_of(six), WINDOWS, RATE)
+    found = measure_window_noise(block_of(six), WINDOWS, RATE)
     assert (found.levels[3, 4] > found.noise[4] * 1.01) == loud
 
 
@@ -84,7 +88,7 @@ def test_one_step_of_coarse_outputs_makes_no_window_loud() -> None:
     six = six_of()
     six[:, 2] = 0.1
     six[3 * N + 5 : 3 * N + 9, 2] = 0.2
-    found = shaking(block_of(six), WINDOWS, RATE)
+    found = measure_window_noise(block_of(six), WINDOWS, RATE)
     np.testing.assert_allclose(found.noise[2], 0.1 / 12**0.5)
     np.testing.assert_allclose(found.levels[:, 2], 0.1 / 12**0.5)
 
@@ -101,7 +105,7 @@ def several(*hz: float) -> Array:
 def test_an_output_on_its_rail_tells_nothing_of_the_noise(standing: int) -> None:
     six = six_of()
     six[: standing * N, 0] = 19.6
-    found = shaking(block_of(np.round(six, 5)), WINDOWS, RATE)
+    found = measure_window_noise(block_of(np.round(six, 5)), WINDOWS, RATE)
     np.testing.assert_allclose(found.noise, WHITE, rtol=0.1)
     assert (found.levels[:, 0] > 0.9 * WHITE[0]).all()
 

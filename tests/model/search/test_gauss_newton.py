@@ -15,7 +15,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search import selection
-from fieldcal.model.search.inference import Inference, Inferred
+from fieldcal.model.search.inference import Inference, InferenceResult
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.window_rows import WindowSystem
@@ -47,11 +47,11 @@ SETTLING = Term(
 
 
 @cache
-def settling() -> Inferred:
+def settling() -> InferenceResult:
     return inference_of(state_of(SETTLING)).run()
 
 
-def chi2(found: Inferred) -> float:
+def chi2(found: InferenceResult) -> float:
     """Weighted squares of what the state leaves, over the rows."""
     system = found.inference.system
     assert isinstance(system, WindowSystem)
@@ -64,8 +64,8 @@ def test_a_time_constant_is_found_between_the_points_of_its_grid() -> None:
     found = settling()
     ((cause, group),) = found.best.members
     assert cause.key == "settling:acc"
-    assert 0.0 < group.unsure < 0.05 * TAU
-    assert abs(group.shape["tau_s"] - TAU) < 4 * group.unsure
+    assert 0.0 < group.shape_sigma < 0.05 * TAU
+    assert abs(group.shape["tau_s"] - TAU) < 4 * group.shape_sigma
     (term,) = found.state.terms
     assert term.shape == group.shape and term.effect is EFFECTS["settling"]
     sigma = np.sqrt(np.diag(found.best.state.inverse))
@@ -129,11 +129,11 @@ def test_another_set_is_refined_beside_and_leaves_no_columns() -> None:
     cause = next(c for c in d.causes if c.key == "settling:gyr")
     whole = [g for g in cause.variants if len(g.columns) == 3]
     (own,) = found.best.members
-    on_grid = [found.search.evaluated((own, (cause, g))).score for g in whole]
+    on_grid = [found.search.evaluate((own, (cause, g))).score for g in whole]
     best = whole[int(np.argmax(on_grid))]
-    there = found.search.evaluated((own, (cause, best)))
+    there = found.search.evaluate((own, (cause, best)))
     width, count = d.width, len(d.bases)
-    refined = found.inference.beside(found, there)
+    refined = found.inference.refine_beside(found, there)
     assert (d.width, len(d.bases)) == (width, count)
     assert refined.members[0][1] is own[1], "what was found stays"
     assert refined.members[1][1].shape != best.shape
@@ -147,7 +147,7 @@ def test_a_settled_state_stays() -> None:
     found = settling()
     inference, d = found.inference, found.inference.dictionary
     members = found.best.members
-    state, values, again = inference.settled(found.state, found.values, members)
+    state, values, again = inference.settle(found.state, found.values, members)
     sigma = np.sqrt(np.diag(again.state.inverse))
     linear = [c for g in d.always for c in g.columns]
     at = np.isin(again.state.columns, linear)
@@ -158,14 +158,14 @@ def test_a_settled_state_stays() -> None:
 
 def test_wanted_are_columns_of_the_set_and_what_is_always_there() -> None:
     found, d = settling(), settling().inference.dictionary
-    wanted = found.inference.wanted(found.best.members)
+    wanted = found.inference.wanted_columns(found.best.members)
     groups = [*d.always, *(g for _, g in found.best.members)]
     expected = sorted({int(c) for g in groups for c in g.columns})
     assert np.flatnonzero(wanted).tolist() == expected
     free = Inference(WindowSystem(rows_of(X, X.f @ np.zeros((3, 6))),
                             dictionary(ladder(6, (2,)))), nominal())  # fmt: skip
     own = free.dictionary
-    some = free.wanted(())
+    some = free.wanted_columns(())
     assert some[own.small_rotation : own.small_rotation + 18].all()
 
 
@@ -179,12 +179,12 @@ def test_the_top_of_a_parabola_is_where_it_is() -> None:
     top = 0.3 * np.log(FINEST)
     scores = [-0.5 * sharp * (k * np.log(FINEST) - top) ** 2 for k in (0, -1, 1)]
     own = ((cause, here),)
-    ((_, group),) = inference._at_top(own, own, 0, scores, "tau_s")
+    ((_, group),) = inference._at_parabola_top(own, own, 0, scores, "tau_s")
     found = group.shape["tau_s"]
     assert found == pytest.approx(at * FINEST**0.3)
-    assert group.unsure == pytest.approx(found / sharp**0.5)
+    assert group.shape_sigma == pytest.approx(found / sharp**0.5)
     beyond = [0.0, -5.0, 4.0]
-    ((_, group),) = inference._at_top(own, own, 0, beyond, "tau_s")
+    ((_, group),) = inference._at_parabola_top(own, own, 0, beyond, "tau_s")
     assert group.shape["tau_s"] == pytest.approx(at * FINEST), "no further than a step"
 
 
@@ -205,34 +205,34 @@ def drawn(seed: int) -> tuple[Search, Set]:
         some = 0.05 * group.typical * rng.standard_normal(len(group.columns))
         off += SESSION.design[:, :, group.columns] @ some
     search = SESSION.search(off)
-    return search, search.evaluated(())
+    return search, search.evaluate(())
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_of_all_pairs_the_best_is_taken(seed: int) -> None:
     search, empty = drawn(seed)
-    found = search._paired(empty, -np.inf)
+    found = search._with_two_more(empty, -np.inf)
     assert len(found.members) == 2
     scores = []
     for table in search.tables(empty):
         for one, two, worth, (u, v) in search._pairs(empty, table, -np.inf):
             one, two = replace(one, size=u), replace(two, size=v)
             scores.append(table.score + worth)
-            both = search.taken(empty, one, two)
+            both = search.accept(empty, one, two)
             assert both.keys == {one.member[0].key, two.member[0].key}
     every = [s for s in search.visited.values() if len(s.members) == 2]
     assert found.score >= max(s.score for s in every) - 0.5
     assert found.score >= max(scores) - 1.0
-    assert search._paired(empty, np.inf) is empty, "none comes near"
+    assert search._with_two_more(empty, np.inf) is empty, "none comes near"
 
 
 class Watched(Search):
     """A search that notes beside which sets pairs were tried."""
 
-    def _paired(self, there: Set, level: float | None = None) -> Set:
+    def _with_two_more(self, there: Set, level: float | None = None) -> Set:
         """Note the set, and go on as ever."""
         self.__dict__.setdefault("asked", []).append(there)
-        return super()._paired(there, level)
+        return super()._with_two_more(there, level)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -242,7 +242,7 @@ def test_what_costs_much_is_tried_where_nothing_cheap_helps(seed: int) -> None:
     quick, whole = (Watched(one.dictionary, one.gram) for _ in range(2))
     best = quick.run(thorough=False)
     assert "asked" not in quick.__dict__
-    assert quick._step(best, [quick._followed, quick._replaced]) is best
+    assert quick._step(best, [quick._with_one_more, quick._with_one_replaced]) is best
     found = whole.run()
     assert found.score >= best.score
     first = whole.__dict__["asked"][0]
@@ -260,15 +260,17 @@ def test_all_the_parameters_of_a_cause() -> None:
     d: Dictionary = SESSION.dictionary
     cause: Cause = next(c for c in d.causes if c.key == "cross_coupling")
     whole = cause.variants[0]
-    assert selection._whole(cause, part_of(whole, 2)) is whole
-    assert selection._whole(cause, whole) is whole
+    assert selection._full_variant(cause, part_of(whole, 2)) is whole
+    assert selection._full_variant(cause, whole) is whole
     shaped = replace(part_of(whole, 2), shape={"tau_s": 1.0})
-    assert selection._whole(cause, shaped) is shaped
+    assert selection._full_variant(cause, shaped) is shaped
     search, empty = drawn(0)
     offer = next(o for o in search.offers(empty)
                  if o.member[0].key == "cross_coupling")  # fmt: skip
-    wide = selection._widened(replace(offer, member=(cause, part_of(whole, 2))))
+    wide = selection._with_all_parameters(
+        replace(offer, member=(cause, part_of(whole, 2)))
+    )
     assert wide.member == (cause, whole)
-    assert (wide.size, wide.less) == (offer.size, offer.less)
+    assert (wide.size, wide.instability) == (offer.size, offer.instability)
     same = replace(offer, member=(cause, whole))
-    assert selection._widened(same) is same
+    assert selection._with_all_parameters(same) is same

@@ -13,7 +13,7 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.fitted import whole
+from fieldcal.model.system.fitted import estimates_by_column
 
 FADING = {
     "warm_up": {"ax": 0.01, "ay": 0.004, "az": -0.008, "tau_s": 143.0},
@@ -38,8 +38,8 @@ def test_the_way_is_left_with_its_noise_beside_what_fades(
         session = _having(name, seed)
         found = explain(prepare_recording(session.record(seed), session.about))
         assert [one.name for one in found.probable_causes] == [name]
-        values = whole(found.inferred.best.state, found.dictionary)
-        for turn in found.inferred.turned:
+        values = estimates_by_column(found.inferred.best.state, found.dictionary)
+        for turn in found.inferred.turn_rows:
             left = turn.way - turn.way_design @ values[turn.columns]
             square, freedom = square + float(left @ left), freedom + len(left)
     assert freedom > 350 * sessions
@@ -71,7 +71,7 @@ def test_what_was_gone_through_is_not_gone_through_again(
     session = plain(rng, ("wide",)).having({"cross_coupling": {"k12": 0.006}})
     found = explain(prepare_recording(session.record(1), session.about)).inferred
     assert found.best.keys == {"cross_coupling"}
-    assert found.search.key(found.best.members) in found.been
+    assert found.search.key(found.best.members) in found.visited_keys
     runs: list[Set] = []
     run = Search.run
 
@@ -80,11 +80,13 @@ def test_what_was_gone_through_is_not_gone_through_again(
         return runs[-1]
 
     monkeypatch.setattr(Search, "run", kept)
-    nothing = found.search.evaluated(())
-    again = found.inference.resumed(nothing, found)
+    nothing = found.search.evaluate(())
+    again = found.inference.resume(nothing, found)
     assert again.best.keys == found.best.keys and len(runs) > 1
     first = Search.key(runs[0].members)
     runs.clear()
-    ended = found.inference.resumed(nothing, replace(found, been=frozenset({first})))
+    ended = found.inference.resume(
+        nothing, replace(found, visited_keys=frozenset({first}))
+    )
     assert [Search.key(one.members) for one in runs] == [first]
     assert Search.key(ended.best.members) == first

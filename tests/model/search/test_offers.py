@@ -10,7 +10,7 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set, chances
+from fieldcal.model.evidence.sets import Set, log_chances
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
 from fieldcal.model.search.offer import Offer
@@ -24,7 +24,7 @@ CAUSES = {c.key: c for c in SESSION.dictionary.causes}
 
 def drawn(seed: int = 1) -> Search:
     rng = np.random.default_rng(seed)
-    off = SESSION.noise(rng, SESSION.dictionary.unstable)
+    off = SESSION.noise(rng, SESSION.dictionary.typical_instability)
     group = CAUSES["bias_drift:acc"].variants[0]
     off += 0.3 * SESSION.design[:, :, group.columns] @ group.typical
     return SESSION.search(off)
@@ -32,7 +32,7 @@ def drawn(seed: int = 1) -> Search:
 
 def having(search: Search, *keys: str) -> Set:
     members = tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys)
-    return search.evaluated(members)
+    return search.evaluate(members)
 
 
 def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
@@ -46,7 +46,7 @@ def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
         chance = priors.AGAIN if again else cause.chance
         assert found[key] == pytest.approx(np.log(chance / len(cause.variants)))
     np.testing.assert_array_equal(
-        search._chances(search.evaluated(()))[0], SESSION.dictionary.chances
+        search._chances(search.evaluate(()))[0], SESSION.dictionary.log_chances
     )
 
 
@@ -73,13 +73,13 @@ def test_what_is_taken_begins_with_the_sizes_that_were_offered(
     there = having(search, "cross_coupling")
     one, two = search.offers(there)[:2]
     begun: list[tuple[tuple[Member, ...], Sizes]] = []
-    monkeypatch.setattr(search, "evaluated", lambda m, s: begun.append((m, s)))
-    search.taken(there, one, two)
+    monkeypatch.setattr(search, "evaluate", lambda m, s: begun.append((m, s)))
+    search.accept(there, one, two)
     ((members, start),) = begun
     assert members == (*there.members, one.member, two.member)
     assert start.calibration == there.sizes.calibration
     assert start.members == (*there.sizes.members, one.size, two.size)
-    both = zip(one.less, two.less, there.sizes.instability, strict=True)
+    both = zip(one.instability, two.instability, there.sizes.instability, strict=True)
     assert start.instability == tuple(min(some) for some in both)
 
 
@@ -113,13 +113,13 @@ def test_what_wanders_far_above_the_noise_is_offered_by_all_its_waves(
 
     def offered() -> Offer:
         search = session.search(off)
-        (offer,) = search.offers(search.evaluated(()))
+        (offer,) = search.offers(search.evaluate(()))
         return offer
 
     by_some = offered()
     monkeypatch.setattr(offers, "WAVES", 20)
     by_all, search = offered(), session.search(off)
-    found = search.taken(search.evaluated(()), by_all)
+    found = search.accept(search.evaluate(()), by_all)
     assert by_all.score == pytest.approx(found.score, abs=8.0)
     assert by_all.score > by_some.score + 20
 
@@ -130,38 +130,40 @@ ACC, GYR, DRIFT = JUMPS.dictionary.causes
 
 def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     (one, *_) = [g for g in GYR.variants if len(g.params) == 3][20:]
-    shares = chances(ACC, [(GYR, one)])
+    shares = log_chances(ACC, [(GYR, one)])
     at = np.array([g.shape["at_s"] for g in ACC.variants])
     at_once = np.abs(at - one.shape["at_s"]) == np.abs(at - one.shape["at_s"]).min()
     assert at_once.sum() == 4, "all axes together, or one"
     assert np.exp(shares[at_once]).sum() == pytest.approx(priors.AGAIN)
     np.testing.assert_allclose(shares[~at_once], np.log(ACC.chance / len(at)))
     for other in ([], [(DRIFT, DRIFT.variants[0])]):
-        assert chances(ACC, other) == pytest.approx(np.log(ACC.chance / len(at)))
+        assert log_chances(ACC, other) == pytest.approx(np.log(ACC.chance / len(at)))
     again = np.log(priors.AGAIN / len(DRIFT.variants))
-    assert chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
+    assert (
+        log_chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
+    )
 
 
 def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> None:
     at = sorted({g.shape["at_s"] for g in ACC.variants})[7]
-    acc, gyr = (c.expecting([(at - 1e-3, at + 1e-3)]) for c in (ACC, GYR))
+    acc, gyr = (c.expecting_within([(at - 1e-3, at + 1e-3)]) for c in (ACC, GYR))
     ((whole,), (other,)) = acc.expected, gyr.expected
     assert whole.shape["at_s"] == at and len(whole.params) == 3
-    assert acc.variants == (*ACC.variants, whole) and whole.fixed == 1.0
-    alone, usual = chances(acc, []), np.log(ACC.chance / len(acc.variants))
+    assert acc.variants == (*ACC.variants, whole) and whole.fixed_size == 1.0
+    alone, usual = log_chances(acc, []), np.log(ACC.chance / len(acc.variants))
     assert alone[-1] == pytest.approx(np.log(priors.RESTARTED))
     np.testing.assert_allclose(alone[:-1], usual)
-    both = chances(acc, [(gyr, other)])
+    both = log_chances(acc, [(gyr, other)])
     assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART))
     there = np.array([g.shape["at_s"] == at for g in ACC.variants])
     assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART)
     np.testing.assert_allclose(both[:-1][~there], usual)
-    assert DRIFT.expecting([(0.0, 1e3)]) is DRIFT, "it has no instant"
-    assert ACC.expecting([]) is ACC
+    assert DRIFT.expecting_within([(0.0, 1e3)]) is DRIFT, "it has no instant"
+    assert ACC.expecting_within([]) is ACC
     (knock,) = Session.of(ladder(), ("base_step",)).dictionary.causes
-    anew = knock.expecting([(at - 1e-3, at + 1e-3)])
+    anew = knock.expecting_within([(at - 1e-3, at + 1e-3)])
     assert len(anew.expected) == 1, "set up anew meanwhile"
-    assert chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTARTED))
+    assert log_chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTARTED))
 
 
 @pytest.mark.parametrize("off", [True, False], ids=["off", "on"])
@@ -170,10 +172,10 @@ def test_what_no_row_shows_of_a_restart_is_offered_all_the_same(off: bool) -> No
     session = Session.of(ladder(), ("bias_step:acc", "bias_step:gyr"))
     d = session.dictionary
     d.shown = np.ones(d.width, dtype=bool)
-    d.expected_within([(100.0, 160.0)] if off else [])
+    d.expect_within([(100.0, 160.0)] if off else [])
     acc, gyr = d.causes
     search = session.search(np.zeros((len(d.x), 6)))
-    there = search.evaluated(((gyr, gyr.variants[-1]),))
+    there = search.evaluate(((gyr, gyr.variants[-1]),))
     found = {o.member[0].key: o for o in search.offers(there)}
     assert bool(acc.expected) == off == (acc.key in found)
     if off:
@@ -193,12 +195,12 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     assert found["acc"] == pytest.approx(found["gyr"])
     search = JUMPS.search(off)
     acc, gyr = (next(m for m in best.members if m[0] is c) for c in (ACC, GYR))
-    assert search.chance((acc, gyr)) == pytest.approx(search.chance((gyr, acc)))
-    both = search.evaluated((gyr, acc))
-    offered = search.offers(search.evaluated((gyr,)), both.sizes)
+    assert search.log_chance((acc, gyr)) == pytest.approx(search.log_chance((gyr, acc)))
+    both = search.evaluate((gyr, acc))
+    offered = search.offers(search.evaluate((gyr,)), both.sizes)
     (offer,) = [o for o in offered if o.member[0] is ACC]
     assert offer.member[1].shape == acc[1].shape
-    taken = search.taken(search.evaluated((gyr,)), offer)
+    taken = search.accept(search.evaluate((gyr,)), offer)
     assert abs(taken.score - offer.score) < 2 * SLACK
 
 
@@ -208,9 +210,11 @@ def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> Non
     d = copy(plain.dictionary)
     d.always = [replace(g, in_state=False) for g in d.always]
     search = Search(d, plain.gram)
-    nothing = search.evaluated(())
-    known = [g.columns for g in d.always if g.fixed is not None]
+    nothing = search.evaluate(())
+    known = [g.columns for g in d.always if g.fixed_size is not None]
     at = np.isin(nothing.state.columns, np.concatenate(known))
     assert at.any()
     for table in search.tables(nothing):
-        np.testing.assert_array_equal(table.state.sizes[at], nothing.state.sizes[at])
+        np.testing.assert_array_equal(
+            table.state.prior_sigma[at], nothing.state.prior_sigma[at]
+        )

@@ -8,7 +8,7 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.search.proportion import in_proportion
+from fieldcal.model.search.proportion import proportional_causes
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
@@ -30,11 +30,11 @@ def noisy(seed: int) -> tuple[Array, np.random.Generator]:
 def risen(off: Array, part: str) -> float:
     """By how much the group of one proportion raises the weight of nothing, ln."""
     d = dictionary(X)
-    d.joined(list(in_proportion(d, [searched(off, d).evaluated(())])))
+    d.add_causes(list(proportional_causes(d, [searched(off, d).evaluate(())])))
     search = searched(off, d)
     (cause,) = (c for c in d.causes if c.key == f"position:{part}")
-    there = search.evaluated(((cause, cause.variants[0]),))
-    return there.score - search.evaluated(()).score
+    there = search.evaluate(((cause, cause.variants[0]),))
+    return there.score - search.evaluate(()).score
 
 
 @pytest.mark.parametrize("proportion", [(2e-2, -1.5e-2, 1e-2), (0.0, 0.0, 2e-2)])
@@ -66,8 +66,8 @@ def test_columns_are_the_derivatives_of_the_product() -> None:
     course = rng.standard_normal(len(LADDER))
     off[:, :3] += course[X.position, None] * [3e-2, -2e-2, 1e-2]
     d = dictionary(X)
-    acc, gyr = in_proportion(d, [searched(off, d).evaluated(())])
-    d.joined([acc, gyr])
+    acc, gyr = proportional_causes(d, [searched(off, d).evaluate(())])
+    d.add_causes([acc, gyr])
     group = acc.variants[0]
     linear = WindowSystem(rows_of(X, np.hstack([X.f, X.w])), d).linearised(nominal())
     design = np.zeros((len(X), 3, len(group.columns)))

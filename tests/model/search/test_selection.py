@@ -17,7 +17,7 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.pairs import pairs
+from fieldcal.model.search.pairs import pair_gains
 from fieldcal.model.search.selection import Search
 
 DENSITY = np.log(priors.density())
@@ -38,7 +38,7 @@ QUIET = np.zeros(7)
 
 
 def unstable(share: float = 1.0) -> Array:
-    return SESSION.dictionary.unstable * share
+    return SESSION.dictionary.typical_instability * share
 
 
 def made(groups: Sequence[Group], rng: np.random.Generator, v: float = 1.0) -> Array:
@@ -46,7 +46,7 @@ def made(groups: Sequence[Group], rng: np.random.Generator, v: float = 1.0) -> A
     out = np.zeros((len(SESSION.dictionary.x), 6))
     for g in groups:
         out += SESSION.design[:, :, g.columns] @ (
-            g.sizes(v) * rng.standard_normal(len(g.columns))
+            g.prior_sigma(v) * rng.standard_normal(len(g.columns))
         )
     return out
 
@@ -54,9 +54,11 @@ def made(groups: Sequence[Group], rng: np.random.Generator, v: float = 1.0) -> A
 def fixed(session: Session) -> Session:
     """The same where all sizes of what is always there are known."""
     d = session.dictionary
-    known = replace(session, dictionary=d.plain())
-    known.dictionary.always = [replace(g, fixed=1.0, in_step=False) for g in d.always]
-    known.dictionary.unstable = QUIET
+    known = replace(session, dictionary=d.calibration_only())
+    known.dictionary.always = [
+        replace(g, fixed_size=1.0, changes_together=False) for g in d.always
+    ]
+    known.dictionary.typical_instability = QUIET
     return known
 
 
@@ -77,7 +79,7 @@ def true_and_found(keys: Sequence[str], seed: int) -> tuple[Set, Set]:
     search = SESSION.search(off)
     best = search.run()
     assert best.score == max(s.score for s in search.visited.values())
-    return search.evaluated(members), best
+    return search.evaluate(members), best
 
 
 @pytest.mark.parametrize(
@@ -109,8 +111,8 @@ def test_a_step_is_on_as_many_outputs_as_show_it(second: float, more: bool) -> N
     size = at[3, 4, 5].typical * np.array([0.05, second, 0.0])
     off += session.design[:, :, at[3, 4, 5].columns] @ size
     search = session.search(off)
-    alone = search.evaluated(((step, at[3,]),))
-    found = search.on_more_outputs(alone)
+    alone = search.evaluate(((step, at[3,]),))
+    found = search.widen_outputs(alone)
     assert (found.members[0][1] is at[3, 4, 5]) == more
     assert (found.score > alone.score + 3) if more else found is alone
 
@@ -132,7 +134,7 @@ def test_where_nothing_is_nothing_is_said() -> None:
         search = session.search(session.noise(rng, tau))
         best = search.run()
         empty += not best.members
-        said += bool(Posterior(search, best).standing())
+        said += bool(Posterior(search, best).probable_causes())
     assert said <= 2
     assert empty >= 198
 
@@ -140,8 +142,8 @@ def test_where_nothing_is_nothing_is_said() -> None:
 def with_sizes(empty: Set, groups: Sequence[Group], sizes: Sequence[int]) -> float:
     """F of a set with more groups, all of them with these sizes."""
     columns = np.concatenate([empty.state.columns, *(g.columns for g in groups)])
-    wide = [g.sizes(float(SIZES[i])) for g, i in zip(groups, sizes, strict=True)]
-    whole = np.concatenate([empty.state.sizes, *wide])
+    wide = [g.prior_sigma(float(SIZES[i])) for g, i in zip(groups, sizes, strict=True)]
+    whole = np.concatenate([empty.state.prior_sigma, *wide])
     state = Eliminated.of(empty.state.rows, columns, whole)
     return state.score + float(sum(DENSITY[i] for i in sizes))
 
@@ -152,16 +154,16 @@ def test_what_pairs_gain_is_what_their_sets_gain(seed: int) -> None:
     groups = [c.variants[0] for c in CAUSES.values()]
     off = KNOWN.noise(rng) + made(groups[:3], rng, 0.02)
     search = KNOWN.search(off)
-    empty = search.evaluated(())
+    empty = search.evaluate(())
     seen = set()
     alone = [EVEN] * len(groups)
-    for gain, (i, j), (u, v) in pairs(empty.state, groups, alone):
+    for gain, (i, j), (u, v) in pair_gains(empty.state, groups, alone):
         two = [groups[i], groups[j]]
         expected = with_sizes(empty, two, (u, v)) - empty.state.score
         assert gain == pytest.approx(expected, rel=1e-9, abs=1e-7)
         members = tuple((c, c.variants[0]) for c in [*CAUSES.values()])
         start = replace(empty.sizes, members=(u, v))
-        both = search.evaluated((members[i], members[j]), start)
+        both = search.evaluate((members[i], members[j]), start)
         found = with_sizes(empty, two, both.sizes.members) - empty.state.score
         assert -1e-7 <= found - gain < 1.0, "the likeliest sizes of the pair"
         seen.add((i, j))
@@ -177,8 +179,8 @@ def test_sizes_are_those_that_trying_all_finds(
     rng = np.random.default_rng(seed)
     two = [CAUSES[key].variants[0] for key in keys]
     search = KNOWN.search(KNOWN.noise(rng) + made(two, rng, 0.3))
-    found = search.evaluated(tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys))
-    empty = search.evaluated(())
+    found = search.evaluate(tuple((CAUSES[k], CAUSES[k].variants[0]) for k in keys))
+    empty = search.evaluate(())
     some = range(12, 24)
     every = np.array([[with_sizes(empty, two, (u, v)) for v in some] for u in some])
     u, v = np.unravel_index(every.argmax(), every.shape)
@@ -197,18 +199,18 @@ def test_sizes_are_those_that_trying_all_finds(
 def test_instabilities_are_those_that_trying_all_finds(seed: int) -> None:
     """Of the three accelerometers, each of which may be another."""
     known = fixed(SESSION)
-    known.dictionary.unstable = np.where(np.arange(7) < 3, unstable(), 0.0)
+    known.dictionary.typical_instability = np.where(np.arange(7) < 3, unstable(), 0.0)
     rng = np.random.default_rng(seed)
-    tau = known.dictionary.unstable * 2.0 * np.exp(rng.normal(0, 0.3, 7))
+    tau = known.dictionary.typical_instability * 2.0 * np.exp(rng.normal(0, 0.3, 7))
     search = known.search(known.noise(rng, tau))
-    found, some = search.evaluated(()), range(12, 23)
-    columns, wide = found.state.columns, found.state.sizes
-    small = search.gram.only(columns)
+    found, some = search.evaluate(()), range(12, 23)
+    columns, wide = found.state.columns, found.state.prior_sigma
+    small = search.gram.select_columns(columns)
 
     def score(x: int, y: int, z: int) -> float:
         sizes = np.array([SIZES[i] for i in (x, y, z, 0, 0, 0, 0)])
-        rows = small.weighed(sizes * known.dictionary.unstable)
-        prior = search.alike((x, y, z, 0, 0, 0, 0))
+        rows = small.with_instability(sizes * known.dictionary.typical_instability)
+        prior = search.instability_log_prior((x, y, z, 0, 0, 0, 0))
         return Eliminated.of(rows, columns, wide).score + float(prior)
 
     every = {(x, y, z): score(x, y, z) for x in some for y in some for z in some}
@@ -219,17 +221,25 @@ def test_instabilities_are_those_that_trying_all_finds(seed: int) -> None:
 def test_instabilities_of_a_triad_are_likelier_alike() -> None:
     search = SESSION.search(SESSION.noise(np.random.default_rng(0)))
     even = (16, 16, 16, 12, 12, 12, 0)
-    level = search.alike(even)
+    level = search.instability_log_prior(even)
     for unlike in ((14, 16, 18), (16, 16, 13), (20, 14, 14)):
-        assert search.alike((*unlike, *even[3:])) < level - 2
-        assert search.alike((*even[:3], *unlike, 0)) < search.alike(
-            (*even[:3], 16, 16, 16, 0)
-        )
-    assert search.alike((12, 12, 12, 16, 16, 16, 0)) == pytest.approx(level)
-    larger = [search.alike((*[i] * 3, 12, 12, 12, 0)) for i in range(len(SIZES))]
+        assert search.instability_log_prior((*unlike, *even[3:])) < level - 2
+        assert search.instability_log_prior(
+            (*even[:3], *unlike, 0)
+        ) < search.instability_log_prior((*even[:3], 16, 16, 16, 0))
+    assert search.instability_log_prior((12, 12, 12, 16, 16, 16, 0)) == pytest.approx(
+        level
+    )
+    larger = [
+        search.instability_log_prior((*[i] * 3, 12, 12, 12, 0))
+        for i in range(len(SIZES))
+    ]
     assert (np.diff(larger) <= 0).all() and larger[24] < larger[16] - 10
     many = np.array([even, (14, 16, 18, 12, 12, 12, 0)])
-    np.testing.assert_allclose(search.alike(many), [search.alike(row) for row in many])
+    np.testing.assert_allclose(
+        search.instability_log_prior(many),
+        [search.instability_log_prior(row) for row in many],
+    )
 
 
 def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
@@ -239,14 +249,16 @@ def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
     acc, gyr, other = by_key.values()
     found = search.search(search.noise(np.random.default_rng(0)))
     first = (acc, acc.variants[0])
-    assert found.chance([]) == 0.0
-    assert found.chance([first]) == pytest.approx(
+    assert found.log_chance([]) == 0.0
+    assert found.log_chance([first]) == pytest.approx(
         np.log(acc.chance / len(acc.variants))
     )
-    both = found.chance([first, (gyr, gyr.variants[3])])
+    both = found.log_chance([first, (gyr, gyr.variants[3])])
     again = np.log(priors.AGAIN / len(gyr.variants))
-    assert both == pytest.approx(found.chance([first]) + again)
-    three = found.chance([first, (gyr, gyr.variants[3]), (other, other.variants[0])])
+    assert both == pytest.approx(found.log_chance([first]) + again)
+    three = found.log_chance(
+        [first, (gyr, gyr.variants[3]), (other, other.variants[0])]
+    )
     assert three == pytest.approx(both + np.log(priors.UNKNOWN))
 
 
@@ -256,13 +268,13 @@ def test_an_offer_foretells_the_set_with_it() -> None:
     search: Search = KNOWN.search(
         KNOWN.noise(rng) + made([CAUSES["angle_offset"].variants[0]], rng, 0.1)
     )
-    empty = search.evaluated(())
+    empty = search.evaluate(())
     offers = search.offers(empty)
     assert offers[0].member[0].key == "angle_offset"
     for offer in offers:
         predicted = offer.score
-        assert search.taken(empty, offer).score == pytest.approx(predicted, rel=1e-9)
-        assert offer.size == search.taken(empty, offer).sizes.members[0]
+        assert search.accept(empty, offer).score == pytest.approx(predicted, rel=1e-9)
+        assert offer.size == search.accept(empty, offer).sizes.members[0]
 
 
 @pytest.mark.parametrize(
@@ -273,11 +285,11 @@ def test_several_effects_are_likelier_than_a_function_that_none_makes(
 ) -> None:
     """Together, though each alone is a little less likely than it."""
     search = SESSION.search(np.zeros((len(SESSION.dictionary.x), 6)))
-    empty = search.evaluated(())
+    empty = search.evaluate(())
     scores = {"alpha:ay": 0.0, "angle_offset": worth[0], "settling:acc": worth[1]}
     sets = {k: replace(empty, members=(there(k),), score=v) for k, v in scores.items()}
     assert CAUSES["alpha:ay"].kind == "unknown"
     search.visited = {search.key(s.members): s for s in sets.values()}
     search.visited[()] = replace(empty, score=-9.0)
-    assert search._of_effects(sets["alpha:ay"]) is sets[told]
-    assert search._of_effects(sets["settling:acc"]) is sets["settling:acc"]
+    assert search._prefer_effects(sets["alpha:ay"]) is sets[told]
+    assert search._prefer_effects(sets["settling:acc"]) is sets["settling:acc"]

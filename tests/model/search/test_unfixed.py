@@ -13,8 +13,8 @@ from benchmarks.hand_held.draws import GRAVITY, log
 from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare_recording
-from fieldcal.model.evidence.sizing import EVEN, Sizes
-from fieldcal.model.search.inference import STAYED
+from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
+from fieldcal.model.search.inference import SMALL_STEP
 from fieldcal.model.search.selection import Search
 from fieldcal.session.folder import Session
 
@@ -42,7 +42,7 @@ def test_three_effects_are_found_of_which_none_is_seen_alone(seed: int) -> None:
     """What bends |f| bends the turns as well, until accelerometers are set right."""
     found = explained(seed)
     assert {one.name for one in found.probable_causes} == EVERY
-    assert found.posterior.nothing < 1e-6
+    assert found.posterior.probability_of_noise_alone < 1e-6
 
 
 def test_the_state_stays_where_the_set_does() -> None:
@@ -50,8 +50,8 @@ def test_the_state_stays_where_the_set_does() -> None:
     inferred = explained(88_000_036).inferred
     own, best = inferred.inference, inferred.best
     own.gram(inferred.state, inferred.values, None)
-    _, moved, _ = own.settled(inferred.state, inferred.values, best.members, best.sizes)
-    assert own.step(best, inferred.values, moved) < STAYED
+    _, moved, _ = own.settle(inferred.state, inferred.values, best.members, best.sizes)
+    assert own.largest_step(best, inferred.values, moved) < SMALL_STEP
 
 
 def test_how_a_position_lies_moves_no_closure() -> None:
@@ -62,7 +62,7 @@ def test_how_a_position_lies_moves_no_closure() -> None:
     coupled = [t for t in inferred.state.terms if t.effect.id == "cross_coupling"]
     assert np.abs(np.concatenate([t.values for t in coupled])).max() > 4e-3
     lies = np.arange(own.dictionary.width)[own.dictionary.rotations]
-    moved = [t.design[:, np.isin(t.columns, lies)] for t in own.turned]
+    moved = [t.design[:, np.isin(t.columns, lies)] for t in own.turn_rows]
     assert len(moved) > 5
     assert max(np.abs(m).max(initial=0.0) for m in moved) < 1e-6
 
@@ -74,12 +74,15 @@ def test_sizes_do_not_hang_on_where_they_begin() -> None:
     assert "temperature_bias" in {one.name for one in found.probable_causes}
     dictionary, gram = found.dictionary, found.inferred.search.gram
     causes = {cause.key: cause for cause in dictionary.causes}
-    even = (EVEN,) * len(dictionary.always)
+    even = (UNIT_INDEX,) * len(dictionary.always)
     for key in ("temperature_bias:gyr", "bias_drift:gyr", "cross_coupling"):
         member = causes[key], causes[key].variants[0]
-        starts = [None, *(Sizes(even, (n,) * 3 + (0,) * 4, (EVEN,)) for n in (24, 29))]
+        starts = [
+            None,
+            *(Sizes(even, (n,) * 3 + (0,) * 4, (UNIT_INDEX,)) for n in (24, 29)),
+        ]
         scores = [
-            Search(dictionary, gram).evaluated((member,), start).score
+            Search(dictionary, gram).evaluate((member,), start).score
             for start in starts
         ]
         assert max(scores) - min(scores) < 5.0

@@ -15,8 +15,8 @@ from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
-from fieldcal.model.turns.attitude import geometry
-from fieldcal.model.turns.turn import Turn, only
+from fieldcal.model.turns.attitude import turn_geometry
+from fieldcal.model.turns.turn import Turn, select_rows
 from fieldcal.physics.experience import Experience
 
 M, STEP = 8, 1e-5
@@ -37,7 +37,7 @@ def turn(x: Experience) -> Turn:
     some = exponential(np.linspace(0.0, 0.3, M + 1)[:, None] * np.array([1, 2, -1]))
     attitude = np.concatenate([some[:-1], whole[None]])
     t = np.linspace(0.0, 2.0, M + 1)
-    edges = replace(only(x, list(range(M + 1))), t=t)
+    edges = replace(select_rows(x, list(range(M + 1))), t=t)
     ends, done = STATE.experienced(x), np.linspace(0, 1, M + 1) ** 2
     return Turn(
         PAIR, ends, edges, edges.f, attitude, done, np.array([0, M]),
@@ -48,7 +48,7 @@ def turn(x: Experience) -> Turn:
 def seen(one: Turn, state: State, x: Experience) -> tuple[Array, Array]:
     """Outputs at the edges (m + 1, 6) and closure of a state, one edge by the other."""
     there = state.experienced(x)
-    f, closure, _ = geometry(there, PAIR, one.attitude, one.done)
+    f, closure, _ = turn_geometry(there, PAIR, one.attitude, one.done)
     p, q = (int(np.argmax(x.position == i)) for i in PAIR)
     end = one.attitude[-1]
     w = [
@@ -61,9 +61,9 @@ def seen(one: Turn, state: State, x: Experience) -> tuple[Array, Array]:
 @pytest.mark.parametrize("x", [ALL, FREE], ids=["all known", "one free"])
 def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) -> None:
     sides = columns.small_rotation_sides
-    basis = General("aside", columns.small_rotation, sides=sides, each=True)
+    basis = General("aside", columns.small_rotation, sides=sides, per_position=True)
     one = turn(x)
-    at, outputs, moved = EndColumns.of(5, basis, x, STATE).met_by(one, SCALE)
+    at, outputs, moved = EndColumns.of(5, basis, x, STATE).columns_for(one, SCALE)
     np.testing.assert_array_equal(at, 5 + np.array([4, 5, 6, 7]))
     for k, (p, i) in enumerate([(2, 0), (2, 1), (3, 0), (3, 1)]):
         both = []
@@ -78,8 +78,8 @@ def test_small_rotations_are_met_at_both_ends_and_nowhere_else(x: Experience) ->
 
 def test_an_effect_is_met_at_both_ends_at_once() -> None:
     effect = catalogue()["angle_offset"]
-    basis, one = columns.of_effect(effect, {}, 0), turn(ALL)
-    at, outputs, moved = EndColumns.of(40, basis, ALL, STATE).met_by(one, SCALE)
+    basis, one = columns.effect_basis(effect, {}, 0), turn(ALL)
+    at, outputs, moved = EndColumns.of(40, basis, ALL, STATE).columns_for(one, SCALE)
     np.testing.assert_array_equal(at, [40, 41])
     for k in range(2):
         both = []

@@ -9,14 +9,14 @@ from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem
 
 X = ladder()
 
 
-def fitted() -> Fitted:
+def fitted() -> FittedSet:
     """Windows that wander, and gyroscopes that walk, beside a nominal state."""
     d, rng = dictionary(X, common=2e-4), np.random.default_rng(1)
     y = np.hstack([X.f, X.w]) + SD * rng.standard_normal((len(X), 6))
@@ -28,8 +28,8 @@ def fitted() -> Fitted:
     linear = WindowSystem(rows, d).linearised(nominal())
     search = Search(d, gram(linear, d, values))
     walk = next(c for c in d.causes if c.key == "random_walk:gyr")
-    there = search.evaluated(((walk, walk.variants[0]),))
-    return Fitted(rows, d, linear, values, there)
+    there = search.evaluate(((walk, walk.variants[0]),))
+    return FittedSet(rows, d, linear, values, there)
 
 
 ONE = fitted()
@@ -38,10 +38,10 @@ ONE = fitted()
 def test_squares_count_what_the_rows_of_a_window_share() -> None:
     d, rows = ONE.dictionary, ONE.rows
     residual = ONE.residual()
-    tau = SIZES[list(ONE.set.sizes.instability)] * d.unstable
+    tau = SIZES[list(ONE.set.sizes.instability)] * d.typical_instability
     assert tau[:3].max() > 1e-3, "windows wander"
     for c in range(6):
-        size = np.hypot(d.common[X.position, c], tau[c])
+        size = np.hypot(d.window_error[X.position, c], tau[c])
         alike = shared(X.position, np.zeros(len(X), dtype=int), size)
         cov = np.diag(rows.sd[:, c] ** 2) + alike
         expected = residual[:, c] @ np.linalg.solve(cov, residual[:, c])
@@ -50,7 +50,7 @@ def test_squares_count_what_the_rows_of_a_window_share() -> None:
 
 
 def test_what_is_random_takes_nothing_from_a_certain_residual() -> None:
-    d, whole, certain = ONE.dictionary, ONE.estimate, ONE.certain
+    d, whole, certain = ONE.dictionary, ONE.estimate, ONE.deterministic_estimate
     ((_, walk),) = ONE.set.members
     assert whole[walk.columns].any() and not certain[walk.columns].any()
     kept = [c for g in d.always if g.in_state for c in g.columns]
@@ -63,6 +63,6 @@ def test_what_is_random_takes_nothing_from_a_certain_residual() -> None:
 
 def test_freedom_is_rows_less_what_was_estimated_of_them() -> None:
     state = ONE.set.state
-    spent = len(state.columns) - np.sum(np.diag(state.inverse) / state.sizes**2)
+    spent = len(state.columns) - np.sum(np.diag(state.inverse) / state.prior_sigma**2)
     assert ONE.dof == 6 * len(X) - round(float(spent))
     assert 6 < spent < len(state.columns)

@@ -171,7 +171,7 @@ def test_columns_of_bias_and_scale_are_what_these_change(one: Columns) -> None:
 def test_columns_of_turns_are_what_these_change(one: Columns) -> None:
     """Of every position about two axes, whether its angles are known or not."""
     d, state = one.dictionary, one.state
-    for p in range(d.places):
+    for p in range(d.position_count):
         for joint in range(2):
             step = np.zeros_like(state.small_rotation)
             step[p, joint] = 1e-4
@@ -239,21 +239,23 @@ def test_the_gram_matrix_is_that_of_the_rows(free: tuple[int, ...]) -> None:
     """With what windows share, their instability, and turns that nobody knows."""
     one = COLUMNS["of unknown orientation" if free else "at rest"]
     d = dictionary(one.dictionary.x, common=3e-4)
-    d.common[4] *= 3
+    d.window_error[4] *= 3
     rng = np.random.default_rng(11)
     y = output(d, one.state) + rng.normal(0, 1e-3, (ROWS, 6))
     some = np.union1d(d.bias + np.arange(40), rng.permutation(d.width)[:60])
-    some = np.union1d(some, d.small_rotation + np.arange(2 * d.places))
+    some = np.union1d(some, d.small_rotation + np.arange(2 * d.position_count))
     values = np.zeros(d.width)
     values[some[::7]] = rng.standard_normal(len(some[::7])) * 1e-3
     recorded = rows_of(d.x, y)
     linear = WindowSystem(recorded, d).linearised(one.state)
-    found = gram(linear, d, values, (), some).weighed(TAU)
+    found = gram(linear, d, values, (), some).with_instability(TAU)
     at, channel = (i.ravel() for i in np.indices((ROWS, 6)))
     design = one.table.reshape(ROWS * 6, -1)
     sd, window = recorded.sd.ravel(), d.x.position[at]
     cov = np.diag(sd**2)
-    cov += shared(window, channel, np.hypot(d.common[window, channel], TAU[channel]))
+    cov += shared(
+        window, channel, np.hypot(d.window_error[window, channel], TAU[channel])
+    )
     for p in free:
         small_rotation = (
             priors.SMALL_ROTATION * design[:, d.small_rotation + 2 * p :][:, :2]

@@ -12,22 +12,22 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.system import turn_rows
-from fieldcal.model.system.met_columns import Met, met_columns
+from fieldcal.model.system.met_columns import TurnColumns, columns_of_turns
 from fieldcal.model.turns.turn import Turn
 
 
 def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """With every column that a session has, on the way as well."""
-    seen: list[tuple[Met, Met]] = []
+    seen: list[tuple[TurnColumns, TurnColumns]] = []
 
-    def both(turns: list[Turn], views: list[RowView], *known: Any) -> list[Met]:
-        out = met_columns(turns, views, *known)
+    def both(turns: list[Turn], views: list[RowView], *known: Any) -> list[TurnColumns]:
+        out = columns_of_turns(turns, views, *known)
         for turn, view, met in zip(turns, views, out, strict=True):
-            (alone,) = met_columns([turn], [view], *known)
+            (alone,) = columns_of_turns([turn], [view], *known)
             seen.append((met, alone))
         return out
 
-    monkeypatch.setattr(turn_rows, "met_columns", both)
+    monkeypatch.setattr(turn_rows, "columns_of_turns", both)
     session = kinds()["gyro_scale"][0](np.random.default_rng(7))
     found = explain(prepare_recording(session.record(7), session.about))
     assert "gyro_scale" in [one.name for one in found.probable_causes]

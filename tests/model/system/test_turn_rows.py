@@ -35,7 +35,7 @@ def test_the_information_of_a_closure_is_what_its_covariance_leaves(
 ) -> None:
     root = ends * RNG.standard_normal((3, 3))
     cov = root @ root.T
-    basis, info = turn_rows._plane(across, cov, 0.25)
+    basis, info = turn_rows._known_axes(across, cov, 0.25)
     assert len(basis) == round(np.trace(across))
     np.testing.assert_allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-12)
     whole = across @ (cov + 0.25 * np.eye(3)) @ across
@@ -48,7 +48,10 @@ def test_columns_and_variances_of_the_means_of_windows() -> None:
     rows = rows_of(X, np.zeros((len(X), 6)))
     rows.sd[:] = SD * RNG.uniform(0.5, 2.0, (len(X), 6))
     linear = WindowSystem(rows, d).linearised(nominal())
-    means, spread = turn_rows._means(linear, d), turn_rows._spread(linear, d)
+    means, spread = (
+        turn_rows._window_columns(linear, d),
+        turn_rows._window_variances(linear, d),
+    )
     for p in range(9):
         at = X.position == p
         for c in range(3):
@@ -75,10 +78,10 @@ def test_a_way_that_a_hand_shook_says_nothing(size: float, kept: bool) -> None:
         design = np.hstack([RNG.standard_normal((300, 3)), np.zeros((300, 1))])
         way = size * RNG.standard_normal(300) + design @ [90.0, -70.0, 50.0, 0.0]
         rows.append(turn(way, design))
-    found = turn_rows._steadied(rows)
+    found = turn_rows._drop_shaken_way(rows)
     assert [len(r.way) for r in found] == [300 * kept] * 2
     assert [r.way_design.shape for r in found] == [(300 * kept, 4)] * 2
-    assert turn_rows._steadied([]) == []
+    assert turn_rows._drop_shaken_way([]) == []
 
 
 def test_outputs_change_with_the_force_by_all_that_reads_it() -> None:
@@ -89,7 +92,7 @@ def test_outputs_change_with_the_force_by_all_that_reads_it() -> None:
     state = replace(nominal(), bias=np.full(6, 0.5), scale=scale, terms=terms)
     k12, k13, k21, k23, k31, k32 = coupling
     whole = np.array([[0.9, k12, k13], [k21, 0.96, k23], [k31, k32, 1.02]])
-    found = turn_rows._slopes(state, X, X.since_turn[None])
+    found = turn_rows._output_slopes(state, X, X.since_turn[None])
     for slope, f in zip(found, X.f, strict=True):
         expected = whole + 2 * np.diag(k2 * f)
         np.testing.assert_allclose(slope, expected, atol=1e-8)
@@ -102,13 +105,13 @@ def test_what_no_physics_makes_of_accelerometers_at_rest_is_strange() -> None:
     causes = {c.key: c for c in d.causes}
 
     def having(key: str) -> Set:
-        return search.evaluated(((causes[key], causes[key].variants[0]),))
+        return search.evaluate(((causes[key], causes[key].variants[0]),))
 
-    assert turn_rows._strange(having("time:ay")) and turn_rows._strange(
-        having("time:acc")
-    )
+    assert turn_rows._has_unknown_acc_cause(
+        having("time:ay")
+    ) and turn_rows._has_unknown_acc_cause(having("time:acc"))
     for key in ("time:gy", "settling:acc", "random_walk:acc"):
-        assert not turn_rows._strange(having(key))
+        assert not turn_rows._has_unknown_acc_cause(having(key))
 
 
 SETTLING = Term(EFFECTS["settling"], np.linspace(-2e-3, 3e-3, 6), {"tau_s": 5.0})
@@ -116,9 +119,9 @@ SETTLING = Term(EFFECTS["settling"], np.linspace(-2e-3, 3e-3, 6), {"tau_s": 5.0}
 
 def test_what_begins_to_fade_at_the_end_of_a_turn_is_its_size() -> None:
     state = replace(nominal(), bias=np.full(6, 0.3), terms=(SETTLING,))
-    found = way_rows.settling(state, X, X.since_turn[None])
+    found = way_rows.settling_amplitudes(state, X, X.since_turn[None])
     np.testing.assert_allclose(found, SETTLING.values, atol=1e-15)
-    assert not way_rows.settling(nominal(), X, X.since_turn[None]).any()
+    assert not way_rows.settling_amplitudes(nominal(), X, X.since_turn[None]).any()
 
 
 def test_what_settles_builds_up_smoothly_and_is_known_better_afterwards() -> None:
@@ -126,11 +129,13 @@ def test_what_settles_builds_up_smoothly_and_is_known_better_afterwards() -> Non
     x = replace(X, t=t)
     since = np.where(t >= 105.0, t - 105.0, np.inf)[None]
     middle = np.array([0.5, 4.9, 5.29, 5.31, 7.0])
-    found = way_rows._built_up(x, since, middle)
+    found = way_rows._settling_covariance(x, since, middle)
     size = np.array([0.5, 0.5, 0.5, 0.15, 0.15])
     apart = (middle[:, None] - middle) / 2.0
     np.testing.assert_allclose(found, np.outer(size, size) * np.exp(-(apart**2) / 2))
-    never = way_rows._built_up(x, np.full((1, 33), np.inf), np.array([1.0, 8.2, 8.4]))
+    never = way_rows._settling_covariance(
+        x, np.full((1, 33), np.inf), np.array([1.0, 8.2, 8.4])
+    )
     np.testing.assert_allclose(np.diag(never), [0.25, 0.25, 0.0225])
 
 
@@ -141,7 +146,7 @@ def test_columns_on_the_way_are_what_an_effect_changes_there() -> None:
     coupling = Term(EFFECTS["cross_coupling"], np.linspace(-0.02, 0.03, 6))
     state = replace(nominal(), scale=np.linspace(0.9, 1.2, 6), terms=(coupling,))
     x, since = replace(X, w=w, w_dot=0.3 * w[::-1]), X.since_turn[None]
-    found = columns.of_effect(effect, {}, 0).of(RowView(x, x, since, state))
+    found = columns.effect_basis(effect, {}, 0).evaluate(RowView(x, x, since, state))
     for j, step in enumerate(1e-4 * np.eye(3)):
         up, down = (state.output(effect.change(x, s), since) for s in (step, -step))
         np.testing.assert_allclose(found[:, :, j], (up - down) / 2e-4, atol=1e-6)

@@ -5,7 +5,7 @@ import pytest
 
 from fieldcal.core.frames import turn
 from fieldcal.core.samples import Array
-from fieldcal.model.turns.rotation import carry, small_turns
+from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 
 SECONDS = 4.0
 ALPHA, BETA = np.deg2rad([120.0, -75.0])
@@ -31,6 +31,6 @@ def test_two_joints_at_once_come_out_where_they_end(
 ) -> None:
     t = np.arange(round(SECONDS * rate_hz) + 1) / rate_hz
     edge = np.arange(0, len(t), each)
-    reached = carry(small_turns(t, both_joints(t), edge))[-1]
+    reached = attitudes_from_rotations(small_turns(t, both_joints(t), edge))[-1]
     apart = reached @ turn(ALPHA, BETA).T
     assert np.linalg.norm(apart - np.eye(3)) < within

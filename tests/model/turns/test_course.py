@@ -14,7 +14,12 @@ from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.state import State, Term
-from fieldcal.model.turns.turn import Turn, moved, only, wrong
+from fieldcal.model.turns.turn import (
+    Turn,
+    apply_way_effects,
+    other_gyro_errors,
+    select_rows,
+)
 
 M, STEP, INTERVAL = 12, 0.05, 0.01
 RNG = np.random.default_rng(6)
@@ -25,10 +30,10 @@ def turn() -> Turn:
     """Twelve steps of a turn about an axis that changes, in three pieces."""
     x = ladder(3)
     at = np.isin(x.position, (2, 3))
-    ends = only(x, np.flatnonzero(at).tolist())
+    ends = select_rows(x, np.flatnonzero(at).tolist())
     ends = replace(ends, f=ends.f + 0.1 * RNG.standard_normal(ends.f.shape))
     t = 7.0 + STEP * np.arange(M + 1)
-    edges = only(x, list(range(M + 1)))
+    edges = select_rows(x, list(range(M + 1)))
     angle = np.cumsum(RNG.uniform(0, 0.1, (M + 1, 3)), axis=0)
     done = np.linspace(0, 1, M + 1) ** 2
     return Turn(
@@ -59,12 +64,12 @@ def test_a_closure_is_the_sum_of_what_the_rates_are_off_by() -> None:
 def test_on_the_way_it_is_less_its_share_of_the_closure() -> None:
     phi = phi_of(OFF)
     expected = [p - u * phi[-1] for p, u in zip(phi, ONE.done, strict=True)]
-    np.testing.assert_allclose(ONE.carried(OFF), expected, atol=1e-12)
+    np.testing.assert_allclose(ONE.attitude_error(OFF), expected, atol=1e-12)
 
 
 def test_what_is_off_swings_the_force_of_the_first_position() -> None:
     f = ONE.ends.f[ONE.ends.position == 2].mean(axis=0)
-    found = ONE.swung(OFF)
+    found = ONE.force_error(OFF)
     for k in range(M + 1):
         for j in range(2):
             expected = ONE.attitude[k] @ np.cross(OFF[k, :, j], f)
@@ -96,7 +101,7 @@ def test_what_a_state_has_wrong_of_the_rates_beside_bias_scale_and_delay() -> No
     state = State(base.bias + 0.3, base.scale * 1.2, base.small_rotation, base.earth,
                   terms)  # fmt: skip
     since = x.since_turn[None]
-    found = wrong(state, x, since)
+    found = other_gyro_errors(state, x, since)
     names = [p.name for p in effects["gyro_cross_coupling"].params]
     matrix = np.zeros((3, 3))
     for name, value in zip(names, coupling, strict=True):
@@ -110,7 +115,7 @@ def test_only_what_acts_on_the_way_moves_what_is_felt_there() -> None:
     lever, tilt = np.array([0.1, 0.0, -0.2]), np.array([1.0, 2.0])
     terms = (Term(effects["base_tilt"], tilt), Term(effects["lever_arm"], lever))
     state = replace(nominal(), terms=terms)
-    found = moved(x, state)
+    found = apply_way_effects(x, state)
     expected = x.f + np.cross(x.w, np.cross(x.w, lever))
     np.testing.assert_allclose(found.f, expected, atol=1e-12)
     np.testing.assert_array_equal(found.w, x.w)
@@ -133,7 +138,7 @@ def test_sides_of_small_rotations_are_their_columns() -> None:
 
 def test_some_rows_keep_what_they_have() -> None:
     x = ladder(2)
-    some = only(x, [3, 11])
+    some = select_rows(x, [3, 11])
     rows = [
         "alpha", "beta", "f", "w", "w_dot", "t", "since_start", "since_turn",
         "warming", "heating", "variance", "position", "rate", "lasts",

@@ -14,16 +14,16 @@ from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns import integration
 from fieldcal.model.turns.attitude import (
-    ASTRAY,
+    LOST_ANGLE,
     accelerations,
-    astray,
-    between,
-    blur,
-    geometry,
+    antisymmetric_vector,
+    interpolate_vectors,
+    sampling_error,
     trapezoid_means,
-    vee,
+    turn_geometry,
+    vertical_lost,
 )
-from fieldcal.model.turns.integration import Leg, divided, integrated
+from fieldcal.model.turns.integration import Leg, divide_into_steps, integrate_turn
 from fieldcal.model.turns.rotation import mean_rates, products
 from fieldcal.physics.experience import Experience
 from fieldcal.session.description import parse
@@ -56,7 +56,7 @@ def test_a_closure_is_what_the_attitude_is_off_by() -> None:
     x, reached = ends(), way() @ exponential(-SMALL)
     attitude = np.array([np.eye(3), reached])
     done = np.array([0.0, 1.0])
-    f, closure, across = geometry(x, (0, 1), attitude, done)
+    f, closure, across = turn_geometry(x, (0, 1), attitude, done)
     np.testing.assert_allclose(closure, SMALL, atol=1e-9)
     np.testing.assert_array_equal(across, np.eye(3))
     np.testing.assert_allclose(f, x.f[[0, 3]], atol=1e-12)
@@ -65,7 +65,7 @@ def test_a_closure_is_what_the_attitude_is_off_by() -> None:
 def test_without_angles_it_is_known_across_the_force() -> None:
     x, reached = ends(False), way() @ exponential(-SMALL)
     attitude = np.array([np.eye(3), reached])
-    _, closure, across = geometry(x, (0, 1), attitude, np.array([0.0, 1.0]))
+    _, closure, across = turn_geometry(x, (0, 1), attitude, np.array([0.0, 1.0]))
     up = x.f[0] / np.linalg.norm(x.f[0])
     np.testing.assert_allclose(across, np.eye(3) - np.outer(up, up), atol=1e-12)
     np.testing.assert_allclose(closure, across @ SMALL, atol=1e-7)
@@ -77,11 +77,11 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
     x, f = ends(), ends().f[0] / np.linalg.norm(ends().f[0])
     across = np.cross(f, [0.3, -0.8, 0.5])
     across /= np.linalg.norm(across)
-    assert ASTRAY == 0.3
-    assert astray(x, (0, 1), way() @ exponential(off * across)) == lost
+    assert LOST_ANGLE == 0.3
+    assert vertical_lost(x, (0, 1), way() @ exponential(off * across)) == lost
     about = way() @ exponential(off * f)
-    assert not astray(x, (0, 1), about)
-    _, closure, known = geometry(
+    assert not vertical_lost(x, (0, 1), about)
+    _, closure, known = turn_geometry(
         x, (0, 1), np.array([np.eye(3), about]), np.array([0, 1])
     )
     assert (np.trace(known) < 2.5) == lost
@@ -92,7 +92,7 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
 def test_between_ends_a_vector_is_as_near_as_the_turn_is_done() -> None:
     attitude = exponential(-np.outer(np.linspace(0, 1, 4), [0.5, -0.2, 0.9]))
     done, start, end = np.array([0.0, 0.25, 0.75, 1.0]), RNG.random(3), RNG.random(3)
-    found = between(attitude, done, start, end)
+    found = interpolate_vectors(attitude, done, start, end)
     for k in range(4):
         one, two = attitude[k] @ start, attitude[k] @ attitude[3].T @ end
         np.testing.assert_allclose(found[k], (1 - done[k]) * one + done[k] * two)
@@ -131,26 +131,28 @@ def test_blur_is_what_a_turn_in_half_the_steps_comes_out_otherwise_by(
     a, hz = 0.02, 8.0
     phase = 2 * np.pi * hz * t
     w = a * 2 * np.pi * hz * np.column_stack([np.cos(phase), np.sin(phase), 0 * t])
-    missed = blur(t, w, each, np.zeros(3))
+    missed = sampling_error(t, w, each, np.zeros(3))
     assert 1e-5 < missed < 1e-2
     for turned in (w[:, [2, 0, 1]], w[:, [1, 2, 0]]):
-        assert blur(t, turned, each, np.zeros(3)) == pytest.approx(missed, rel=1e-6)
+        assert sampling_error(t, turned, each, np.zeros(3)) == pytest.approx(
+            missed, rel=1e-6
+        )
     noise = 5e-3
     chance = 3 * noise**2 * 4.0**2 / 401
-    found = blur(t, w, each, np.full(3, noise))
+    found = sampling_error(t, w, each, np.full(3, noise))
     assert found == pytest.approx(np.sqrt(max(missed**2 - chance / 9, 0.0)), rel=1e-6)
     white = noise * np.random.default_rng(1).standard_normal((401, 3))
-    assert blur(t, white, each, np.full(3, noise)) < 1e-3
-    assert blur(t, 0 * w + [0.1, 0.2, 0.3], each, np.zeros(3)) < 1e-12
+    assert sampling_error(t, white, each, np.full(3, noise)) < 1e-3
+    assert sampling_error(t, 0 * w + [0.1, 0.2, 0.3], each, np.zeros(3)) < 1e-12
 
 
 def test_matrices_of_vectors() -> None:
     v, a = RNG.standard_normal((2, 5, 3))
     matrix = cross_matrix(v)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", matrix, a), np.cross(v, a))
-    np.testing.assert_allclose(vee(matrix), v)
+    np.testing.assert_allclose(antisymmetric_vector(matrix), v)
     lopsided = matrix + RNG.random((5, 1, 1)) * np.eye(3)
-    np.testing.assert_allclose(vee(lopsided), v)
+    np.testing.assert_allclose(antisymmetric_vector(lopsided), v)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 0.3, 3.0])
@@ -160,7 +162,9 @@ def test_exponentials_are_rotations_about_their_vector(size: float) -> None:
     np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
     np.testing.assert_allclose(found @ axis, axis, atol=1e-14)
     assert (np.trace(found) - 1) / 2 == pytest.approx(np.cos(size))
-    np.testing.assert_allclose(vee(found), np.sin(size) * axis, atol=1e-14)
+    np.testing.assert_allclose(
+        antisymmetric_vector(found), np.sin(size) * axis, atol=1e-14
+    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 16])
@@ -202,7 +206,7 @@ def leg(rate_hz: float, seconds: float, w: Array, **more: Array | float) -> Leg:
 def test_a_turn_is_cut_into_steps_of_20_ms_and_pieces_of_150(
     rate_hz: float, each: int, piece: int
 ) -> None:
-    found = divided(leg(rate_hz, 3.0, np.ones(3)))
+    found = divide_into_steps(leg(rate_hz, 3.0, np.ones(3)))
     assert found is not None and found.each == each
     count = (round(3.0 * rate_hz) - 1) // each
     np.testing.assert_array_equal(found.edge, np.arange(count + 1) * each)
@@ -215,10 +219,10 @@ def test_a_turn_is_cut_into_steps_of_20_ms_and_pieces_of_150(
 
 
 def test_a_turn_of_few_steps_is_none_and_a_long_one_has_no_more_pieces() -> None:
-    assert divided(leg(100.0, 0.16, np.ones(3))) is None
-    found = divided(leg(100.0, 0.19, np.ones(3)))
+    assert divide_into_steps(leg(100.0, 0.16, np.ones(3))) is None
+    found = divide_into_steps(leg(100.0, 0.19, np.ones(3)))
     assert found is not None and len(found.edge) == 10
-    long = divided(leg(100.0, 50.0, np.ones(3)))
+    long = divide_into_steps(leg(100.0, 50.0, np.ones(3)))
     assert long is not None and integration.PIECES - 1 <= len(long.cut) - 1 <= 60
 
 
@@ -227,17 +231,18 @@ def test_integrated_rates_are_rid_of_what_is_known() -> None:
     w = np.array([0.0, 0.0, 0.5])
     bias, scale = np.array([0.01, -0.02, 0.03]), np.array([1.0, 1.0, 1.25])
     one = leg(100.0, 2.01, bias + scale * w + [0.0, 0.0, 0.1], bias=bias, scale=scale)
-    steps = divided(one)
+    steps = divide_into_steps(one)
     assert steps is not None
     rid = np.tile([0.0, 0.0, 0.1], (len(steps.edge), 1))
-    found = integrated(one, steps, rid)
+    found = integrate_turn(one, steps, rid)
     np.testing.assert_allclose(found.rate, np.tile(w, (201, 1)), atol=1e-12)
     np.testing.assert_allclose(found.attitude[-1], exponential(np.array([0, 0, -1.0])),
                                atol=1e-9)  # fmt: skip
     np.testing.assert_allclose(found.done, np.linspace(0, 1, 101), atol=1e-9)
     slow = replace(one, source=replace(one.source, pace=2.0))
     np.testing.assert_allclose(
-        integrated(slow, steps, rid).attitude[-1], exponential(np.array([0, 0, -0.5])),
+        integrate_turn(slow, steps, rid).attitude[-1],
+        exponential(np.array([0, 0, -0.5])),
         atol=1e-9,
     )  # fmt: skip
 
@@ -247,9 +252,9 @@ def test_the_earth_turns_with_the_device_on_the_way() -> None:
     start = np.array([3e-5, 4e-5, 0.0])
     end = exponential(np.array([0.0, 0.0, -1.0])) @ start
     x = replace(one.x, w=np.array([start] * 3 + [end] * 2))
-    steps = divided(one)
+    steps = divide_into_steps(one)
     assert steps is not None
-    found = integrated(replace(one, x=x), steps, np.zeros((len(steps.edge), 3)))
+    found = integrate_turn(replace(one, x=x), steps, np.zeros((len(steps.edge), 3)))
     turned = exponential(-found.rate * (steps.t - steps.t[0])[:, None]) @ start
     np.testing.assert_allclose(found.earth, turned, atol=1e-8)
 
@@ -258,9 +263,9 @@ def test_rates_that_are_late_are_taken_later() -> None:
     one = leg(100.0, 2.01, np.zeros(3))
     gyr = np.outer(one.source.block.t, [1.0, -1.0, 2.0])
     ramp = replace(one.source, block=replace(one.source.block, gyr=gyr))
-    steps = divided(one)
+    steps = divide_into_steps(one)
     assert steps is not None
     late = replace(one, source=ramp, late=0.03)
-    found = integrated(late, steps, np.zeros((len(steps.edge), 3)))
+    found = integrate_turn(late, steps, np.zeros((len(steps.edge), 3)))
     expected = np.outer(steps.t + 0.03, [1.0, -1.0, 2.0])
     np.testing.assert_allclose(found.rate, expected, atol=1e-12)

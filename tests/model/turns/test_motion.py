@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.rows.reduce import Rows, RowSource, reduce
+from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.model.turns.motion import moving
-from fieldcal.model.turns.turn import Turning
+from fieldcal.model.turns.motion import motion_bounds
+from fieldcal.model.turns.turn import TurnTracker
 from fieldcal.session.description import parse
 
 RATE, NOISE = 100.0, 1e-4
@@ -40,7 +40,7 @@ def recorded(
     usable = np.ones((n, 6), dtype=bool)
     about = parse({"format": 1, "position": places})
     source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
-    return source, reduce(source)
+    return source, reduce_to_rows(source)
 
 
 def turning(first: int, last: int, size: float = 0.5, n: int = 5000) -> Array:
@@ -53,7 +53,7 @@ def turning(first: int, last: int, size: float = 0.5, n: int = 5000) -> Array:
 @pytest.mark.parametrize("bias", [0.0, 0.3])
 def test_the_motion_is_found_with_some_time_around_it(size: float, bias: float) -> None:
     source, rows = recorded(turning(2000, 2500, size), np.full(3, bias))
-    found = moving(source, rows, (0, 1), *GAP)
+    found = motion_bounds(source, rows, (0, 1), *GAP)
     assert found is not None
     start, end = found
     assert 2000 - MARGIN - 12 <= start <= 2000 - MARGIN + 1
@@ -65,12 +65,12 @@ def test_beside_a_window_without_gyroscopes_all_of_the_way_is_motion() -> None:
     source, rows = recorded(turning(2000, 2500))
     rows.y[rows.x.position == 1, 4] = np.nan
     with warnings.catch_warnings(action="error"):
-        assert moving(source, rows, (0, 1), *GAP) == GAP
+        assert motion_bounds(source, rows, (0, 1), *GAP) == GAP
 
 
 def test_it_ends_where_the_windows_do() -> None:
     source, rows = recorded(turning(1020, 3990))
-    assert moving(source, rows, (0, 1), *GAP) == GAP
+    assert motion_bounds(source, rows, (0, 1), *GAP) == GAP
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1), (1, 1)])
@@ -82,7 +82,7 @@ def test_what_goes_slowly_before_and_after_belongs_to_it(
     rate[1800:1900] = 2e-3 * before
     rate[2600:2700] = 2e-3 * after
     source, rows = recorded(rate)
-    found = moving(source, rows, (0, 1), *GAP)
+    found = motion_bounds(source, rows, (0, 1), *GAP)
     assert found is not None
     start, end = found
     first, last = (1800 if before else 2000), (2700 if after else 2500)
@@ -92,11 +92,13 @@ def test_what_goes_slowly_before_and_after_belongs_to_it(
 
 def test_where_nothing_stands_out_the_gap_is_taken() -> None:
     source, rows = recorded(turning(2000, 2500, 1e-3))
-    assert moving(source, rows, (0, 1), *GAP) == GAP
+    assert motion_bounds(source, rows, (0, 1), *GAP) == GAP
     source, rows = recorded(turning(2000, 2500, 1e-3, 8000), gap=(1000, 7100))
-    long = moving(source, rows, (0, 1), 1000, 6900)
+    long = motion_bounds(source, rows, (0, 1), 1000, 6900)
     assert long == (1000, 6900), "59 s"
-    assert moving(source, rows, (0, 1), 1000, 7100) is None, "61 s are not followed"
+    assert motion_bounds(source, rows, (0, 1), 1000, 7100) is None, (
+        "61 s are not followed"
+    )
 
 
 @pytest.mark.parametrize(("end", "followed"), [(7200, True), (7450, False)])
@@ -105,21 +107,21 @@ def test_a_motion_of_more_than_a_minute_is_not_followed(
 ) -> None:
     gap = 1000, 8000
     source, rows = recorded(turning(1500, end, n=9000), gap=gap)
-    assert (moving(source, rows, (0, 1), *gap) is not None) == followed
+    assert (motion_bounds(source, rows, (0, 1), *gap) is not None) == followed
 
 
 def test_without_all_samples_no_motion_is_followed() -> None:
     source, rows = recorded(turning(2000, 2500))
     source.usable[3000, 1] = False
-    assert moving(source, rows, (0, 1), *GAP) is None
+    assert motion_bounds(source, rows, (0, 1), *GAP) is None
     source.usable[3000, 1], source.usable[4500, 1] = True, False
-    assert moving(source, rows, (0, 1), *GAP) is not None
-    assert moving(source, rows, (0, 1), 2000, 2039) is None, "too few"
+    assert motion_bounds(source, rows, (0, 1), *GAP) is not None
+    assert motion_bounds(source, rows, (0, 1), 2000, 2039) is None, "too few"
     for lost, found in ((2, True), (3, False)):
         t = source.block.t.copy()
         t[2200:] += lost / RATE
         source.block.t[:] = t
-        assert (moving(source, rows, (0, 1), *GAP) is not None) == found
+        assert (motion_bounds(source, rows, (0, 1), *GAP) is not None) == found
         source.block.t[:] = np.arange(len(t)) / RATE
 
 
@@ -128,17 +130,17 @@ def test_single_samples_that_may_not_be_used_are_as_if_they_were_missing() -> No
     source, rows = recorded(turning(2000, 2500))
     lost = source.usable.copy()
     lost[1700:2700:40, 4] = False
-    legs = [Turning(s, rows, np.zeros((1, len(rows.x)))).legs
+    legs = [TurnTracker(s, rows, np.zeros((1, len(rows.x)))).legs
             for s in (source, replace(source, usable=lost))]  # fmt: skip
     (pair, first, last), (other, begins, ends) = legs[0][0], legs[1][0]
     assert pair == other
-    whole = replace(source, usable=lost).whole.block
+    whole = replace(source, usable=lost).complete_samples.block
     assert len(whole) == len(source.block) - 25
     t = source.block.t
     assert whole.t[begins] == pytest.approx(t[first], abs=0.05)
     assert whole.t[ends] == pytest.approx(t[last], abs=0.05)
     lost[2200:2300] = False
     broken = replace(source, usable=lost)
-    assert not Turning(broken, rows, np.zeros((1, len(rows.x)))).legs
+    assert not TurnTracker(broken, rows, np.zeros((1, len(rows.x)))).legs
     nothing = replace(source, usable=np.zeros_like(lost))
-    assert source.whole is source and nothing.whole is nothing
+    assert source.complete_samples is source and nothing.complete_samples is nothing

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.turns.rounded import StandingOutputs, standing
+from fieldcal.model.turns.rounded import StandingOutputs, find_standing_outputs
 
 STEP, RATE, N, EACH = 0.02, 100.0, 400, 2
 SCALE = np.array([1.0, 1.02, 0.98])
@@ -67,7 +67,7 @@ def test_what_rounding_makes_of_a_turn_is_as_large_as_is_said() -> None:
         share = stands().share(one.gyr, EDGE)
         shared = np.einsum("mci,mc,c->i", one.attitude, share, one.off / SCALE)
         t = np.arange(N) / RATE
-        covariance = stands().apart(t, one.gyr, SCALE, EDGE, one.attitude)
+        covariance = stands().closure_covariance(t, one.gyr, SCALE, EDGE, one.attitude)
         left = one.closure - shared * EACH / RATE
         pulls.append(left @ np.linalg.solve(covariance, left) / 3)
         alone.append(one.closure @ np.linalg.solve(covariance, one.closure) / 3)
@@ -96,7 +96,7 @@ def block(noise: float) -> tuple[Block, NDArray[np.intp]]:
 
 
 def test_a_gyroscope_stands_where_its_noise_reaches_across_no_step() -> None:
-    found = standing(*block(0.02 * STEP), np.full(3, STEP / 12**0.5))
+    found = find_standing_outputs(*block(0.02 * STEP), np.full(3, STEP / 12**0.5))
     assert found is not None
     np.testing.assert_array_equal(found.value, 0.0)
     np.testing.assert_allclose(found.step, STEP)
@@ -107,7 +107,7 @@ def test_a_gyroscope_stands_where_its_noise_reaches_across_no_step() -> None:
 def test_what_windows_do_not_share_is_not_met_again(
     alike: tuple[float, float, float],
 ) -> None:
-    found = standing(*block(0.02 * STEP), np.array(alike))
+    found = find_standing_outputs(*block(0.02 * STEP), np.array(alike))
     if not any(alike):
         assert found is None
         return

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.turns.tremor import LEAST, swaying
+from fieldcal.model.turns.tremor import LEAST, sway_variance
 
 STEP, SECONDS = 0.01, 10.0
 
@@ -24,16 +24,16 @@ def rates(size: float, hz: float, noise: float, seed: int) -> Array:
 
 @pytest.mark.parametrize("hz", [0.7, 1.6, 4.0])
 def test_a_sine_is_half_its_square_about_the_axis_with_most_of_it(hz: float) -> None:
-    found = swaying(rates(2e-3, hz, 0.0, 1), STEP)
+    found = sway_variance(rates(2e-3, hz, 0.0, 1), STEP)
     assert found == pytest.approx(0.64 * 2e-3**2 / 2, rel=0.06)
 
 
 def test_noise_is_no_swaying() -> None:
     """Its walk is a third as large as the sine here: 1.5e-2^2 x 0.01 x 10 / 15."""
     size = 3.5e-3
-    found = [swaying(rates(size, 1.6, 1.5e-2, seed), STEP) for seed in range(300)]
+    found = [sway_variance(rates(size, 1.6, 1.5e-2, seed), STEP) for seed in range(300)]
     assert np.mean(found) == pytest.approx(0.64 * size**2 / 2, rel=0.1)
 
 
 def test_of_a_few_samples_nothing_is_known() -> None:
-    assert swaying(rates(2e-3, 1.6, 0.0, 1)[: LEAST - 1], STEP) == 0.0
+    assert sway_variance(rates(2e-3, 1.6, 0.0, 1)[: LEAST - 1], STEP) == 0.0

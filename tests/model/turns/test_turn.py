@@ -15,12 +15,12 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.causes.filtered_turns import FILTERED
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.held_out import turns_held_out
+from fieldcal.model.posterior.held_out import held_out_turn_residuals
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import Term
-from fieldcal.model.system.fitted import Fitted
+from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.way_rows import WayRows
@@ -119,7 +119,7 @@ def followed(
     inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
-    known = Search(d, gram(linear, d, at_rest)).evaluated(())
+    known = Search(d, gram(linear, d, at_rest)).evaluate(())
     assert inference.turns is not None
     turns = inference.turns.linearised(inference.nominal, at_rest, linear, known)
     return inference, known, turns
@@ -244,7 +244,7 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
     inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
-    assert inference.turns is not None and not d.free.any()
+    assert inference.turns is not None and not d.unoriented.any()
     turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
     noise = float(np.sqrt((prepared.rows.noise[3:] ** 2).mean()))
     for turn in turns:
@@ -258,9 +258,9 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     one = ride("gyro_scale")
     inference, state = one.inference, one.inference.nominal
     assert inference.turns is not None
-    turning = inference.turns.turning
+    turning = inference.turns.tracker
     turn = next(iter(turning.turns(state)))
-    since = turning.after(turn.x.t, turn.positions[1])
+    since = turning.time_since_turn(turn.x.t, turn.positions[1])
     view, noise = RowView(turn.x, turn.x, since, state), np.repeat([0.0, 1e-2], 3)
     found = WayRows(turn, view, inference.dictionary, one.known, noise)._covariance()
     rng, gaps = np.random.default_rng(1), np.diff(turn.x.t)
@@ -268,10 +268,10 @@ def test_noise_of_gyroscopes_on_the_way_is_a_bridge_between_windows() -> None:
     steps = density * rng.standard_normal((1500, len(gaps), 3)) * gaps[:, None] ** 0.5
     phi = np.concatenate([np.zeros((1500, 1, 3)), np.cumsum(steps, axis=1)], axis=1)
     phi -= turn.done[:, None] * phi[:, -1:]
-    rows = turn.means(turn.swung(np.moveaxis(phi, 0, 2)))
+    rows = turn.means(turn.force_error(np.moveaxis(phi, 0, 2)))
     spread = np.cov(rows.reshape(-1, 1500))
     sizes = SIZES[list(one.known.sizes.instability)][:3]
-    loose = sizes * inference.dictionary.unstable[:3]
+    loose = sizes * inference.dictionary.typical_instability[:3]
     cov = found - np.diag((turn.sd**2).ravel())
     own = np.diag(cov).reshape(-1, 3) - 2 * loose**2
     drawn = np.diag(spread).reshape(-1, 3)
@@ -298,9 +298,9 @@ def test_turns_are_foretold_from_windows_and_the_other_turns() -> None:
     search = Search(d, rows)
     missed = []
     for members in ((), ((cause, one.group),)):
-        there = search.evaluated(members)
-        fitted = Fitted(inference.system.rows, d, linear, at_rest, there)
-        missed.append(turns_held_out(fitted, one.turns))
+        there = search.evaluate(members)
+        fitted = FittedSet(inference.system.rows, d, linear, at_rest, there)
+        missed.append(held_out_turn_residuals(fitted, one.turns))
     assert len(missed[0]) == sum(len(t.closure) + len(t.way) for t in one.turns)
     before, after = (np.sqrt(np.mean(m**2)) for m in missed)
     assert after < 0.1 * before
@@ -309,7 +309,7 @@ def test_turns_are_foretold_from_windows_and_the_other_turns() -> None:
 def test_a_copied_column_is_as_the_one_it_is_near() -> None:
     turn = ride("gyro_scale").turns[2]
     old, new = turn.columns[[1, 4]], np.array([9001, 9002])
-    more = turn.copied(old, new)
+    more = turn.with_copied_columns(old, new)
     np.testing.assert_array_equal(more.columns[-2:], new)
     for was, found in ((turn.design, more.design), (turn.way_design, more.way_design)):
         np.testing.assert_array_equal(found[:, -2:], was[:, [1, 4]])
@@ -319,10 +319,12 @@ def test_a_copied_column_is_as_the_one_it_is_near() -> None:
 def test_the_time_since_a_turn_counts_from_where_it_ends() -> None:
     inference = ride("gyro_scale").inference
     assert inference.turns is not None
-    turning, x = inference.turns.turning, inference.dictionary.x
+    turning, x = inference.turns.tracker, inference.dictionary.x
     first = int(np.argmax(x.position == 2))
     ended = x.t[first] - inference.dictionary.since[:, first]
-    since = turning.after(np.array([ended[0] - 0.5, ended[0], ended[0] + 2.0]), 2)
+    since = turning.time_since_turn(
+        np.array([ended[0] - 0.5, ended[0], ended[0] + 2.0]), 2
+    )
     np.testing.assert_allclose(since[0], [np.inf, 0.0, 2.0], atol=1e-9)
     assert abs(ended[0] - (2 * SPACING_S)) < 0.7
 
@@ -347,14 +349,19 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
-    assert inference.turns is not None and d.free.all()
+    assert inference.turns is not None and d.unoriented.all()
     turns = inference.turns.linearised(inference.nominal, at_rest, linear, None)
     assert len(turns) > 3
     for turn in turns:
         whole = np.zeros((len(turn.closure), d.width))
         whole[:, turn.columns] = turn.design
         for c in range(3):
-            each = whole[:, d.windows + c * len(d.held) + np.arange(len(d.held))]
+            each = whole[
+                :,
+                d.windows
+                + c * len(d.window_positions)
+                + np.arange(len(d.window_positions)),
+            ]
             assert np.flatnonzero(each.any(axis=0)).tolist() == list(turn.positions)
             for found, expected in (
                 (each.sum(axis=1), whole[:, d.bias + c]),

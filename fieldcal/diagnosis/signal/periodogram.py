@@ -8,9 +8,10 @@ squared. Noise at neighbouring frequencies is alike there, over the bandwidth of
 window, so its level comes from the windows side by side. Tremor has another phase each
 time and is noise as well, of the level
 
-    (sum |X_w|^2 - |sum X_w|^2 / W) W / (W - 1)                                    (1)
+    (Q sum |X_w|^2 / q_w - |sum X_w|^2) / (W - 1),    Q = sum q_w                  (1)
 
-which a line with one phase leaves as it is.
+with q_w the sum of the squares of the taper of a window, which is proportional to its
+length. A line with one phase leaves that as it is.
 Source: D. Percival, A. Walden, Spectral Analysis for Physical Applications, chapter 10.
 """
 
@@ -195,9 +196,11 @@ def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, 
     (6, m), (6, m) and (m,) Hz. `frame` (w, 3, 3) rotates each window into the axes in
     which the phase is kept.
     """
-    turned = []
+    turned, squares = [], []
     for samples, to_frame in zip(pieces.samples, frame, strict=True):
-        tapered = (np.hanning(len(samples))[:, None] * samples).T
+        taper = np.hanning(len(samples))
+        squares.append(float(taper @ taper))
+        tapered = (taper[:, None] * samples).T
         turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
     t, rate, count = np.concatenate(pieces.times), pieces.rate, len(turned)
     n = _next_fast_length(2 * round((t[-1] - t[0]) * rate) + 2)
@@ -207,11 +210,11 @@ def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, 
         return power, np.zeros_like(power), hz
     short = 2 * _next_fast_length(max(map(len, pieces.times)))
     each = np.zeros((6, short // 2 + 1))
-    for values, at in zip(turned, pieces.times, strict=True):
-        each += _squared_magnitude(_fourier_sums(values, at, rate, short))
+    for values, at, square in zip(turned, pieces.times, squares, strict=True):
+        each += _squared_magnitude(_fourier_sums(values, at, rate, short)) / square
     coarse = np.fft.rfftfreq(short, 1 / rate)
     total = np.array([np.interp(hz, coarse, row) for row in each])
-    return power, (count * total - power) / (count - 1), hz  # (1)
+    return power, (sum(squares) * total - power) / (count - 1), hz  # (1)
 
 
 def _next_fast_length(n: int) -> int:

@@ -108,3 +108,16 @@ def test_a_line_comes_before_tremor_that_is_louder_at_the_same_frequencies() -> 
     assert loudest is not None and loudest.channels == (3,)
     # with one phase there is nothing that chance does not make of such tremor
     assert highest_peak(p, spectra, [line]) is None
+
+
+def test_a_line_keeps_its_phase_in_windows_of_different_lengths() -> None:
+    """Long windows have most of a line's power, which is no tremor in them."""
+    rng = np.random.default_rng(12)
+    lengths, starts = (3600, 180, 900, 240, 2000), (0.0, 25.0, 40.0, 61.0, 80.0)
+    times = [s + np.arange(n) / RATE for n, s in zip(lengths, starts, strict=True)]
+    samples = [noise(rng, n) for n in lengths]
+    for t, six in zip(times, samples, strict=True):
+        six[:, 3] += 1.5e-4 * np.sin(2 * np.pi * 12.06 * t)
+    p = pieces(times, samples)
+    line = highest_peak(p, compute_spectra(p), [])
+    assert line is not None and line.hz == pytest.approx(12.06, abs=0.01)

@@ -33,8 +33,8 @@ CYCLES = 2.5
 HUMP = 2.0
 """Times the floor down to which the power about a peak belongs to it."""
 
-LOOKS = 16
-"""Spectra looked at."""
+SEARCHED = 16
+"""Groups of channels in which a recording is searched for a peak, about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ def _highest_in_spectrum(
         total = np.sum([stands[c] for c in some], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
         odds = _log_gamma_tail(float(total[at]), count * len(some))
-        odds += np.log(LOOKS * len(total))
+        odds += np.log(SEARCHED * len(total))
         if best is None or odds < best[0]:
             peak = _peak_at(hz, total / (count * len(some)), at)
             best = odds, replace(peak, channels=some)

@@ -135,9 +135,7 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     triads in base axes; they are left out where times are those of arrival, which keep
     no phase. Windows are tapered, since a decay at the start of each is no line.
     """
-    power, count, hz = _power_by_window(pieces)
-    used = np.flatnonzero(power.any(axis=1)).tolist()
-    windows = Spectrum(power, count, hz, tuple((c,) for c in used))
+    windows = window_spectrum(pieces)
     out = [windows]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
     long = lasts * pieces.rate > GRID or sum(map(len, pieces.samples)) > COHERENT
@@ -146,7 +144,7 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
-    triads = [some for some in TRIADS if set(some) <= set(used)]
+    triads = [some for some in TRIADS if set(some) <= set(windows.channels)]
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
@@ -158,6 +156,24 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
         level = np.where(tremor > sure * level, tremor, level)
         out.append(Spectrum(power, 1, hz, channel_groups, level))
     return out
+
+
+def window_spectrum(pieces: WindowSamples) -> Spectrum:
+    """Power summed over windows, channel by channel."""
+    length = min(LONGEST, max(map(len, pieces.samples)))
+    n = 1 << (length - 1).bit_length()
+    total, count = np.zeros((6, n // 2 + 1)), 0
+    for samples, t in zip(pieces.samples, pieces.times, strict=True):
+        parts = max(1, len(samples) // LONGEST)
+        for part in np.array_split(np.arange(len(t)), parts):
+            taper = np.hanning(len(part))
+            tapered = samples[part].T * taper
+            spectrum = _fourier_sums(tapered, t[part], pieces.rate, n)
+            total += _squared_magnitude(spectrum) / (taper @ taper)
+            count += 1
+    used = np.flatnonzero(total.any(axis=1)).tolist()
+    hz = np.fft.rfftfreq(n, 1 / pieces.rate)
+    return Spectrum(total, count, hz, tuple((c,) for c in used))
 
 
 def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
@@ -184,10 +200,13 @@ def _level_with_one_phase(
 
     `frame` (w, 3, 3) rotates each window.
     """
-    length = [len(samples) for samples in pieces.samples]
-    square = np.array([(np.hanning(n) ** 2).sum() for n in length])
-    shares = np.einsum("w,wij->ij", square, frame**2)
+    shares = np.einsum("w,wij->ij", _taper_squares(pieces), frame**2)
     return np.vstack([shares @ variance[:3], shares @ variance[3:]])
+
+
+def _taper_squares(pieces: WindowSamples) -> Array:
+    """q_w of (1), the sum of the squares of each window's taper, (w,)."""
+    return np.array([(np.hanning(len(s)) ** 2).sum() for s in pieces.samples])
 
 
 def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, Array]:
@@ -196,11 +215,9 @@ def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, 
     (6, m), (6, m) and (m,) Hz. `frame` (w, 3, 3) rotates each window into the axes in
     which the phase is kept.
     """
-    turned, squares = [], []
+    turned, squares = [], _taper_squares(pieces)
     for samples, to_frame in zip(pieces.samples, frame, strict=True):
-        taper = np.hanning(len(samples))
-        squares.append(float(taper @ taper))
-        tapered = (taper[:, None] * samples).T
+        tapered = (np.hanning(len(samples))[:, None] * samples).T
         turned.append(np.vstack([to_frame @ tapered[:3], to_frame @ tapered[3:]]))
     t, rate, count = np.concatenate(pieces.times), pieces.rate, len(turned)
     n = _next_fast_length(2 * round((t[-1] - t[0]) * rate) + 2)
@@ -214,7 +231,7 @@ def _coherent_power(pieces: WindowSamples, frame: Array) -> tuple[Array, Array, 
         each += _squared_magnitude(_fourier_sums(values, at, rate, short)) / square
     coarse = np.fft.rfftfreq(short, 1 / rate)
     total = np.array([np.interp(hz, coarse, row) for row in each])
-    return power, (sum(squares) * total - power) / (count - 1), hz  # (1)
+    return power, (squares.sum() * total - power) / (count - 1), hz  # (1)
 
 
 def _next_fast_length(n: int) -> int:
@@ -227,22 +244,6 @@ def _next_fast_length(n: int) -> int:
     """
     odd = [int(3**i * 5**j) for i in range(5) for j in range(4)]
     return min(m << (-(-n // m) - 1).bit_length() for m in odd)
-
-
-def _power_by_window(pieces: WindowSamples) -> tuple[Array, int, Array]:
-    """Power, count and frequencies of all channels, summed over windows."""
-    length = min(LONGEST, max(map(len, pieces.samples)))
-    n = 1 << (length - 1).bit_length()
-    total, count = np.zeros((6, n // 2 + 1)), 0
-    for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        parts = max(1, len(samples) // LONGEST)
-        for part in np.array_split(np.arange(len(t)), parts):
-            taper = np.hanning(len(part))
-            tapered = samples[part].T * taper
-            spectrum = _fourier_sums(tapered, t[part], pieces.rate, n)
-            total += _squared_magnitude(spectrum) / (taper @ taper)
-            count += 1
-    return total, count, np.fft.rfftfreq(n, 1 / pieces.rate)
 
 
 def _fourier_sums(values: Array, t: Array, rate: float, n: int) -> Complex:

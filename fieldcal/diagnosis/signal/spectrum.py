@@ -22,7 +22,11 @@ from fieldcal.diagnosis.signal.line import (
 )
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
 from fieldcal.diagnosis.signal.peaks import Peak, highest_peak
-from fieldcal.diagnosis.signal.periodogram import compute_spectra, noise_near
+from fieldcal.diagnosis.signal.periodogram import (
+    compute_spectra,
+    noise_near,
+    window_spectrum,
+)
 from fieldcal.diagnosis.signal.pieces import (
     Complex,
     WindowSamples,
@@ -171,7 +175,7 @@ def _noise_beside(pieces: WindowSamples, tone: SpectralLine) -> Array:
     it is subtracted first and restored afterwards.
     """
     _subtract(pieces, tone)
-    (channels, *_) = compute_spectra(pieces)
+    channels = window_spectrum(pieces)
     _subtract(pieces, replace(tone, causes=-tone.causes))
     return np.maximum(pieces.noise, noise_near(channels, tone.hz, pieces.noise))
 

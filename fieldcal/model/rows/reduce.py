@@ -154,10 +154,7 @@ def reduce_to_rows(
     shaken = source.window_noise
     noise, levels = shaken.noise, shaken.levels
     if source.sway_noise is not None:
-        noise, levels = (
-            np.fmax(noise, source.sway_noise),
-            np.fmax(levels, source.sway_noise),
-        )
+        noise, levels = (np.fmax(a, source.sway_noise) for a in (noise, levels))
     if level is not None:
         noise, levels = level, np.tile(level, (len(held), 1))
     source = replace(source, block=shaken.block)

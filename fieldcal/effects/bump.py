@@ -1,18 +1,21 @@
 """Somebody, or the wind, touched the device while it was held.
 
 A stretch of a window, at_s and for_s long, far beyond what is usual in that window: in
-single samples, or in the mean of a tenth or half a second. Usual is the noise, or what
-the window shows at that length throughout, so that a base that rocks, a machine that
-shakes or a hand that trembles makes no bumps. It is left out. Source: model of this
-project.
+single samples, in the mean of a tenth or half a second, or, for a gentle push, in the
+amplitude of a half sine of up to two seconds. Usual is the noise, or what the window
+shows at that length throughout, so that a base that rocks, a machine that shakes or a
+hand that trembles makes no bumps. It is left out. Source: model of this project.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
+from fieldcal.physics.gentle_pushes import GentlePush, gentle_pushes
 from fieldcal.physics.pushes import (
     FEWEST,
     LARGEST,
@@ -42,6 +45,9 @@ FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
 LOUDEST_S = 1.0
 """Length of a push of a hand or a gust, s."""
 
+STEPS = 2.0
+"""Steps, in standard deviations of noise, between which a gentle push is lost."""
+
 NOTHING = slice(0, 0)
 
 SHORTEST = 3
@@ -64,9 +70,36 @@ class Bump(Chain):
         rate = 1 / float(np.median(np.diff(recording.block.t)))
         held = enumerate(recording.windows)
         some = [p for p, (first, last) in held if last - first >= FEWEST]
-        return [
-            fault for p in some for fault in _disturbed_stretches(recording, p, rate)
-        ]
+        loud = {p: _disturbed_stretches(recording, p, rate) for p in some}
+        gentle = _gently_pushed_stretches(recording, loud, rate)
+        return [fault for p in some for fault in (*loud[p], *gentle[p])]
+
+
+def _gently_pushed_stretches(
+    recording: CheckedSamples, loud: Mapping[int, Sequence[Fault]], rate: float
+) -> dict[int, list[Fault]]:
+    """Gentle pushes in each window, beside the faults that it has already."""
+    windows = {}
+    for p, faults in loud.items():
+        z = recording.six(*recording.windows[p].tolist()) / _noise(recording)
+        z[:, recording.steps > STEPS * recording.noise] = 0.0
+        if recording.x.rate[p].any():
+            z[:, :3] = 0.0
+        for fault in faults:
+            z[fault.rows - recording.windows[p, 0]] = np.nan
+        windows[p] = z
+    out: dict[int, list[Fault]] = {p: [] for p in windows}
+    pushes = gentle_pushes(list(windows.values()), rate)
+    around = round(AROUND_S * rate)
+    for (p, z), found in zip(windows.items(), pushes, strict=True):
+        for push in found:
+            first = max(push.first - around, 0)
+            near = z[first : push.last + around]
+            at = (push.first - first, push.last - first)
+            courses = _steady_changes(near, at, rate)
+            if all(push.is_in(near - course) for course in courses):
+                out[p].append(_gentle_fault(recording, p, push, loud[p]))
+    return out
 
 
 def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list[Fault]:
@@ -75,8 +108,7 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     around, shortest = round(AROUND_S * rate), max(2, round(0.1 * rate))
     first, last = (int(i) for i in recording.windows[p])
     steps = 0.5 * recording.steps
-    noise = np.maximum(recording.noise, steps)
-    noise[noise == 0.0] = np.inf  # what never changes is not pushed
+    noise = _noise(recording)
     z = recording.six(first, last)
     z /= noise
     _flatten(z, rate, _most_disturbed_stretch(z, rate, shortest))
@@ -94,6 +126,13 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
         if not _has_steady_change(near / noise, there, (int(a), int(b)), rate):
             out.append(_fault(recording, first, int(a), int(b), z, rate))
     return out
+
+
+def _noise(recording: CheckedSamples) -> Array:
+    """Standard deviation of a sample, at least half a step, (6,)."""
+    noise: Array = np.maximum(recording.noise, 0.5 * recording.steps)
+    noise[noise == 0.0] = np.inf  # what never changes is not pushed
+    return noise
 
 
 def _most_disturbed_stretch(z: Array, rate: float, m: int) -> slice:
@@ -163,15 +202,10 @@ def _has_steady_change(
     window, first and one past the last sample; `there` what is usual in that.
     """
     near, around = np.nan_to_num(near), round(AROUND_S * rate)
-    courses = [_level_jump(near, round(BESIDE_S * rate))]
-    if at[0] < around:
-        courses += [_exponential_change(near, tau * rate) for tau in FADES_S]
     shortest, margin = max(2, round(0.1 * rate)), round(LOUDEST_S * rate / 2)
     first = min(at[0], around)
     beside = slice(max(first - margin, 0), first + at[1] - at[0] + margin)
-    for course in courses:
-        if course is None:
-            continue
+    for course in _steady_changes(near, at, rate):
         rest = near - course
         _flatten(rest, rate)
         calm = (usual_spread(rest) < SHAKEN * there.sample).all()
@@ -179,6 +213,16 @@ def _has_steady_change(
         if calm and len(disturbed_stretches(rest, shortest, usually)) == 0:
             return True
     return False
+
+
+def _steady_changes(near: Array, at: tuple[int, int], rate: float) -> list[Array]:
+    """Courses (n, 6) of a jump and of exponential changes, fitted to the samples."""
+    known = np.nan_to_num(near)
+    jump = _level_jump(known, round(BESIDE_S * rate))
+    courses = [] if jump is None else [jump]
+    if at[0] < round(AROUND_S * rate):
+        courses += [_exponential_change(known, tau * rate) for tau in FADES_S]
+    return courses
 
 
 def _level_jump(z: Array, margin: int) -> Array | None:
@@ -241,4 +285,27 @@ def _fault(
         size=float(np.abs(z[a:b, worst]).max() * recording.noise[worst]),
         sigma=float(np.abs(z[a:b, worst]).max()),
         channels=tuple(np.array(CHANNELS)[np.abs(z[a:b]).max(axis=0) > LARGEST]),
+    )
+
+
+def _gentle_fault(
+    recording: CheckedSamples, p: int, push: GentlePush, loud: Sequence[Fault]
+) -> Fault:
+    """Samples of a gentle push. Beside a loud one it is a part of that: not named."""
+    start, end = (int(i) for i in recording.windows[p])
+    t = recording.block.t
+    first, last = start + push.first, min(start + push.last, end)
+    at, to = float(t[first]), float(t[last - 1])
+    length = to - at
+    sigma = length / (2 * push.deviation)
+    alone = all(at - f.to_s > length or f.from_s - to > length for f in loud)
+    return Fault(
+        channel=CHANNELS[push.channel],
+        values={"at_s": at, "for_s": length} if alone else {},
+        sigmas={"at_s": 0.05 + sigma, "for_s": 0.1 + sigma},
+        from_s=at,
+        to_s=to,
+        rows=np.arange(first, last),
+        size=abs(push.amplitude) * float(recording.noise[push.channel]),
+        sigma=push.deviation,
     )

@@ -1,0 +1,157 @@
+"""Touches and gusts of up to two seconds that no single sample shows.
+
+A push is found where its amplitude (`matched_filter`) goes further than noise goes in a
+whole recording once in a thousand times. The most unusual one is taken first; what it
+covers says nothing more, and the search begins again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldcal.core.chances import chi2_tail
+from fieldcal.core.samples import ACC, GYR, Array
+from fieldcal.physics.matched_filter import (
+    AmplitudeNoise,
+    MatchedFilter,
+    amplitude_noise,
+)
+
+LENGTHS_S = (0.5, 1.0, 2.0)
+"""Lengths of the pushes that are looked for, s."""
+
+CHANCE = 1e-3
+"""Probability of finding a push in a recording without any."""
+
+TRIADS, AXES = (ACC, GYR), 3
+
+
+@dataclass(frozen=True, slots=True)
+class GentlePush:
+    """A push, as its matched filter sees it.
+
+    Attributes
+    ----------
+    first, last : first and one past the last sample in the window
+    channel : index in `samples.CHANNELS` of the output that shows it most
+    amplitude : height of the half sine there, in standard deviations of a sample
+    deviation : d of (3) in `matched_filter`
+    least : d from which it is a push
+    matched : the filter
+    noise : of the amplitudes at this instant
+
+    """
+
+    first: int
+    last: int
+    channel: int
+    amplitude: float
+    deviation: float
+    least: float
+    matched: MatchedFilter
+    noise: AmplitudeNoise
+
+    def is_in(self, z: Array) -> bool:
+        """Whether outputs (n, 6) have a push of this length, by the same noise."""
+        d2 = self.noise.deviations(self.matched.amplitudes(z))
+        return bool(d2.size and d2.max() > self.least**2)
+
+
+def gentle_pushes(windows: Sequence[Array], rate_hz: float) -> list[list[GentlePush]]:
+    """Pushes in each window.
+
+    Parameters
+    ----------
+    windows : outputs of each, (n, 6), in standard deviations of noise; nan where one
+        is missing
+    rate_hz : samples in a second
+
+    """
+    left = [z.copy() for z in windows]
+    found: list[list[GentlePush]] = [[] for _ in windows]
+    lengths = [n for n in (round(s * rate_hz) for s in LENGTHS_S) if n > 1]
+    searches = [_Search(MatchedFilter.for_length(n), left) for n in lengths]
+    looks = sum(search.looks for search in searches)
+    if not looks:
+        return found
+    least2 = _chi2_exceeded_with(CHANCE / looks)
+    going = set(range(len(windows)))
+    while going:
+        best: dict[int, GentlePush] = {}
+        for search in searches:
+            for w, push in search.most_unusual(going, least2):
+                if w not in best or push.deviation > best[w].deviation:
+                    best[w] = push
+        for w, push in best.items():
+            found[w].append(push)
+            left[w][push.first : push.last] = np.nan
+        going = set(best)
+        for search in searches:
+            search.renew(left, going)
+    return found
+
+
+class _Search:
+    """Search for pushes of one length in all windows."""
+
+    def __init__(self, matched: MatchedFilter, windows: Sequence[Array]) -> None:
+        self._matched = matched
+        self._amplitudes = [matched.amplitudes(z) for z in windows]
+
+    @property
+    def looks(self) -> float:
+        """Independent amplitudes of both triads."""
+        each = len(TRIADS) / self._matched.amplitudes_per_dof
+        return each * sum(len(a) for a in self._amplitudes)
+
+    def renew(self, windows: Sequence[Array], changed: set[int]) -> None:
+        """Calculate the amplitudes anew in the windows that changed."""
+        for w in changed:
+            self._amplitudes[w] = self._matched.amplitudes(windows[w])
+
+    def most_unusual(
+        self, going: set[int], least2: float
+    ) -> Iterator[tuple[int, GentlePush]]:
+        """The most unusual push of each window that has one."""
+        noise = amplitude_noise(self._amplitudes, self._matched)
+        for w in sorted(going):
+            d2 = noise[w].deviations(self._amplitudes[w])
+            if not d2.size or d2.max() <= least2:
+                continue
+            i, triad = divmod(int(np.argmax(d2)), len(TRIADS))
+            yield w, self._push(w, i, triad, (float(d2.max()), least2), noise[w])
+
+    def _push(
+        self, w: int, i: int, triad: int, d2: tuple[float, float], noise: AmplitudeNoise
+    ) -> GentlePush:
+        amplitudes = np.nan_to_num(self._amplitudes[w][i])[TRIADS[triad]]
+        axis = int(np.argmax(np.abs(amplitudes)))
+        first, last = self._matched.stretch(i)
+        height = self._matched.sigma * float(amplitudes[axis])
+        return GentlePush(
+            first,
+            last,
+            TRIADS[triad].start + axis,
+            height,
+            float(np.sqrt(d2[0])),
+            float(np.sqrt(d2[1])),
+            self._matched,
+            noise.at(i),
+        )
+
+
+def _chi2_exceeded_with(chance: float) -> float:
+    """Chi2 of the axes of a triad that is exceeded with a probability.
+
+    >>> round(_chi2_exceeded_with(0.050106), 2)
+    7.81
+    """
+    low, high = 0.0, 1e3
+    while high - low > 1e-6:
+        middle = (low + high) / 2
+        more = chi2_tail(middle, AXES) > chance
+        low, high = (middle, high) if more else (low, middle)
+    return high

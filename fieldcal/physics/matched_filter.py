@@ -1,0 +1,180 @@
+"""Amplitude of a push of a given length at each instant, and how unusual it is.
+
+A push there and back is a half sine of length w. Over 2 w around it the output has a
+level and a slope besides. The least-squares amplitude of the half sine at the instant
+i, in its own standard deviations under white noise, is
+
+    a_i = sum_j c_j z_{i+j},     sum c_j^2 = 1                                      (1)
+
+where c is the half sine without its own level and slope. Where a base sways or a hand
+trembles, a scatters more than white noise makes it. Its variance at i has two
+witnesses: the same window away from i, s_i^2 with N_i degrees of freedom, and the other
+windows, s_0^2 with nu_0 (`window_variances`):
+
+    v_i = max(1, (N_i s_i^2 + nu_0 s_0^2) / (N_i + nu_0)),     nu = N_i + nu_0      (2)
+
+A push moves the k axes of a triad at the same time. With R the correlation of their
+amplitudes and b = a / sqrt v, q = b' R^-1 b is a ratio of variances, and
+
+    d_i^2 = (nu + k / 2 - 1) ln(1 + q / nu)                                         (3)
+
+has nearly the tail of a chi2 of k degrees of freedom; exactly for k = 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from fieldcal.core.samples import ACC, GYR, Array
+from fieldcal.physics.window_variances import variances_of_others
+
+TAPS = 12
+"""Block means in the length of a push, where it has more samples."""
+
+FURTHEST = 3.0
+"""Standard deviations beyond which an amplitude counts no more in a correlation."""
+
+POOLED = 4.0
+"""Weight of the mean correlation of all windows, in degrees of freedom."""
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedFilter:
+    """Filter for a push of one length.
+
+    Attributes
+    ----------
+    block : samples whose mean is one value of the filter's input
+    taps : (m,) c of (1)
+    sigma : standard deviation of the least-squares height of the half sine, in those of
+        a sample
+
+    """
+
+    block: int
+    taps: Array
+    sigma: float
+
+    @classmethod
+    def for_length(cls, samples: int) -> MatchedFilter:
+        """For a push of so many samples, at least 2."""
+        block = max(samples // TAPS, 1)
+        n = max(round(samples / block), 2)
+        beside = np.zeros(n // 2)
+        wave = np.sin(np.pi * (np.arange(n) + 0.5) / n)
+        shape = np.concatenate([beside, wave, beside])
+        course = np.column_stack([np.ones(len(shape)), np.arange(len(shape))])
+        shape -= course @ np.linalg.lstsq(course, shape, rcond=None)[0]
+        norm = float(np.linalg.norm(shape))
+        return cls(block, shape / norm, 1 / (norm * np.sqrt(block)))
+
+    def stretch(self, i: int) -> tuple[int, int]:
+        """First and one past the last sample of the `i`-th half sine."""
+        beside = len(self.taps) // 4
+        return (i + beside) * self.block, (i + len(self.taps) - beside) * self.block
+
+    @property
+    def amplitudes_per_dof(self) -> float:
+        """Amplitudes that make one degree of freedom of the mean of their squares."""
+        correlation = np.correlate(self.taps, self.taps, "full")
+        return float(np.square(correlation).sum())
+
+    def amplitudes(self, z: Array) -> Array:
+        """(1) of outputs (n, c) in standard deviations of white noise, (k, c).
+
+        The `i`-th is of the samples from `i * block` on; nan where one is missing.
+        """
+        blocks = len(z) // self.block
+        if blocks < len(self.taps):
+            return np.empty((0, z.shape[1]))
+        parts = z[: blocks * self.block].reshape(blocks, self.block, -1)
+        inputs = parts.sum(axis=1) / np.sqrt(self.block)
+        out: Array = sliding_window_view(inputs, len(self.taps), axis=0) @ self.taps
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class AmplitudeNoise:
+    """What the amplitudes in one window scatter by without a push.
+
+    Attributes
+    ----------
+    variance : (k, c) or (c,) v
+    dof : (k, c) or (c,) nu
+    correlation : (c, c) R
+
+    """
+
+    variance: Array
+    dof: Array
+    correlation: Array
+
+    def at(self, i: int) -> AmplitudeNoise:
+        """The noise at one instant."""
+        return AmplitudeNoise(self.variance[i], self.dof[i], self.correlation)
+
+    def deviations(self, amplitudes: Array) -> Array:
+        """d^2 of amplitudes (k, c) for each triad, (k, 2); one that is missing is 0."""
+        b = np.nan_to_num(amplitudes) / np.sqrt(self.variance)
+        out = np.zeros((len(b), 2))
+        for triad, axes in enumerate((ACC, GYR)):
+            inverse = np.linalg.inv(self.correlation[axes, axes])
+            q = np.einsum("ij,jk,ik->i", b[:, axes], inverse, b[:, axes])
+            nu = self.dof[..., axes].mean(axis=-1)
+            out[:, triad] = (nu + 0.5) * np.log1p(q / np.maximum(nu, 1e-9))  # (3)
+        return out
+
+
+def amplitude_noise(
+    windows: Sequence[Array], matched: MatchedFilter
+) -> list[AmplitudeNoise]:
+    """Noise of the amplitudes in each window; `windows` has those of each, (k, 6)."""
+    square = [np.nan_to_num(np.square(a)) for a in windows]
+    known = [np.isfinite(a).astype(float) for a in windows]
+    count = np.array([k.sum(axis=0) for k in known])
+    total = np.array([s.sum(axis=0) for s in square])
+    each, near = matched.amplitudes_per_dof, len(matched.taps)
+    common, nu = variances_of_others(total / np.maximum(count, 1.0), count / each)
+    noise = []
+    for w in range(len(windows)):
+        left = count[w] - _sums_around(known[w], near)
+        away = np.maximum(total[w] - _sums_around(square[w], near), 0.0)
+        dof = left / each + nu[w]
+        v = (away / each + nu[w] * common[w]) / np.maximum(dof, 1e-9)  # (2)
+        noise.append((np.maximum(v, 1.0), dof))
+    own = [_products(a / np.sqrt(v)) for a, (v, _) in zip(windows, noise, strict=True)]
+    pooled = sum(own) / max(sum(len(a) for a in windows), 1)
+    return [
+        AmplitudeNoise(v, dof, _correlation(one / each + POOLED * pooled))
+        for one, (v, dof) in zip(own, noise, strict=True)
+    ]
+
+
+def _sums_around(values: Array, near: int) -> Array:
+    """Sums (k, c) over the values that are less than `near` rows away."""
+    k = len(values)
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    ends = np.minimum(np.arange(k) + near, k)
+    starts = np.maximum(np.arange(k) - near + 1, 0)
+    sums: Array = total[ends] - total[starts]
+    return sums
+
+
+def _products(b: Array) -> Array:
+    """Sum of products of standardised amplitudes (k, c), (c, c)."""
+    clipped = np.clip(np.nan_to_num(b), -FURTHEST, FURTHEST)
+    out: Array = clipped.T @ clipped
+    return out
+
+
+def _correlation(products: Array) -> Array:
+    size = np.sqrt(np.diag(products))
+    dead = size == 0
+    size[dead] = 1.0
+    out: Array = products / np.outer(size, size)
+    out[dead, dead] = 1.0
+    return out

@@ -1,0 +1,126 @@
+"""The amplitude of a push against least squares, and its chances against draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from fieldcal.core.samples import Array
+from fieldcal.physics.matched_filter import (
+    AmplitudeNoise,
+    MatchedFilter,
+    amplitude_noise,
+)
+
+ONE = np.eye(6)
+
+
+def least_squares_height(z: Array, width: int) -> tuple[float, float]:
+    """Height of a half sine amid twice its length, with a line; and its sigma."""
+    x = np.arange(len(z)) - (len(z) - 1) / 2
+    inside = np.abs(x) < width / 2
+    wave = np.where(inside, np.cos(np.pi * x / width), 0.0)
+    design = np.column_stack([wave, np.ones(len(z)), x])
+    covariance = np.linalg.inv(design.T @ design)
+    return float((covariance @ design.T @ z)[0]), float(np.sqrt(covariance[0, 0]))
+
+
+@pytest.mark.parametrize("width", [4, 12, 120])
+def test_an_amplitude_is_that_of_least_squares_over_its_sigma(width: int) -> None:
+    rng = np.random.default_rng(width)
+    z = rng.standard_normal((2 * width, 6))
+    matched = MatchedFilter.for_length(width)
+    found = matched.amplitudes(z)
+    assert found.shape == (1, 6)
+    for c in range(6):
+        height, sigma = least_squares_height(z[:, c], width)
+        # blocks of a twelfth of the push take its shape to some percent
+        near = 1e-9 if width <= 12 else 0.25
+        assert found[0, c] == pytest.approx(height / sigma, abs=near)
+        assert matched.sigma == pytest.approx(sigma, rel=0.02)
+
+
+@pytest.mark.parametrize("width", [5, 40, 130])
+def test_the_stretch_of_an_amplitude_is_where_the_push_was(width: int) -> None:
+    z = np.zeros((20 * width, 6))
+    wave = np.sin(np.pi * (np.arange(width) + 0.5) / width)
+    z[7 * width : 8 * width, 4] = wave
+    matched = MatchedFilter.for_length(width)
+    amplitudes = matched.amplitudes(z)[:, 4]
+    first, last = matched.stretch(int(np.argmax(amplitudes)))
+    assert abs(first - 7 * width) <= max(matched.block, 1)
+    assert abs(last - first - width) <= matched.block
+    assert amplitudes.max() * matched.sigma == pytest.approx(1.0, rel=0.03)
+
+
+def test_white_noise_has_amplitudes_of_unit_variance_in_so_many_degrees() -> None:
+    rng, matched = np.random.default_rng(1), MatchedFilter.for_length(60)
+    means = []
+    for _ in range(400):
+        means += (
+            np.square(matched.amplitudes(rng.standard_normal((3000, 6))))
+            .mean(0)
+            .tolist()
+        )
+    assert np.mean(means) == pytest.approx(1.0, abs=0.01)
+    count = len(matched.amplitudes(np.zeros((3000, 6))))
+    dof = 2 / np.var(means)
+    assert dof == pytest.approx(count / matched.amplitudes_per_dof, rel=0.1)
+
+
+def test_what_is_missing_has_no_amplitude() -> None:
+    z = np.random.default_rng(2).standard_normal((200, 6))
+    z[100, 3] = np.nan
+    missing = np.isnan(MatchedFilter.for_length(10).amplitudes(z))
+    assert missing[:, 3].sum() == 20 and not missing[:, :3].any()
+
+
+@pytest.mark.parametrize("nu", [6.0, 12.0, 40.0])
+def test_a_deviation_has_the_tail_of_chi2(nu: float) -> None:
+    """Three normal values over the root of one variance of nu degrees of freedom."""
+    rng, n = np.random.default_rng(3), 400_000
+    amplitudes = np.zeros((n, 6))
+    amplitudes[:, :3] = rng.standard_normal((n, 3))
+    amplitudes[:, :3] /= np.sqrt(rng.chisquare(nu, n) / nu)[:, None]
+    d2 = AmplitudeNoise(np.ones(6), np.full(6, nu), ONE).deviations(amplitudes)[:, 0]
+    for chance in (0.1, 1e-2, 1e-3):
+        share = float((d2 > stats.chi2.ppf(1 - chance, 3)).mean())
+        assert share == pytest.approx(chance, rel=0.35)
+
+
+def test_axes_that_move_together_are_not_counted_thrice() -> None:
+    together = np.full((3, 3), 0.99) + 0.01 * np.eye(3)
+    correlation = np.eye(6)
+    correlation[:3, :3] = together
+    noise = AmplitudeNoise(np.ones(6), np.full(6, 1e9), correlation)
+    same, other = np.zeros(6), np.zeros(6)
+    same[:3], other[:3] = 4.0, (4.0, -4.0, 0.0)
+    d2 = noise.deviations(np.array([same, other]))[:, 0]
+    assert d2[0] == pytest.approx(same[:3] @ np.linalg.solve(together, same[:3]))
+    assert d2[0] < 17 < 1000 < d2[1]
+
+
+def drawn(nu: float, dof: int, windows: int, seed: int) -> list[Array]:
+    """White amplitudes of windows, whose variances are drawn about 4."""
+    rng = np.random.default_rng(seed)
+    variance = 4.0 * nu / rng.chisquare(nu, windows)
+    return [np.sqrt(v) * rng.standard_normal((dof, 6)) for v in variance]
+
+
+def test_windows_alike_share_one_variance() -> None:
+    white = MatchedFilter(1, np.array([1.0]), 1.0)
+    windows = [w * 2 for w in drawn(1e9, 12, 40, 5)]
+    for one in amplitude_noise(windows, white):
+        assert one.dof.min() > 60
+        assert one.variance == pytest.approx(16.0, rel=0.15)
+
+
+def test_the_variance_at_an_instant_knows_nothing_of_it() -> None:
+    white = MatchedFilter(1, np.array([1.0]), 1.0)
+    windows = drawn(1e9, 50, 1, 6)
+    windows[0][20, 2] = 1e3
+    (noise,) = amplitude_noise(windows, white)
+    rest = np.delete(windows[0][:, 2], 20)
+    assert noise.variance[20, 2] == pytest.approx(np.square(rest).mean())
+    assert noise.variance[21, 2] > 1e4

@@ -36,7 +36,7 @@ from fieldcal.fleet.workers import process_pool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
-from fieldcal.session.sample_files import to_batch
+from fieldcal.session.sample_files import to_record_batch
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile, Truth
 from fieldcal.sim_device.replay import simulate
@@ -66,7 +66,9 @@ def recorded(
     ]
     block = simulate(Profile(truth=truth, effects=effects), windows, seed=seed)
     folder.mkdir(parents=True)
-    pq.write_table(pa.Table.from_batches([to_batch(block)]), folder / "samples.parquet")
+    pq.write_table(
+        pa.Table.from_batches([to_record_batch(block)]), folder / "samples.parquet"
+    )
     positions = [
         {"alpha_deg": a, "beta_deg": b, "start_s": s, "end_s": s + SECONDS}
         for (a, b), s in zip(NINE, starts.tolist(), strict=True)

@@ -193,9 +193,9 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         clock = lambda: vehicle.now  # noqa: E731
         return ParameterLink("virtual", vehicle.connect, clock, vehicle.pause)
 
-    written = folder.write_whole
+    written = folder.write_atomically
 
-    def write_whole(path: Path, content: str | bytes) -> Path:
+    def write_atomically(path: Path, content: str | bytes) -> Path:
         vehicle.step()
         done = written(path, content)
         vehicle.step()
@@ -203,7 +203,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
 
     with (
         mock.patch("fieldcal.commands.write.opened", opened),
-        mock.patch.object(transaction, "write_whole", write_whole),
+        mock.patch.object(transaction, "write_atomically", write_atomically),
     ):
         yield
 

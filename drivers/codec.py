@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
 from fieldcal.drivers.driver import Health
@@ -187,7 +187,7 @@ def recognise(data: bytes, seconds: float) -> tuple[str, FormatMatch] | None:
 
 def formats() -> tuple[str, ...]:
     """Names of the wire formats there are."""
-    return names(protocols.__path__)
+    return module_names(protocols.__path__)
 
 
 def open_codec(name: str, options: Options) -> Codec:
@@ -207,4 +207,4 @@ def codec_class(name: str) -> type[Codec]:
     if name not in formats():
         known = ", ".join(formats())
         raise InputError(f"no wire format {name!r}: there are {known}")
-    return class_in(f"{protocols.__name__}.{name}", Codec)  # type: ignore[type-abstract]
+    return plugin_class(f"{protocols.__name__}.{name}", Codec)  # type: ignore[type-abstract]

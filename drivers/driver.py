@@ -19,7 +19,7 @@ from time import monotonic, time
 from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.core.plugins import class_in
+from fieldcal.core.plugins import plugin_class
 from fieldcal.core.samples import Block, Grain, concat
 
 LOOK = 0.5
@@ -247,7 +247,7 @@ def open_driver(url: str) -> Driver:
         raise InputError(
             f"no driver for {url!r}: write a scheme first, such as serial:/dev/ttyUSB0"
         )
-    imu = class_in(module, Driver)  # type: ignore[type-abstract]
+    imu = plugin_class(module, Driver)  # type: ignore[type-abstract]
     try:
         return imu(address)
     except imu.faults as fault:

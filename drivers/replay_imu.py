@@ -26,7 +26,7 @@ from fieldcal.drivers.options import Options, split
 from fieldcal.drivers.pace import Pace, speed
 from fieldcal.evaluation.observations import reported_grain
 from fieldcal.session.folder import Session
-from fieldcal.session.sample_files import ENDINGS, read
+from fieldcal.session.sample_files import ENDINGS, read_samples
 
 PIECE = 0.5
 """Longest stretch delivered at once, s of device time."""
@@ -157,7 +157,7 @@ def load(place: Path) -> Block:
     """
     if not place.is_file():
         raise InputError(f"{place}: there is no such session or log")
-    return read(place)[0]
+    return read_samples(place)[0]
 
 
 def decoded(place: Path, options: Options) -> tuple[Block, Grain]:

@@ -31,7 +31,7 @@ class Procedure(Protocol):
 @cache
 def names() -> tuple[str, ...]:
     """Every procedure there is, in alphabetical order."""
-    return plugins.names(__path__)
+    return plugins.module_names(__path__)
 
 
 def most(about: Description, name: str) -> int | None:

@@ -20,7 +20,12 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import CalibrationFailed, Skipped
-from fieldcal.core.positions import TWO, Position, forces, ladder
+from fieldcal.core.positions import (
+    TWO_POSITIONS,
+    Position,
+    ladder_settings,
+    specific_forces,
+)
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import angle_setting
 from fieldcal.model import thresholds
@@ -35,7 +40,7 @@ from fieldcal.procedures import most
 from fieldcal.session.description import Description
 from fieldcal.windows import Average
 
-POSITIONS: tuple[Position, ...] = TWO
+POSITIONS: tuple[Position, ...] = TWO_POSITIONS
 """What it begins with."""
 
 MOST = 9
@@ -100,7 +105,7 @@ def candidates(about: Description) -> list[Position]:
     elif {p.degrees for p in POSITIONS} <= {p.degrees for p in about.positions}:
         joints = LADDER
     else:
-        return [Position.deg(a, b) for a, b in ladder(about.positions)]
+        return [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
     return [Position.deg(a, b) for a, b in product(*joints)]
 
 
@@ -192,7 +197,10 @@ def _choice(
     if worth is None:
         raise CalibrationFailed("there is no position left to choose from")
     best = np.flatnonzero(worth.gain >= worth.gain.max() - ALIKE).tolist()
-    there, here = forces([places[i] for i in best], 1.0), forces([last], 1.0)
+    there, here = (
+        specific_forces([places[i] for i in best], 1.0),
+        specific_forces([last], 1.0),
+    )
     nearest: int = best[int(np.argmin(np.linalg.norm(there - here, axis=1)))]
     return nearest
 

@@ -6,9 +6,9 @@ than the equations one after the other. Source: Avrutov and Pozniak 2023, (15)-(
 
 from __future__ import annotations
 
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.procedures.positions import plan
 
 __all__ = ["POSITIONS", "plan"]
 
-POSITIONS: tuple[Position, ...] = FIVE
+POSITIONS: tuple[Position, ...] = FIVE_POSITIONS

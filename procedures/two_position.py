@@ -9,7 +9,7 @@ Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.positions import TWO, Position
+from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.evaluation.observations import angle_setting, build_observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
@@ -17,7 +17,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 
-POSITIONS: tuple[Position, ...] = TWO
+POSITIONS: tuple[Position, ...] = TWO_POSITIONS
 
 
 def plan(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.batch import SessionBatch
@@ -126,7 +126,7 @@ def carried_out(batch: SessionBatch, left: list[str], pool: WorkerPool) -> None:
             if speed:
                 bar.update(task, rate=f"{60 * speed:.3g} a minute")
             if one.error:
-                bar.console.print(one_line(one.error), soft_wrap=True)
+                bar.console.print(escape_line(one.error), soft_wrap=True)
 
 
 def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:

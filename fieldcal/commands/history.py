@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
@@ -98,7 +98,8 @@ def _devices(args: argparse.Namespace, history: History) -> int:
         )
     for serial, count, last in devices:
         sys.stdout.write(
-            f"{one_line(serial)}: {count} calibrations, the last {one_line(last)}\n"
+            f"{escape_line(serial)}: {count} calibrations,"
+            f" the last {escape_line(last)}\n"
         )
     return 0
 
@@ -189,7 +190,7 @@ def _show(
     bounds: GradeLimits,
 ) -> None:
     say = sys.stdout.write
-    say(f"{one_line(serial)}: {len(runs)} calibrations\n")
+    say(f"{escape_line(serial)}: {len(runs)} calibrations\n")
     for name, points in trends.items():
         unit = points[-1].unit if points else ""
         say(f"\n{name}, {unit}\n")

@@ -83,9 +83,9 @@ def run(args: argparse.Namespace) -> int:
             sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import render_noise_page
-        from fieldcal.session.folder import write_whole
+        from fieldcal.session.folder import write_atomically
 
-        written = write_whole(args.report, render_noise_page(found))
+        written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
 

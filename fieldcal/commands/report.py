@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
-        from fieldcal.session.folder import write_whole
+        from fieldcal.session.folder import write_atomically
 
         with Browser() as browser:
             browser.open(page)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
             ):
                 if wanted:
                     path = page.with_suffix(ending)
-                    write_whole(path, make())
+                    write_atomically(path, make())
                     sys.stdout.write(f"written: {path}\n")
     return 0
 
@@ -88,12 +88,12 @@ def write(
     from fieldcal.report import gather, render
     from fieldcal.report.gather import read_earlier_result
     from fieldcal.report.page import REPORT
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     before = [read_earlier_result(path) for path in earlier] or _before(
         session, history
     )
-    return write_whole(output or session / REPORT, render(gather(session, before)))
+    return write_atomically(output or session / REPORT, render(gather(session, before)))
 
 
 def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:

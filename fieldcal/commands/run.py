@@ -25,8 +25,8 @@ from fieldcal.commands.run_waits import (
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.factory import FACTORY
-from fieldcal.core.plugins import names
+from fieldcal.core.factory import FACTORY_KEYS
+from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -46,7 +46,7 @@ EXAMPLE = """\
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
-    *FACTORY,
+    *FACTORY_KEYS,
 )
 
 
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
     # their names alone: what they import is not loaded for a line of help
-    procedures = names([str(Path(__file__).parents[1] / "procedures")])
+    procedures = module_names([str(Path(__file__).parents[1] / "procedures")])
     add(
         "procedure",
         nargs=argparse.OPTIONAL,
@@ -311,7 +311,7 @@ def _take_besides(
     taken: dict[int, Any],
 ) -> None:
     """Note the positions that a remedy adds, and those that it takes once more."""
-    from fieldcal.session.marks import ADDED
+    from fieldcal.session.marks import POSITION_ADDED
 
     for number in again:
         recorder.mark("repeated", position=number)
@@ -319,4 +319,4 @@ def _take_besides(
     for number, position in enumerate(task.about.positions[known:], known):
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
-        recorder.mark(ADDED, position=number, name=position.name, **angles)
+        recorder.mark(POSITION_ADDED, position=number, name=position.name, **angles)

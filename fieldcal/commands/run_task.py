@@ -89,7 +89,7 @@ def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
     from fieldcal.run import plan_file
     from fieldcal.session import description
 
-    tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
     tables["position"] = plan_file.positions_of(args.procedure)
     tables["run"] = {"procedure": args.procedure, **_given(args)}
     return tables

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_factory
 from fieldcal.core.errors import InputError
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -165,7 +165,7 @@ def _over_time(session: Session) -> dict[str, Any]:
 
 def _left(args: argparse.Namespace) -> dict[str, float]:
     """What the options say that the factory left in the device."""
-    said = {name: getattr(args, name) for name in FACTORY}
+    said = {name: getattr(args, name) for name in FACTORY_KEYS}
     return {name: value for name, value in said.items() if value is not None}
 
 

@@ -166,7 +166,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
         If it has another ending.
 
     """
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     if path.suffix in (".param", ".parm"):
         lines = [f"{c.name},{c.new:.9g}" for c in wanted]
@@ -175,7 +175,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
         lines += [f"1\t1\t{c.name}\t{c.new:.9g}\t9" for c in wanted]
     else:
         raise InputError(f"{path}: end it in .param (Mission Planner) or .params (QGC)")
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     sys.stderr.write(f"written: {path}\n")
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 from fieldcal.calibration import COMPONENTS
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import names
+from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
@@ -87,7 +87,7 @@ class Exporter(Protocol):
 
 def formats() -> tuple[str, ...]:
     """Names of the formats there are."""
-    return names(__path__)
+    return module_names(__path__)
 
 
 def exporter(name: str) -> Exporter:

@@ -26,7 +26,7 @@ from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagona
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"
@@ -163,5 +163,5 @@ def write(source: ExportSource, path: Path) -> list[str]:
         *(f"# {sentence}" for sentence in found.says),
         *(f"{name},{value:.9g}" for name, value in found.values.items()),
     ]
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     return list(found.says)

@@ -24,7 +24,7 @@ from fieldcal.drivers.mavlink_installed import (
 )
 from fieldcal.drivers.mavlink_parameters import ParameterLink, same
 from fieldcal.drivers.mavlink_talk import listed
-from fieldcal.session.folder import DESCRIPTION, Session, write_whole
+from fieldcal.session.folder import DESCRIPTION, Session, write_atomically
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
@@ -158,13 +158,13 @@ def save(
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S-%f")
     path = folder / f"{SAVED}{stamp}.json"
     document = {"device": device, "old": dict(old), "new": dict(new)}
-    return write_whole(path, json.dumps(document, indent=2) + "\n")
+    return write_atomically(path, json.dumps(document, indent=2) + "\n")
 
 
 def note_done(path: Path, **what: Any) -> None:
     """Note in a saved set what became of it: ``done``, ``undone``."""
     document = load_json(path.read_text("utf-8"))
-    write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
+    write_atomically(path, json.dumps({**document, **what}, indent=2) + "\n")
 
 
 def save_removed(folder: Path) -> list[Path]:

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from fieldcal.core.errors import InputError
 from fieldcal.service.bounds import Bounds
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 State = Literal["waiting", "working", "done", "failed"]
 
@@ -122,7 +122,7 @@ class Jobs:
 
         """
         job = Job(part.name[1:-5], name, received_at, options=dict(options))
-        write_whole(part / JOB, json.dumps(asdict(job)))
+        write_atomically(part / JOB, json.dumps(asdict(job)))
         with self._lock:
             if not self.room():
                 raise InputError(
@@ -137,7 +137,7 @@ class Jobs:
         job = replace(job, **what)
         with self._lock:
             if self.folder(job.id).is_dir():
-                write_whole(self.folder(job.id) / JOB, json.dumps(asdict(job)))
+                write_atomically(self.folder(job.id) / JOB, json.dumps(asdict(job)))
         return job
 
     def removed(self, number: str) -> bool:

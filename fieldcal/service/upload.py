@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 from fieldcal.service.bounds import MIB, Bounds
 from fieldcal.session import description
 from fieldcal.session.folder import DESCRIPTION
@@ -54,8 +54,8 @@ def members(path: Path, bounds: Bounds) -> list[zipfile.ZipInfo]:
         kind = stat.S_IFMT(one.external_attr >> 16)
         if kind not in (0, stat.S_IFREG) or one.flag_bits & 1:
             raise InputError(
-                f"{one_line(one.filename)}: is a link, encrypted or no file: pack the"
-                " plain files of a session"
+                f"{escape_line(one.filename)}: is a link, encrypted or no file: pack"
+                " the plain files of a session"
             )
     return found
 
@@ -85,13 +85,13 @@ def session_members(
         plain = path.name and not {"\\", ":"} & {*one.filename}
         if path.parent != top or path.is_absolute() or ".." in path.parts or not plain:
             raise InputError(
-                f"{one_line(one.filename)}: does not lie beside {DESCRIPTION}: pack the"
-                " files of the session's folder and nothing else"
+                f"{escape_line(one.filename)}: does not lie beside {DESCRIPTION}: pack"
+                " the files of the session's folder and nothing else"
             )
         if path.name.startswith("."):
             continue  # of the system it was packed on
         if path.name in out:
-            raise InputError(f"{one_line(path.name)}: is in the archive twice")
+            raise InputError(f"{escape_line(path.name)}: is in the archive twice")
         out[path.name] = one
     return out
 
@@ -117,12 +117,12 @@ def unpack(
                         left -= len(piece)
                         if left < 0:
                             raise InputError(
-                                f"{one_line(name)}: is larger than the archive says"
+                                f"{escape_line(name)}: is larger than the archive says"
                             )
                         out.write(piece)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
         raise InputError(f"the archive is damaged: {error}; send it again") from error
-    about = description.read(folder / DESCRIPTION)
+    about = description.read_description(folder / DESCRIPTION)
     run = about.raw.get("run")
     if isinstance(run, Mapping) and "limits" in run:
         raise InputError(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fieldcal.core.errors import FieldcalError, InputError
-from fieldcal.core.shown import shown
+from fieldcal.core.escaping import escape_invisible
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.history.sessions import StoredSession
 from fieldcal.report import gather, render
@@ -21,7 +21,7 @@ from fieldcal.service.bounds import Bounds
 from fieldcal.service.jobs import JOB, RESULTS, SESSION, UPLOAD
 from fieldcal.service.records import record
 from fieldcal.service.upload import members, session_members, unpack
-from fieldcal.session.folder import RESULT, Session, write_whole
+from fieldcal.session.folder import RESULT, Session, write_atomically
 from fieldcal.session.integrity import DIAGNOSIS
 
 OPTIONS = {
@@ -113,8 +113,8 @@ class JobTask:
             [*call, *said], capture_output=True, check=False, cwd=sent.parent,
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
-        text = shown(done.stderr.decode("utf-8", "replace"))[-LOG:]
-        write_whole(sent.parent.parent / "import.log", text)
+        text = escape_invisible(done.stderr.decode("utf-8", "replace"))[-LOG:]
+        write_atomically(sent.parent.parent / "import.log", text)
         if done.returncode:
             shutil.rmtree(part, ignore_errors=True)
             last = text.strip().splitlines()[-1:] or ["import was killed"]
@@ -134,11 +134,11 @@ class JobTask:
         for name, content in ((RESULT, one.result), (DIAGNOSIS, one.diagnosis)):
             if content is not None:
                 shutil.copy(opened.write_json(name, content), part / name)
-        write_whole(part / REPORT, render(gather(session)))
+        write_atomically(part / REPORT, render(gather(session)))
         run = "run" in opened.about.raw
         held = opened.positions if run else ()
         junit.write(part / JUNIT, "session", held, list(opened.marks()), one.result)
-        write_whole(part / RECORD, json.dumps(record(one), indent=2) + "\n")
+        write_atomically(part / RECORD, json.dumps(record(one), indent=2) + "\n")
         part.rename(there)
 
 

@@ -22,7 +22,7 @@ from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
@@ -317,7 +317,7 @@ class _SessionFit:
 
     def _level_assumed_note(self) -> str:
         extra = ladder_remedy(self.observations, parameters("angle_offset"))
-        cure = f"; add {join(extra)} to find it" if extra else ""
+        cure = f"; add {join_words(extra)} to find it" if extra else ""
         return (
             "these positions do not show the tilt, so the base is taken as level" + cure
         )

@@ -62,7 +62,7 @@ WINDOWS = (0.0, 27.0), (33.0, 59.5)
 
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
 WHERE = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
-ABOUT = description.parse({"site": SITE, "position": WHERE})
+ABOUT = description.parse_description({"site": SITE, "position": WHERE})
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 

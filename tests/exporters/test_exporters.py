@@ -24,7 +24,7 @@ from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
 from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
-from fieldcal.session.schemas import schema
+from fieldcal.session.schemas import load_schema
 
 
 def samples(rng: np.random.Generator, n: int = 200) -> Block:
@@ -213,7 +213,7 @@ def test_json_follows_its_schema_and_corrects(
     made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     told = json.loads(written(made[0], "json", tmp_path).read_text())
-    jsonschema.validate(told, schema("export"))
+    jsonschema.validate(told, load_schema("export"))
     _, raw, true = made
     for name, u, f in (
         ("accelerometer", raw.acc, true.acc),

@@ -139,12 +139,12 @@ def bench(folder: Path) -> Session:
     import pyarrow as pa
     import pyarrow.parquet
 
-    from fieldcal.session.sample_files import to_batch
+    from fieldcal.session.sample_files import to_record_batch
 
     folder.mkdir()
     windows = [(0.0, 0.0, 5.0, 15.0), (np.pi / 4, np.radians(5.0), 25.0, 35.0)]
     block = simulate(Profile(), windows, seed=1)
-    table = pa.Table.from_batches([to_batch(block)])
+    table = pa.Table.from_batches([to_record_batch(block)])
     pyarrow.parquet.write_table(table, folder / "samples.parquet")
     lines_ = ['[device]\nserial = "A1"\n[site]\nlatitude_deg = 50.45\nheight_m = 170.0']
     for alpha, beta, start, end in windows:

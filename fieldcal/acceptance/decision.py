@@ -75,7 +75,7 @@ class Circumstances:
     Attributes
     ----------
     temperatures : mean of each window, deg C, nan where unknown
-    link : counts of `driver.Health`; empty where unknown
+    link : counts of `driver.LinkHealth`; empty where unknown
     verification : residual of a position that was not fitted; None without one
     family : earlier calibrations of the device at this temperature, oldest first; None
         without a history

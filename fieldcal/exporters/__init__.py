@@ -21,7 +21,7 @@ from fieldcal.core.plugins import module_names
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
     from fieldcal.core.samples import Array
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
     from fieldcal.session.folder import Session
 
 
@@ -42,7 +42,7 @@ class ExportSource:
     calibration: Calibration
     nominal: Nominal
     session: Session
-    installed: Installed | None = field(default=None)
+    installed: InstalledCalibration | None = field(default=None)
     instance: int = 0
 
     def linear(self, sensor: str) -> tuple[Array, Array]:

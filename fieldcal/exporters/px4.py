@@ -18,7 +18,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.drivers.mavlink_installed import PX4, Installed
+from fieldcal.drivers.mavlink_installed import PX4, InstalledCalibration
 from fieldcal.exporters import ExportSource
 from fieldcal.exporters.ardupilot import ArdupilotParameters, converted
 from fieldcal.session.folder import write_atomically
@@ -33,7 +33,7 @@ FLOAT = 9
 def parameters(
     calibration: Calibration,
     nominal: Nominal | None = None,
-    installed: Installed | None = None,
+    installed: InstalledCalibration | None = None,
     instance: int = 0,
 ) -> ArdupilotParameters:
     """Return the parameters that take this calibration out of what the sensor sends.

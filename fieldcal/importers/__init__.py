@@ -53,12 +53,12 @@ def open_recording(
         If it cannot be read, or nothing knows its format.
 
     """
-    if name in codec.formats():
+    if name in codec.wire_formats():
         more = f"&{wanted.options}" if wanted.options else ""
         wanted = replace(wanted, options=f"format={name}{more}")
         name = "wire"
     if name and name not in formats():
-        known = (*formats(), *codec.formats())
+        known = (*formats(), *codec.wire_formats())
         raise InputError(f"no format {name!r}: there are {', '.join(known)}")
     if (path / TIMES).is_file():
         path = path / TIMES

@@ -18,9 +18,13 @@ from processes import HANGS, TWO_POSITION, simulated, steady
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.drivers.mavlink_parameters import ParameterLink
-from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch
+from fieldcal.drivers.mavlink_watch import STABLE_ROUNDS, InstalledWatch
 from fieldcal.session.installed_calibration import (
     NO_CORRECTION,
     nominal_as_sent,
@@ -134,29 +138,29 @@ def test_a_parameter_that_does_not_change_by_itself_still_refuses(
     assert "INS_ACCOFFS_Y = 0.7 on the autopilot" in capsys.readouterr().err
 
 
-def told(installed: Installed, watch: InstalledWatch, offset: float) -> None:
+def told(installed: InstalledCalibration, watch: InstalledWatch, offset: float) -> None:
     """One whole round of answers."""
-    for some in names(ARDUPILOT, 0).values():
+    for some in parameter_names(ARDUPILOT, 0).values():
         for name in some:
             watch.hear(name, {"INS_GYROFFS_X": offset}.get(name, 1.0))
 
 
 def test_it_is_read_until_it_is_stable() -> None:
-    installed = Installed(ARDUPILOT, 0)
+    installed = InstalledCalibration(ARDUPILOT, 0)
     watch = InstalledWatch(installed)
     for offset, waits in ((0.0, True), (0.0, False)):
         told(installed, watch, offset)
-        assert watch.waits is waits
+        assert watch.is_reading is waits
     assert (watch.readings, watch.changes) == (1, 0)
-    watch.again(STABLE)
+    watch.start_over(STABLE_ROUNDS)
     for offset, waits in ((0.0, True), (0.1, True), (0.2, True), (0.2, False)):
         told(installed, watch, offset)
-        assert watch.waits is waits
+        assert watch.is_reading is waits
     assert watch.changes == 2
     assert installed.values["INS_GYROFFS_X"] == 0.2
     # an answer that nobody asked for, as when another program sets it
     watch.hear("INS_GYROFFS_X", 0.3)
-    assert watch.waits and "INS_GYROFFS_X" not in watch.open
+    assert watch.is_reading and "INS_GYROFFS_X" not in watch.unheard
 
 
 def test_samples_before_a_change_are_as_if_it_had_been_there() -> None:

@@ -21,7 +21,7 @@ from fieldcal.core.frames import direction_cosines
 from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.diagnosis import diagnose
-from fieldcal.drivers.driver import Driver, Health, open_driver
+from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
@@ -335,7 +335,7 @@ class Dead(Driver):
     """A device that says nothing."""
 
     def __init__(self, address: str = "") -> None:
-        self.name, self.health = "dead device", Health()
+        self.name, self.health = "dead device", LinkHealth()
 
     def receive(self, timeout: float) -> Block | None:
         return None
@@ -350,7 +350,7 @@ def test_a_wrong_format_is_said_at_once_with_the_one_that_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What comes instead is on the screen while the run still waits for samples."""
-    monkeypatch.setattr("fieldcal.drivers.driver.LOOK", 0.1)
+    monkeypatch.setattr("fieldcal.drivers.driver.SILENCE_INTERVAL", 0.1)
     lines = (b"%d,0.01,-9.81,0.02,0,0,0.00%d\n" % (10 * i, i % 3) for i in range(10**6))
     with talking(lambda i: next(lines)) as port:
         told: list[str] = []

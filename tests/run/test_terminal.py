@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from fieldcal.core.positions import FIVE_POSITIONS, Position
-from fieldcal.drivers.driver import ClockLine, Health
+from fieldcal.drivers.driver import ClockFit, LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
@@ -40,7 +40,7 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
         "reason": MISPLACED,
         "rate_hz": 100.0,
         "temperature": 24.5,
-        "health": Health(samples=1234),
+        "health": LinkHealth(samples=1234),
     }
     return OperatorView(**(known | changes))  # type: ignore[arg-type]
 
@@ -312,14 +312,14 @@ def test_the_scale_is_always_the_same() -> None:
 
 @pytest.mark.parametrize(("sigma", "shown"), [(0.3, "1"), (9.6, "10"), (43.0, "43")])
 def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
-    health = Health(samples=1234, clock=ClockLine(-20.2, sigma, 0.0, 1e-3))
+    health = LinkHealth(samples=1234, clock=ClockFit(-20.2, sigma, 0.0, 1e-3))
     text = link_state(view("averaging", health=health)).plain
     assert text.endswith(f"clock -20 ± {shown} ppm")
 
 
 def test_a_clock_of_which_nothing_is_known_is_not_shown() -> None:
     """After the computer was asleep."""
-    health = Health(samples=1234, clock=ClockLine(-93958.0, 20272.0, 0.0, 5.0))
+    health = LinkHealth(samples=1234, clock=ClockFit(-93958.0, 20272.0, 0.0, 5.0))
     assert "clock" not in link_state(view("averaging", health=health)).plain
 
 

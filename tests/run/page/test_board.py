@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.positions import FIVE_POSITIONS, Position
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.page.board import Board
@@ -30,7 +30,7 @@ def view(phase: Phase, hold: Hold = HOLD, **changes: object) -> OperatorView:
         "reason": WaitReason(WaitState.TURNING),
         "rate_hz": 100.0,
         "temperature": 24.5,
-        "health": Health(samples=1234),
+        "health": LinkHealth(samples=1234),
     }
     return OperatorView(phase, hold, **(known | changes))  # type: ignore[arg-type]
 

@@ -11,7 +11,7 @@ from browser import Screen
 from scipy.spatial.transform import Rotation
 
 from fieldcal.core.positions import FIVE_POSITIONS, Position
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.report.browser import find_browser
 from fieldcal.run.operator.protocol import OperatorView
@@ -88,7 +88,7 @@ def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
     there = PositionCheck(False, 12.0, 10.0, "", 2.0)
     server.board.view_changed(
         OperatorView("turning", hold, there, 0.4, 0.0, np.full(6, np.nan),
-                     WaitReason(WaitState.TURNING), 100.0, 24.5, Health(samples=9))
+                     WaitReason(WaitState.TURNING), 100.0, 24.5, LinkHealth(samples=9))
     )  # fmt: skip
     row = "document.querySelector('#joints tbody').rows[2]"
     page.until(f"{row}.hidden", False)

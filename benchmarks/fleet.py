@@ -95,8 +95,8 @@ def batch(place: Path, count: int) -> list[StoredSession]:
         pass
     wall = perf_counter() - begun
     seconds, peaks = np.loadtxt(place / "used", ndmin=2).T
-    rows = own.database.done(
-        lambda db: sessions.found(db, reduced=True, documents=True)
+    rows = own.database.run(
+        lambda db: sessions.find_sessions(db, reduced=True, documents=True)
     )
     solved = sum(one.good is True for one in rows)
     data = sum(len(r.reduced or b"") for r in rows) / count / 1024
@@ -141,7 +141,9 @@ def tilted(place: Path, count: int = 12) -> None:
     alone: Counter[str] = Counter()
     for _ in own.process(own.unprocessed(), process_pool(os.cpu_count() or 1)):
         pass
-    rows = database.done(lambda db: sessions.found(db, reduced=True, documents=True))
+    rows = database.run(
+        lambda db: sessions.find_sessions(db, reduced=True, documents=True)
+    )
     for one in rows:
         carried = (one.result or {}).get("not_carried", {})
         alone.update(carried.get("causes", {}))

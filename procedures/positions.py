@@ -1,7 +1,6 @@
-"""Any positions: all that they determine, estimated jointly.
+"""Positions of the user's choice: estimates jointly all parameters that they determine.
 
-For sets of positions of one's own. What they leave undetermined is named in the
-warnings.
+Parameters that they do not determine are named in the warnings.
 """
 
 from __future__ import annotations

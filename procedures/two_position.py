@@ -1,8 +1,8 @@
 """Two positions: bias and scale factor of the accelerometers, bias of the gyroscopes.
 
-Home, then both joints turned by small angles. The base must be level: what it is tilted
-by goes into the biases (one degree: 0.17 m/s^2), and two positions cannot see it. How
-level it is has to be said, and is part of every uncertainty.
+Home, then both joints turned by small angles. The base must be level: its tilt enters
+the biases (0.17 m/s^2 for one degree), and two positions cannot determine it. The level
+of the base must be stated, and is part of every uncertainty.
 Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
 """
 

@@ -25,7 +25,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
 from fieldcal.core.positions import specific_forces
 from fieldcal.evaluation.observations import angle_setting
-from fieldcal.history.family import expected
+from fieldcal.history.family import next_run_distribution
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
@@ -165,7 +165,7 @@ def _shown_by_family(
         repeat = limits.repeat(group_of(name))
         if not earlier or repeat is None:
             continue
-        usual = expected(
+        usual = next_run_distribution(
             np.array([c.value(name) for c in earlier]),
             np.array([c.uncertainty(name) for c in earlier]),
             repeat,

@@ -31,7 +31,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.observations import UsableWindows
-from fieldcal.history.store import History, HistoryRun, family
+from fieldcal.history.store import History, HistoryRun, family_runs
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
 from fieldcal.windows import Average, average
@@ -65,7 +65,7 @@ def assess(
         try:
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
-            usual = family(runs)
+            usual = family_runs(runs)
             earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))

@@ -58,13 +58,13 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.fleet.lot import analyse_lot
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
     if not 0 < args.fdr < 1:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
-    wanted = sessions.parsed(args.query)
-    database = Database(args.history or default_place())
-    some = database.done(lambda db: sessions.found(db, wanted))
+    wanted = sessions.parse_filters(args.query)
+    database = Database(args.history or default_location())
+    some = database.run(lambda db: sessions.find_sessions(db, wanted))
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fieldcal.history.place import Place
+    from fieldcal.history.location import StoreLocation
     from fieldcal.report import EarlierCalibration
 
 EXAMPLE = """\
@@ -68,7 +68,7 @@ def write(
     session: Path,
     output: Path | None = None,
     earlier: Sequence[Path] = (),
-    history: Place | None = None,
+    history: StoreLocation | None = None,
 ) -> Path:
     """Write the report of a session and return where it is.
 
@@ -96,9 +96,9 @@ def write(
     return write_atomically(output or session / REPORT, render(gather(session, before)))
 
 
-def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:
+def _before(folder: Path, history: StoreLocation | None) -> list[EarlierCalibration]:
     """What the history knows of the device, without this session."""
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
@@ -108,6 +108,6 @@ def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:
         return []
     return [
         EarlierCalibration(run.taken_at[:10], run.calibration)
-        for run in History(history or default_place()).runs(str(serial))
+        for run in History(history or default_location()).runs(str(serial))
         if Path(run.session).resolve() != folder.resolve()
     ]

@@ -196,12 +196,12 @@ def _shown_on(
         first_result,
         further_results,
     )
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
 
     file = args.limits or task.run.get("limits")
     bounds = limits.read(task.about.grade, Path(file) if file else None)
-    history = History(args.history or default_place())
+    history = History(args.history or default_location())
     try:
         found, truth, others = _record(args, task, folder, bounds, page)
         found = first_result(found, folder, bounds, history)
@@ -237,7 +237,7 @@ def _names_none(args: argparse.Namespace) -> bool:
     from fieldcal import procedures
 
     said = args.device or args.virtual is not None or args.resume
-    return not said and args.procedure in procedures.names()
+    return not said and args.procedure in procedures.procedure_names()
 
 
 def _record(
@@ -297,7 +297,7 @@ def _unsaid(task: PlanTask) -> list[str]:
     from fieldcal.acceptance.site import gravity_missing_warning
 
     unsaid = [unstated_angles_warning(task.about)]
-    if procedures.most(task.about, task.procedure) is None:
+    if procedures.max_positions(task.about, task.procedure) is None:
         unsaid.append(level_warning_before_run(task.about))
     unsaid.append(gravity_missing_warning(task.about))  # what matters most is said last
     return [sentence for sentence in unsaid if sentence]

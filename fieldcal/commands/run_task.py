@@ -43,9 +43,10 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
         return _resumed(args)
     if not args.procedure:
         raise InputError(
-            f"name a procedure ({', '.join(procedures.names())}) or a plan file"
+            f"name a procedure ({', '.join(procedures.procedure_names())})"
+            " or a plan file"
         )
-    if args.procedure in procedures.names():
+    if args.procedure in procedures.procedure_names():
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)

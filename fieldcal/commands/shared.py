@@ -66,10 +66,10 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
     folders = sessions_in(args.sessions)
-    database = Database(args.history or default_place())
+    database = Database(args.history or default_location())
     plain, diagnosed = (
         SessionBatch(folders, SessionTask(d), database) for d in (False, True)
     )

@@ -89,14 +89,14 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, with the procedures that there are."""
     found = schemas.load_schema("plan")
     procedure = found["properties"]["run"]["properties"]["procedure"]
-    procedure["enum"] = list(procedures.names())
-    procedure["description"] = f"write one of {', '.join(procedures.names())}"
+    procedure["enum"] = list(procedures.procedure_names())
+    procedure["description"] = f"write one of {', '.join(procedures.procedure_names())}"
     return found
 
 
 def positions_of(procedure: str) -> list[dict[str, Any]]:
     """Default tables ``[[position]]`` of a procedure."""
-    taken = procedures.procedure(procedure).POSITIONS
+    taken = procedures.load_procedure(procedure).POSITIONS
     return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
 
 
@@ -117,7 +117,7 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return load_toml(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        known = ", ".join(procedures.names())
+        known = ", ".join(procedures.procedure_names())
         raise InputError(
             f"{path}: is neither a procedure ({known}) nor a plan file"
         ) from error

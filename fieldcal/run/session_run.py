@@ -156,9 +156,9 @@ class SessionRun:
     def _plan(self) -> Plan[Calibration]:
         task, about = self._task, with_added_positions(self._task.about, self._added)
         name = task.procedure
-        if self._added and procedures.most(about, name) is None:
+        if self._added and procedures.max_positions(about, name) is None:
             name = "positions"  # whatever set it was, it has more now
-        plan = procedures.procedure(name).plan
+        plan = procedures.load_procedure(name).plan
         found = yield from plan(about, task.seconds, task.sigma)
         about = with_added_positions(task.about, self._added)
         verification = planned_verification(about)
@@ -171,7 +171,7 @@ class SessionRun:
     def _hold_verification(self, number: int, position: Position) -> Plan[None]:
         """Hold the verification position, which is not fitted."""
         task = self._task
-        if procedures.most(task.about, task.procedure) is not None:
+        if procedures.max_positions(task.about, task.procedure) is not None:
             yield from note("one more position, which is not fitted but predicted")
         try:
             yield from hold_until_still(number, position, task.seconds, task.sigma)
@@ -283,7 +283,9 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
             *_remedy_positions(remedy, session),
         ]
         run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
-    fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
+    fixed = (
+        procedures.max_positions(session.about, str(run.get("procedure", ""))) is None
+    )
     if fixed and len(tables.get("position", ())) > _planned_count(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again

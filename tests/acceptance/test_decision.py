@@ -23,7 +23,7 @@ from fieldcal.core.positions import (
     WIDE_POSITIONS,
     Position,
 )
-from fieldcal.history.family import expected
+from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average
@@ -207,7 +207,9 @@ def test_false_alarms_are_as_rare_as_said(runs: int) -> None:
     spread = rng.normal(0.0, usual, (tries, runs + 1))
     seen = spread + rng.normal(0.0, sigma, spread.shape)
     sigmas = np.full(runs, sigma)
-    chances = [expected(x[:-1], sigmas, usual).chance(x[-1], sigma) for x in seen]
+    chances = [
+        next_run_distribution(x[:-1], sigmas, usual).chance(x[-1], sigma) for x in seen
+    ]
     assert np.mean(np.array(chances) < 0.01) < 0.016
     assert np.mean(np.array(chances) < 0.5) > 0.3, "nor is everything expected"
 
@@ -215,7 +217,7 @@ def test_false_alarms_are_as_rare_as_said(runs: int) -> None:
 def test_many_runs_make_the_usual_spread_forgotten() -> None:
     rng = np.random.default_rng(3)
     values = rng.normal(1.0, 0.5, 200)
-    found = expected(values, np.full(200, 0.01), 0.001)
+    found = next_run_distribution(values, np.full(200, 0.01), 0.001)
     assert found.spread == pytest.approx(0.5, rel=0.15)
     assert found.mean == pytest.approx(values.mean(), abs=1e-3)
 

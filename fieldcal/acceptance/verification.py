@@ -156,8 +156,8 @@ def propose_verification(positions: Sequence[Position]) -> Position:
     neighbour. If there is none, it is half-way between the first and the last position;
     if all have a third angle, it is home.
 
-    >>> from fieldcal.core.positions import FIVE
-    >>> propose_verification(FIVE).name
+    >>> from fieldcal.core.positions import FIVE_POSITIONS
+    >>> propose_verification(FIVE_POSITIONS).name
     'α = 0°, β = 5°'
     """
     known = [p.degrees for p in positions if p.degrees is not None]

@@ -105,11 +105,11 @@ def solve(
     NotObservable
         If the positions determine no parameter.
 
-    >>> from fieldcal.core.positions import TWO
+    >>> from fieldcal.core.positions import TWO_POSITIONS
     >>> mean = np.zeros((2, 6))
     >>> mean[:, :3] = [[0.1, -9.81, 0.2], [-6.83672, -6.91037, 0.80457]]
     >>> cov = np.tile(np.diag([1e-6] * 3 + [1e-10] * 3), (2, 1, 1))
-    >>> result = solve(Observations(TWO, mean, cov, gravity=9.81))
+    >>> result = solve(Observations(TWO_POSITIONS, mean, cov, gravity=9.81))
     >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
     ('two_position', [1.0, 1.0, 1.0])
     """

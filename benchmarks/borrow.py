@@ -50,7 +50,7 @@ class Made:
 
     Attributes
     ----------
-    wide : in `WIDE`
+    wide : in `WIDE_POSITIONS`
     together : correlation of x with y, bias by bias and scale by scale
     rng : what draws
 

@@ -13,9 +13,9 @@ import numpy as np
 from benchmarks._load import load_at_1_khz
 from fieldcal.core.errors import DeviceError
 from fieldcal.core.samples import Block
-from fieldcal.drivers.can_frames import FRAME, Frames, Packed
-from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.can_map import SHIPPED, load, read_map
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import FRAME_DTYPE, FrameBuffer, Frames
+from fieldcal.drivers.can_map import VIRTUAL_DBC, load_database, read_map
 from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.options import Options
@@ -33,7 +33,7 @@ SPOILT = 999_999
 
 RUNS = 5
 GOAL = 10.0
-DATABASE = load(SHIPPED)
+DATABASE = load_database(VIRTUAL_DBC)
 
 
 def messages() -> list[can.Message]:
@@ -70,7 +70,7 @@ def numbers(rows: Frames) -> int:
 def samples(rows: Frames) -> int:
     """Decode, put together and time samples; the number of their frames."""
     options = Options("can", "dbc=virtual")
-    decoder = CanAssembler(read_map(options), CanHealth(), options)
+    decoder = CanAssembler(read_map(options), CanLinkHealth(), options)
     got = 0
     for i in range(0, len(rows), BATCH):
         some = rows[i : i + BATCH]
@@ -81,7 +81,7 @@ def samples(rows: Frames) -> int:
 
 def as_rows(received: list[can.Message]) -> Frames:
     """Pack what python-can hands over."""
-    packed = Packed(len(received))
+    packed = FrameBuffer(len(received))
     packed.fill(received, defaultdict(int))
     return packed.frames
 
@@ -128,7 +128,7 @@ def spoilt(lost: float, doubled: float, moved: float) -> tuple[int, int, int]:
     seq = np.arange(n, dtype=float)
     truth = Block.of(seq / 1000, six[:, :3], six[:, 3:], 0 * seq, seq)
     packed = frames(truth)
-    rows = np.zeros(len(packed), FRAME)
+    rows = np.zeros(len(packed), FRAME_DTYPE)
     rows["id"] = [frame.identifier for frame in packed]
     rows["size"] = 8
     joined = b"".join(frame.data for frame in packed)
@@ -137,7 +137,7 @@ def spoilt(lost: float, doubled: float, moved: float) -> tuple[int, int, int]:
     copies[rng.uniform(size=len(rows)) < doubled] = 2
     late = np.arange(len(rows)) + 1.5 * (rng.uniform(size=len(rows)) < moved)
     rows = np.repeat(rows, copies)[np.argsort(np.repeat(late, copies), kind="stable")]
-    options, health = Options("can", "dbc=virtual"), CanHealth()
+    options, health = Options("can", "dbc=virtual"), CanLinkHealth()
     decoder = CanAssembler(read_map(options), health, options)
     whole = wrong = 0
     for i in range(0, len(rows), BATCH):

@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks._load import load_at_1_khz
 from fieldcal.core.samples import Block
-from fieldcal.drivers.codec import formats
+from fieldcal.drivers.codec import wire_formats
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.serial_imu import SerialPort
 from fieldcal.sim_device.wire import open_wire
@@ -140,7 +140,7 @@ def main() -> None:
         f"{'format':10} {'bare':>9} {'driver':>9} {'':>10}  ratio  goal  processor"
         "  lost  at 1 kHz"
     )
-    for name in formats():
+    for name in wire_formats():
         data = stream(name)
         with sender(data) as (path, orders):
             url = f"serial:{path}?{TOLD.get(name, '')}format={name}"

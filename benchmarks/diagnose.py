@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from fieldcal.session.sample_files import to_batch
+from fieldcal.session.sample_files import to_record_batch
 from fieldcal.sim_device.profile import Profile, Sampling
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -66,7 +66,7 @@ def record(
         f"format = 1\n[sampling]\nrate_hz = {rate_hz}\n"
         f"[site]\nlatitude_deg = 50.45\nheight_m = 170.0\n{rows}"
     )
-    batch = to_batch(block)
+    batch = to_record_batch(block)
     with pa.ipc.new_stream(folder / "samples.arrows", batch.schema) as file:
         file.write_table(pa.Table.from_batches([batch]), max_chunksize=1000)
     return len(block)

@@ -36,7 +36,7 @@ from fieldcal.fleet.workers import process_pool
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
-from fieldcal.session.sample_files import to_batch
+from fieldcal.session.sample_files import to_record_batch
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import Profile, Truth
 from fieldcal.sim_device.replay import simulate
@@ -66,7 +66,9 @@ def recorded(
     ]
     block = simulate(Profile(truth=truth, effects=effects), windows, seed=seed)
     folder.mkdir(parents=True)
-    pq.write_table(pa.Table.from_batches([to_batch(block)]), folder / "samples.parquet")
+    pq.write_table(
+        pa.Table.from_batches([to_record_batch(block)]), folder / "samples.parquet"
+    )
     positions = [
         {"alpha_deg": a, "beta_deg": b, "start_s": s, "end_s": s + SECONDS}
         for (a, b), s in zip(NINE, starts.tolist(), strict=True)
@@ -93,8 +95,8 @@ def batch(place: Path, count: int) -> list[StoredSession]:
         pass
     wall = perf_counter() - begun
     seconds, peaks = np.loadtxt(place / "used", ndmin=2).T
-    rows = own.database.done(
-        lambda db: sessions.found(db, reduced=True, documents=True)
+    rows = own.database.run(
+        lambda db: sessions.find_sessions(db, reduced=True, documents=True)
     )
     solved = sum(one.good is True for one in rows)
     data = sum(len(r.reduced or b"") for r in rows) / count / 1024
@@ -139,7 +141,9 @@ def tilted(place: Path, count: int = 12) -> None:
     alone: Counter[str] = Counter()
     for _ in own.process(own.unprocessed(), process_pool(os.cpu_count() or 1)):
         pass
-    rows = database.done(lambda db: sessions.found(db, reduced=True, documents=True))
+    rows = database.run(
+        lambda db: sessions.find_sessions(db, reduced=True, documents=True)
+    )
     for one in rows:
         carried = (one.result or {}).get("not_carried", {})
         alone.update(carried.get("causes", {}))

@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.codecs import TOLD
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.codec import formats, open_codec
+from fieldcal.drivers.codec import open_codec, wire_formats
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device.wire import open_wire
 
@@ -67,7 +67,7 @@ def run(name: str, frames: int) -> tuple[int, int, int]:
         block = samples(rng, begin)
         now = keys(block.six)
         got = codec.feed(spoil(wire.encode(block), rng), begin / 1000)
-        kept = max(kept, codec.waiting)
+        kept = max(kept, codec.waiting_bytes)
         if got is not None:
             wrong += sum(not (some & now or some & before) for some in near(got.six))
         before = now
@@ -79,7 +79,7 @@ def main() -> None:
     print(
         f"{'format':10} {'frames':>8} {'whole':>8} {'wrong':>6} {'odds allow':>10} kept"
     )
-    for name in formats():
+    for name in wire_formats():
         whole, wrong, kept = run(name, FRAMES)
         allowed = (FRAMES - whole) * ODDS.get(name, 2**-8)
         print(f"{name:10} {FRAMES:8} {whole:8} {wrong:6} {allowed:10.1f} {kept} bytes")

@@ -9,7 +9,12 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import Tilt
-from fieldcal.core.positions import FIVE, TWO, WIDE, Position
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    TWO_POSITIONS,
+    WIDE_POSITIONS,
+    Position,
+)
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import parameters, predict_outputs
 from fieldcal.planning.planner import Ladder, best_positions
@@ -22,7 +27,7 @@ SIGMA = 1e-3
 SEEDS = 500
 TRUTH = np.array([0.12, -0.08, 0.21, 1.004, 0.997, 1.006])
 TILT = np.array([-1.0, -1.0])
-SIX = (*WIDE, Position.deg(0, 5))
+SIX = (*WIDE_POSITIONS, Position.deg(0, 5))
 NINE = (*SIX, Position.deg(-22, 0), Position.deg(22, 3), Position.deg(0, -5))
 
 
@@ -88,7 +93,8 @@ def against_the_bound() -> None:
     print(f"{SEEDS} seeds, {SIGMA:g} m/s^2 on each mean")
     print(f"{'positions, tilt':26} rmse/bound  pull std    95 % holds   chi2/dof")
     planned = best_positions(5, Ladder(), G)
-    cases = [("two", TWO, Model()), ("five", FIVE, OFFSET), ("wide", WIDE, OFFSET),
+    cases = [("two", TWO_POSITIONS, Model()), ("five", FIVE_POSITIONS, OFFSET),
+             ("wide", WIDE_POSITIONS, OFFSET),
              ("planned", planned, OFFSET),
              ("planned", planned, Model("base_tilt"))]  # fmt: skip
     for name, places, model in cases:
@@ -106,15 +112,15 @@ def against_the_bound() -> None:
 def against_the_print() -> None:
     """Print what the printed two-step solution leaves, beside ours."""
     model, seeds = OFFSET, SEEDS
-    y = noisy(model, FIVE, seeds)
-    each = axis_estimates(observed(FIVE, y[0]))
-    u, _ = model.means(FIVE)
+    y = noisy(model, FIVE_POSITIONS, seeds)
+    each = axis_estimates(observed(FIVE_POSITIONS, y[0]))
+    u, _ = model.means(FIVE_POSITIONS)
     # the axes' estimates are nearly linear in the means: one gain serves all seeds
     spread = np.std(np.einsum("qnc,snc->sq", each.gain, y - u), axis=0)
     printed = dict(zip(each.names, spread, strict=True))
-    _, error, _ = solve(model, FIVE, y)
+    _, error, _ = solve(model, FIVE_POSITIONS, y)
     ours = np.sqrt((error**2).mean(axis=0))
-    limit, wide = bound(model, FIVE), bound(model, WIDE)
+    limit, wide = bound(model, FIVE_POSITIONS), bound(model, WIDE_POSITIONS)
     print(f"\nthe paper's five positions, {SIGMA:g} m/s^2")
     print(f"{'':18}   print    ours   bound   bound of ±45°, ±5°")
     rows = [(f"bias {x} (mm/s^2)", f"{x}.bias", i, 1e3) for i, x in enumerate("xyz")]
@@ -151,7 +157,7 @@ def against_bumps() -> None:
 def speed() -> None:
     """Print the time of one fit."""
     print()
-    for name, places in (("five", FIVE), ("nine", NINE)):
+    for name, places in (("five", FIVE_POSITIONS), ("nine", NINE)):
         sessions = [observed(places, u) for u in noisy(OFFSET, places, 50)]
         began = perf_counter()
         for seen in sessions:

@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.commands.table import concealed_values
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.marks import read_marks
 
@@ -85,7 +85,7 @@ class Bench:
         lines += [f"seconds = {SECONDS}", 'procedure = "five_position"']
         lines += [f'device = "serial:{port}?format=witmotion"', "[run.mover]"]
         lines += ['kind = "virtual"', f'control = "{self.device.control}"']
-        for position in FIVE:
+        for position in FIVE_POSITIONS:
             alpha, beta = position.degrees or (0.0, 0.0)
             lines += ["[[position]]", f"alpha_deg = {alpha}", f"beta_deg = {beta}"]
         self.plan.write_text("\n".join(lines) + "\n")

@@ -16,7 +16,7 @@ from benchmarks._load import load_at_1_khz
 from benchmarks.fuzz import BATCH, FRAMES, spoil
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.mavlink_samples import KINDS, Decoder
+from fieldcal.drivers.mavlink_samples import MESSAGE_KINDS, MavlinkDecoder
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device.mavlink_packing import messages
 
@@ -56,7 +56,7 @@ def packets(name: str, count: int = SAMPLES) -> tuple[bytes, list[bytes]]:
     )
     out = dialect.MAVLink(None, 1, 1)
     packed = []
-    for message in messages(dialect, KINDS[name].identifier, sent):
+    for message in messages(dialect, MESSAGE_KINDS[name].identifier, sent):
         packed.append(message.pack(out))
         out.seq = (out.seq + 1) % 256
     # a program that is not known is asked for no parameters
@@ -114,18 +114,18 @@ def driven(port: int, name: str) -> float:
 def spoilt(name: str) -> tuple[int, int, int]:
     """Frames that came through a million, wrong samples, most bytes kept."""
     rng = np.random.default_rng(99)
-    unit = "mg" if KINDS[name].whole else "m/s^2"
+    unit = "mg" if MESSAGE_KINDS[name].whole else "m/s^2"
     query = f"message={name}&acc_unit={unit}"
     _, sent = stream(name, BATCH)
-    whole = Decoder(Options("fuzz", query)).feed(sent, 0.0)
+    whole = MavlinkDecoder(Options("fuzz", query)).feed(sent, 0.0)
     if whole is None:
         raise AssertionError
     known = {row.tobytes() for row in whole.six}
     through = wrong = kept = 0
     for _ in range(FRAMES // BATCH):
-        decoder = Decoder(Options("fuzz", query))
+        decoder = MavlinkDecoder(Options("fuzz", query))
         got = decoder.feed(spoil(sent, rng), 0.0)
-        kept = max(kept, decoder.waiting)
+        kept = max(kept, decoder.waiting_bytes)
         if got is not None:
             through += len(got)
             wrong += sum(row.tobytes() not in known for row in got.six)

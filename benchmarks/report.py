@@ -12,13 +12,13 @@ import pyarrow.parquet
 import tomlkit
 
 from fieldcal.cli import main as fieldcal
-from fieldcal.core.frames import force
-from fieldcal.core.positions import FIVE, WIDE
+from fieldcal.core.frames import specific_force_at_rest
+from fieldcal.core.positions import FIVE_POSITIONS, WIDE_POSITIONS
 from fieldcal.core.samples import Array, Block
 from fieldcal.report import gather, render
 from fieldcal.report.browser import Browser, find_browser
 from fieldcal.session.folder import Session
-from fieldcal.session.sample_files import to_batch
+from fieldcal.session.sample_files import to_record_batch
 
 RATE, SECONDS, TURN = 1000, 3600, 4.0
 GRAVITY = 9.81
@@ -26,7 +26,7 @@ GRAVITY = 9.81
 
 def _angles(t: Array) -> tuple[Array, Array, list[tuple[float, float]]]:
     """Turns through twenty positions, rad, and a window in each, s."""
-    positions = (*FIVE, *WIDE) * 2
+    positions = (*FIVE_POSITIONS, *WIDE_POSITIONS) * 2
     each = SECONDS / len(positions)
     alpha, beta = np.zeros_like(t), np.zeros_like(t)
     last, windows = (0.0, 0.0), []
@@ -45,17 +45,21 @@ def _session(folder: Path) -> None:
     rng = np.random.default_rng(0)
     t = np.arange(RATE * SECONDS) / RATE
     alpha, beta, windows = _angles(t)
-    acc = force(alpha, beta, GRAVITY) * [1.001, 0.998, 1.003] + [0.1, -0.05, 0.2]
+    acc = specific_force_at_rest(alpha, beta, GRAVITY) * [1.001, 0.998, 1.003] + [
+        0.1,
+        -0.05,
+        0.2,
+    ]
     acc += 0.02 * rng.standard_normal(acc.shape)
     gyr = np.column_stack([np.gradient(beta, t), 0 * t, np.gradient(alpha, t)])
     gyr += 1e-3 * rng.standard_normal(gyr.shape)
     warm = 25 + 5 * (1 - np.exp(-t / 900)) + 0.01 * rng.standard_normal(len(t))
-    table = pa.Table.from_batches([to_batch(Block.of(t, acc, gyr, warm))])
+    table = pa.Table.from_batches([to_record_batch(Block.of(t, acc, gyr, warm))])
     pyarrow.parquet.write_table(table, folder / "samples.parquet")
     rows = [
         dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
         | {"start_s": w[0], "end_s": w[1]}
-        for p, w in zip((*FIVE, *WIDE) * 2, windows, strict=True)
+        for p, w in zip((*FIVE_POSITIONS, *WIDE_POSITIONS) * 2, windows, strict=True)
     ]
     about = {"format": 1, "site": {"gravity": GRAVITY}, "position": rows}
     (folder / "session.toml").write_text(tomlkit.dumps(about))

@@ -24,8 +24,12 @@ import numpy as np
 from benchmarks._words import how_many
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main as fieldcal
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
-from fieldcal.drivers.mavlink_parameters import ParameterLink, same
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    InstalledCalibration,
+    parameter_names,
+)
+from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
 from fieldcal.install import transaction
 from fieldcal.session import folder
 from fieldcal.sim_device.autopilot import Autopilot
@@ -38,7 +42,7 @@ ATTEMPTS = 3
 """How often a command is given again whose questions were not answered."""
 
 BIAS, SCALE, GYR = (0.2, -0.3, 0.1), (1.006, 0.992, 1.008), (0.011, -0.02, 0.006)
-KNOWN = names(ARDUPILOT, 0)
+KNOWN = parameter_names(ARDUPILOT, 0)
 WRITTEN = [n for what in ("acc_offset", "acc_scale", "gyr_offset") for n in KNOWN[what]]
 OLD = {n: 1.02 if "SCAL" in n else 0.05 for n in WRITTEN}
 FAULTS = ("late", "twice", "wrong", "nan", "keeps_wrong", "restarts")
@@ -143,7 +147,7 @@ class Vehicle:
         """Which set it has: old, new, or neither; gyroscopes are its own to average."""
         kept = self.autopilot.parameters
         for said, some in (("old", OLD), ("new", new_set())):
-            if all(same(kept[n], v) for n, v in some.items() if "GYR" not in n):
+            if all(same_float32(kept[n], v) for n, v in some.items() if "GYR" not in n):
                 return said
         return "neither"
 
@@ -164,7 +168,7 @@ def new_set() -> dict[str, float]:
 def session(place: Path) -> Path:
     """A solved session that was recorded from such an autopilot."""
     place.mkdir()
-    there = Installed(ARDUPILOT, 0, {**OLD, "AHRS_ORIENTATION": 0.0})
+    there = InstalledCalibration(ARDUPILOT, 0, {**OLD, "AHRS_ORIENTATION": 0.0})
     groups = {"acc_bias": BIAS, "acc_scale": SCALE, "gyr_bias": GYR}
     units = {"acc_bias": "m/s^2", "acc_scale": "1", "gyr_bias": "rad/s"}
     found = Calibration(
@@ -193,9 +197,9 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         clock = lambda: vehicle.now  # noqa: E731
         return ParameterLink("virtual", vehicle.connect, clock, vehicle.pause)
 
-    written = folder.write_whole
+    written = folder.write_atomically
 
-    def write_whole(path: Path, content: str | bytes) -> Path:
+    def write_atomically(path: Path, content: str | bytes) -> Path:
         vehicle.step()
         done = written(path, content)
         vehicle.step()
@@ -203,7 +207,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
 
     with (
         mock.patch("fieldcal.commands.write.opened", opened),
-        mock.patch.object(transaction, "write_whole", write_whole),
+        mock.patch.object(transaction, "write_atomically", write_atomically),
     ):
         yield
 

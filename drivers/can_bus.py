@@ -1,8 +1,8 @@
-"""A CAN bus as a reader wants it: rows of frames, through python-can.
+"""A CAN bus as a source of rows of frames, through python-can.
 
-An adapter that speaks the Lawicel protocol (slcan) is set up by python-can, but read
-here: python-can reads its port byte by byte, 7000 frames/s, and takes lines that lost
-or gained a byte for frames.
+An adapter with the Lawicel protocol (slcan) is set up by python-can, but read here:
+python-can reads its port byte by byte, at most 7000 frames/s, and accepts lines that
+lost or gained a byte as frames.
 """
 
 from __future__ import annotations
@@ -17,52 +17,52 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.core.errors import DeviceError, InputError
-from fieldcal.drivers.can_frames import Packed
-from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.lawicel import Lawicel
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import FrameBuffer
+from fieldcal.drivers.lawicel import LawicelDecoder
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import LinkDown
-from fieldcal.drivers.serial_imu import SerialPort, reason
-from fieldcal.drivers.tcp import POLL
+from fieldcal.drivers.serial_imu import SerialPort, port_error_text
+from fieldcal.drivers.tcp import POLL_TIME
 
 if TYPE_CHECKING:
     from can import BusABC, Message
 
-MOST = 2000
-"""Frames taken at once."""
+MOST_FRAMES = 2000
+"""Most frames read at once."""
 
-LONGEST = 0.02
-"""Longest time that frames are collected before they are handed on, s."""
+LONGEST_COLLECTION = 0.02
+"""Longest time for which frames are collected before they are returned, s."""
 
-WAITING = 1 << 21
-"""Bytes that the kernel is asked to keep for us: its own 200 KB are 0.1 s of a bus."""
+RECEIVE_BUFFER = 1 << 21
+"""Size of the receive buffer, bytes; the default of 200 KB holds 0.1 s of a bus."""
 
 _NO_CAN = (
     "the kernel has no CAN; load it with `modprobe can_raw`, or use another interface,"
     " such as interface=slcan"
 )
 _NO_CHANNEL = "there is no such CAN channel; see `ip link`"
-KERNEL = {
+KERNEL_ERRORS = {
     errno.EAFNOSUPPORT: _NO_CAN,
     errno.EPROTONOSUPPORT: _NO_CAN,
     errno.ENODEV: _NO_CHANNEL,
     errno.ENXIO: _NO_CHANNEL,
     errno.ENETDOWN: "it is down; `ip link set` it up with its bitrate",
 }
-MULTICAST = {
+MULTICAST_ERRORS = {
     errno.ENODEV: "no network takes multicast; add a route for 224.0.0.0/4",
     errno.ENETUNREACH: "no network takes multicast; add a route for 224.0.0.0/4",
     errno.EADDRINUSE: "another program has the port; choose another with port=",
 }
 
-# what goes wrong is said in one sentence, not by python-can's log besides
+# errors are reported in one sentence; python-can's own log is suppressed
 logging.getLogger("can").addHandler(logging.NullHandler())
 
-Settings = Mapping[str, Any]
+BusSettings = Mapping[str, Any]
 
 
-def settings(options: Options) -> dict[str, Any]:
-    """Take what python-can is to be told from the options of an address."""
+def bus_settings(options: Options) -> dict[str, Any]:
+    """Settings for python-can from the options of an address."""
     told: dict[str, Any] = {"interface": options.text("interface", "socketcan")}
     for name, low, high in (
         ("bitrate", 1e3, 1e6),
@@ -80,7 +80,7 @@ def settings(options: Options) -> dict[str, Any]:
     return told
 
 
-def connect(channel: str, told: Settings) -> BusABC:
+def open_bus(channel: str, told: BusSettings) -> BusABC:
     """Open a bus.
 
     Raises
@@ -107,45 +107,45 @@ def connect(channel: str, told: Settings) -> BusABC:
         if isinstance(fault.__cause__, ValueError):
             raise InputError(f"can: cannot open {at}: {fault}") from fault
         raise DeviceError(
-            f"cannot open {at}: {open_error(interface, fault)}"
+            f"cannot open {at}: {bus_error_text(interface, fault)}"
         ) from fault
 
 
-ONLY: Mapping[Any, int] = defaultdict(int)
-"""A live bus is one of one, whatever its channel is called."""
+SINGLE_BUS: Mapping[Any, int] = defaultdict(int)
+"""Numbers of buses for a live bus: always 0, whatever its channel."""
 
 
 class BusSource:
-    """Frames of any bus that python-can knows."""
+    """Source of frames from any bus that python-can supports."""
 
     def __init__(self, bus: BusABC, interface: str) -> None:
         self._bus, self._interface = bus, interface
-        with suppress(NotImplementedError, OSError):  # a bus that is no socket
+        with suppress(NotImplementedError, OSError):  # a bus without a socket
             with socket.fromfd(bus.fileno(), socket.AF_INET, socket.SOCK_DGRAM) as own:
-                own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
+                own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
 
     def read(self) -> bytes:
-        """Return rows of the frames that came, waiting `POLL` seconds for the first.
+        """Return rows of the received frames; waits `POLL_TIME` s for the first.
 
         Raises
         ------
         OSError
-            If the bus is gone; LinkDown if it is there and down.
+            If the bus is gone; LinkDown if it exists and is down.
 
         """
         import can
 
-        packed = Packed(MOST)
+        packed = FrameBuffer(MOST_FRAMES)
         try:
-            packed.fill(self._waiting(), ONLY)
+            packed.fill(self._waiting(), SINGLE_BUS)
         except (can.CanError, OSError) as fault:
-            said = open_error(self._interface, fault)
-            down = LinkDown if said in KERNEL.values() else OSError
+            said = bus_error_text(self._interface, fault)
+            down = LinkDown if said in KERNEL_ERRORS.values() else OSError
             raise down(said) from fault
         return packed.frames.tobytes()
 
     def _waiting(self) -> Iterator[Message]:
-        message, until = self._bus.recv(POLL), monotonic() + LONGEST
+        message, until = self._bus.recv(POLL_TIME), monotonic() + LONGEST_COLLECTION
         while message is not None:
             yield message
             message = self._bus.recv(0) if monotonic() < until else None
@@ -156,24 +156,24 @@ class BusSource:
 
 
 class SlcanSource:
-    """Frames of an adapter on a serial port.
+    """Source of frames from a Lawicel adapter on a serial port.
 
     Parameters
     ----------
-    bus : python-can's, which has opened the port and the channel
-    health : where lines that are no frames are counted
+    bus : python-can's bus, which has opened the port and the channel
+    health : counts lines that are no frames
 
     """
 
-    def __init__(self, bus: Any, health: CanHealth) -> None:
+    def __init__(self, bus: Any, health: CanLinkHealth) -> None:
         self._bus, self._port = bus, bus.serialPortOrig
-        self._lines = Lawicel(health)
-        self._port.timeout = POLL
+        self._lines = LawicelDecoder(health)
+        self._port.timeout = POLL_TIME
         if "://" not in self._port.port:
             self._port.exclusive = True
 
     def read(self) -> bytes:
-        """Return rows of the frames that came, waiting `POLL` seconds for the first."""
+        """Return rows of the received frames; waits `POLL_TIME` s for the first."""
         return self._lines.feed(self._port.read(max(1, self._port.in_waiting)))
 
     def close(self) -> None:
@@ -187,22 +187,22 @@ class SlcanSource:
 
 
 def open_source(
-    channel: str, told: Settings, health: CanHealth
+    channel: str, told: BusSettings, health: CanLinkHealth
 ) -> BusSource | SlcanSource:
-    """Open a bus for a reader; errors as in `connect`."""
+    """Open a bus for a reader; errors as in `open_bus`."""
     if told["interface"] != "slcan":
-        return BusSource(connect(channel, told), told["interface"])
-    # first of all: what python-can sends would close another program's channel
+        return BusSource(open_bus(channel, told), told["interface"])
+    # checks that no other program has the port: python-can would close its channel
     SerialPort(channel, told.get("tty_baudrate", 115200)).close()
-    return SlcanSource(connect(channel, told), health)
+    return SlcanSource(open_bus(channel, told), health)
 
 
-def open_error(interface: str, fault: BaseException) -> str:
-    """Say why a bus did not open, and what to do."""
+def bus_error_text(interface: str, fault: BaseException) -> str:
+    """Text about why a bus did not open, and what to do."""
     if interface == "slcan":
-        return reason(fault)
+        return port_error_text(fault)
     below: BaseException | None = fault
     while below is not None and not isinstance(below, OSError):
         below = below.__cause__
-    known = MULTICAST if interface == "udp_multicast" else KERNEL
+    known = MULTICAST_ERRORS if interface == "udp_multicast" else KERNEL_ERRORS
     return known.get(below.errno or 0, str(fault)) if below else str(fault)

@@ -1,4 +1,4 @@
-"""Numbers out of the bits of many CAN frames at once, as a DBC file lays them out.
+"""Extracts numbers from many CAN frames at once, as a DBC file defines them.
 
 A field of L bits is cut out of a word w of eight bytes that hold it, taken in the byte
 order of the field, s bits above the lowest:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Words = NDArray[np.unsignedinteger[Any]]
 Bytes = NDArray[np.uint8]
 
-WORD = 8
+WORD_BYTES = 8
 
 LONGEST = 64
 """Bytes of the longest frame, and bits of the longest number."""
@@ -41,8 +41,8 @@ _FLOATS = {16: np.float16, 32: np.float32, 64: np.float64}
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
-    """Where a number is in a frame, and what it means.
+class SignalField:
+    """Position of a number in a frame, and its encoding.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Field:
     length : L, bits
     big_endian, signed, floating : how the bits are read
     scale, offset : a and b
-    special : raw numbers with a name of their own: no measurements
+    special : raw numbers with a name in the DBC; these are no measurements
     size : bytes that a frame needs to hold it
 
     """
@@ -70,8 +70,8 @@ class Field:
     size: int
 
     @classmethod
-    def of(cls, signal: Signal) -> Field:
-        """Lay out a signal of a database.
+    def of(cls, signal: Signal) -> SignalField:
+        """Field of a signal in a DBC database.
 
         Raises
         ------
@@ -79,19 +79,19 @@ class Field:
             If no frame can hold it, or its scale is no number.
 
         """
-        _check(signal)
+        _check_signal(signal)
         big, length = signal.byte_order == "big_endian", signal.length
-        begin = _begin(signal)
+        begin = _first_bit(signal)
         head, end = begin // 8, (begin + length + 7) // 8
         shift = 8 * end - begin - length if big else begin % 8
         first, ninth = head, -1
-        if end - head > WORD:
-            first, ninth = (head + 1, head) if big else (head, head + WORD)
+        if end - head > WORD_BYTES:
+            first, ninth = (head + 1, head) if big else (head, head + WORD_BYTES)
         elif big:
-            first = max(0, end - WORD)
-            shift += 8 * (first + WORD - end)
+            first = max(0, end - WORD_BYTES)
+            shift += 8 * (first + WORD_BYTES - end)
         else:
-            first = max(0, end - WORD)
+            first = max(0, end - WORD_BYTES)
             shift += 8 * (head - first)
         return cls(
             first,
@@ -108,13 +108,13 @@ class Field:
         )
 
     def bits(self, data: Bytes) -> Words:
-        """Cut the field out of frames (m, bytes); (m,), unsigned, (1)."""
-        window = np.ascontiguousarray(data[:, self.first : self.first + WORD])
+        """Bits of the field in frames (m, bytes); (m,), unsigned, (1)."""
+        window = np.ascontiguousarray(data[:, self.first : self.first + WORD_BYTES])
         order = ">u8" if self.big_endian else "<u8"
         word: Words = window.view(order)[:, 0] >> np.uint64(self.shift)
         if self.ninth >= 0:
             above = data[:, self.ninth].astype(np.uint64)
-            word = word | above << np.uint64(8 * WORD - self.shift)
+            word = word | above << np.uint64(8 * WORD_BYTES - self.shift)
         return word & np.uint64(2**self.length - 1)
 
     def raw(self, data: Bytes) -> NDArray[Any]:
@@ -130,7 +130,7 @@ class Field:
 
     def values(self, data: Bytes) -> Array:
         """Physical numbers of frames (m, bytes), nan for a special one; (m,), (3)."""
-        # of a damaged frame a float may be anything: that is no reason to complain
+        # a float of a damaged frame may have any value
         with np.errstate(over="ignore", invalid="ignore"):
             raw = self.raw(data)
             values: Array = raw * self.scale + self.offset  # (3)
@@ -140,20 +140,20 @@ class Field:
 
     @property
     def span(self) -> float:
-        """What a counter in it counts to before it wraps, raw."""
+        """Raw value at which a counter in this field wraps."""
         return float("inf") if self.floating else float(2**self.length)
 
 
-def _begin(signal: Signal) -> int:
-    """Bits of a frame before those of a signal, in its order of the bytes."""
+def _first_bit(signal: Signal) -> int:
+    """Number of bits before the signal, in its byte order."""
     if signal.byte_order == "big_endian":
         return 8 * (signal.start // 8) + 7 - signal.start % 8
     return signal.start
 
 
-def _check(signal: Signal) -> None:
-    """Refuse a signal that no frame has."""
-    end = _begin(signal) + signal.length
+def _check_signal(signal: Signal) -> None:
+    """Refuse a signal that no frame can contain."""
+    end = _first_bit(signal) + signal.length
     fits = 0 < signal.length <= LONGEST and end <= 8 * LONGEST
     if signal.is_float:
         fits = fits and signal.length in _FLOATS

@@ -1,6 +1,6 @@
-"""Frames of a CAN bus as rows of fixed size, so that many are looked at in one go.
+"""CAN frames as rows of fixed size, so that many are processed at once.
 
-A live bus, a log and a test all hand over the same rows: `pack` makes one, and
+Live buses and logs give the same rows. `frame_row` makes one, and
 ``np.frombuffer(data, FRAME)`` reads any number of them.
 """
 
@@ -14,94 +14,95 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-LONGEST = 64
+LONGEST_FRAME = 64
 """Bytes of the longest frame, CAN FD."""
 
-FRAME = np.dtype(
+FRAME_DTYPE = np.dtype(
     {
         "names": ["t", "id", "size", "bus", "data"],
-        "formats": ["<f8", "<u4", "u1", "<u2", ("u1", LONGEST)],
+        "formats": ["<f8", "<u4", "u1", "<u2", ("u1", LONGEST_FRAME)],
         "offsets": [0, 8, 12, 14, 16],
-        "itemsize": 16 + LONGEST,
+        "itemsize": 16 + LONGEST_FRAME,
     }
 )
 """Time stamp of the bus, s; identifier; bytes that came; number of the bus in a log of
 several; the bytes, then zeros."""
 
-EXTENDED = 1 << 31
+EXTENDED_FLAG = 1 << 31
 """Added to an identifier of 29 bits."""
 
-ERROR = 1 << 29
+ERROR_FLAG = 1 << 29
 """Identifier of an error frame."""
 
 Frames = NDArray[np.void]
 
-_ROW = struct.Struct(f"<dIBxH{LONGEST}s")
+_ROW = struct.Struct(f"<dIBxH{LONGEST_FRAME}s")
 
 
-def pack(t: float, identifier: int, extended: bool, data: bytes) -> bytes:
+def frame_row(t: float, identifier: int, extended: bool, data: bytes) -> bytes:
     """One frame as a row.
 
-    >>> np.frombuffer(pack(1.5, 0x123, False, bytes([7, 8])), FRAME)["size"].tolist()
+    >>> row = frame_row(1.5, 0x123, False, bytes([7, 8]))
+    >>> np.frombuffer(row, FRAME_DTYPE)["size"].tolist()
     [2]
     """
-    return _ROW.pack(t, identifier | EXTENDED * extended, len(data), 0, data)
+    return _ROW.pack(t, identifier | EXTENDED_FLAG * extended, len(data), 0, data)
 
 
-class Packed:
-    """Rows of ``can.Message``s, packed one behind the other.
+class FrameBuffer:
+    """Buffer of rows made from ``can.Message``s.
 
-    A remote frame, which has no data, gives none. Whether a frame was received or sent
-    is not looked at: for peers on one machine both are called sent.
+    A remote frame has no data and gives no row. Sent and received frames are treated
+    alike, since peers on one machine see both as sent.
 
     Parameters
     ----------
-    most : messages there is room for
+    most : capacity, messages
 
     Attributes
     ----------
-    seen : messages that were looked at
+    messages_seen : messages processed by the last `fill`
 
     """
 
     def __init__(self, most: int) -> None:
         self._most, self._room = most, bytearray(most * _ROW.size)
-        self._end = self.seen = 0
+        self._end = self.messages_seen = 0
 
     def fill(self, messages: Iterable[Any], buses: Mapping[Any, int]) -> None:
-        """Pack messages up to one that cannot be read; that raises what it likes.
+        """Convert messages up to one that cannot be read; its exception is passed on.
 
         Parameters
         ----------
-        messages : as python-can hands them over
-        buses : number of the bus, by what python-can calls its channel
+        messages : as python-can gives them
+        buses : number of the bus, by the channel in python-can
 
         """
-        # a log has a hundred million of them: a call or an object for each is felt
+        # a log may have 1e8 messages: no call or object for each
         put, room, size, end, remote = _ROW.pack_into, self._room, _ROW.size, 0, 0
         try:
             for message in islice(messages, self._most):
                 bus = buses[message.channel]
                 if message.is_error_frame:
-                    put(room, end, message.timestamp, ERROR, 0, bus, b"")
+                    put(room, end, message.timestamp, ERROR_FLAG, 0, bus, b"")
                 elif message.is_remote_frame:
                     remote += 1
                     continue
                 else:
                     identifier, data = message.arbitration_id, message.data
                     if message.is_extended_id:
-                        identifier |= EXTENDED
+                        identifier |= EXTENDED_FLAG
                     put(room, end, message.timestamp, identifier, len(data), bus, data)
                 end += size
         finally:
-            self._end, self.seen = end, end // size + remote
+            self._end, self.messages_seen = end, end // size + remote
 
     @property
     def full(self) -> bool:
-        """Whether there may be more messages than it had room for."""
-        return self.seen == self._most
+        """Whether the buffer is full, so that more messages may follow."""
+        return self.messages_seen == self._most
 
     @property
     def frames(self) -> Frames:
         """The rows."""
-        return np.frombuffer(self._room, FRAME, self._end // _ROW.size)
+        return np.frombuffer(self._room, FRAME_DTYPE, self._end // _ROW.size)

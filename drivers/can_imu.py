@@ -21,20 +21,20 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array, Block, Grain, concat
-from fieldcal.drivers.can_buses import Buses
-from fieldcal.drivers.can_frames import EXTENDED, FRAME, Frames
-from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.can_log import PlayedCanLog, is_log
-from fieldcal.drivers.driver import Driver, Health
-from fieldcal.drivers.options import split
-from fieldcal.drivers.pace import speed
+from fieldcal.drivers.can_bus_filter import BusFilter
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import EXTENDED_FLAG, FRAME_DTYPE, Frames
+from fieldcal.drivers.can_log import PlayedCanLog, is_can_log
+from fieldcal.drivers.clock_comparison import ClockComparison
+from fieldcal.drivers.driver import Driver, LinkHealth
+from fieldcal.drivers.options import split_address
+from fieldcal.drivers.playback import playback_speed
 from fieldcal.drivers.reader import Reader
-from fieldcal.drivers.skew import Skew
 
-ENOUGH = 10_000
+STRANGE_FRAMES_KEPT = 10_000
 """Strange frames after which no more identifiers are kept."""
 
-LIMIT = 1 << 24
+MOST_WAITING_BYTES = 1 << 24
 """Most bytes of rows that wait: a minute of a device at 1 kHz."""
 
 
@@ -43,34 +43,37 @@ class CanImu(Driver):
 
     def __init__(self, address: str) -> None:
         _check_installed()
-        from fieldcal.drivers.can_bus import open_source, settings
+        from fieldcal.drivers.can_bus import bus_settings, open_source
         from fieldcal.drivers.can_map import read_map
         from fieldcal.drivers.can_samples import CanAssembler
 
-        channel, options = split(address, "can")
+        channel, options = split_address(address, "can")
         if not channel:
             raise InputError("can: name a channel, such as can:can0, or a log")
         self.name = channel
-        self._counts = CanHealth()
-        self.health: Health = self._counts
+        self._counts = CanLinkHealth()
+        self.health: LinkHealth = self._counts
         self._parts = read_map(options)
         self._samples = CanAssembler(self._parts, self._counts, options)
         self._heard: set[int] = set()
-        self._skew = Skew(self._counts)
+        self._skew = ClockComparison(self._counts)
         self._log: PlayedCanLog | None = None
         self._reader: Reader | None = None
-        if is_log(channel):
+        if is_can_log(channel):
             wanted = (part.identifier for part in self._parts)
-            buses = Buses(channel, wanted, options.text("channel"))
-            pace = speed(options)
+            buses = BusFilter(channel, wanted, options.text("channel"))
+            pace = playback_speed(options)
             options.finish()
             self._log = PlayedCanLog(Path(channel), buses, pace)
             return
-        told = settings(options)
+        told = bus_settings(options)
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
         self._reader = Reader(
-            channel, lambda: open_source(channel, told, self._counts), patience, LIMIT
+            channel,
+            lambda: open_source(channel, told, self._counts),
+            patience,
+            MOST_WAITING_BYTES,
         )
 
     @property
@@ -95,7 +98,7 @@ class CanImu(Driver):
             for frames, arrived, broken in self._take(max(0.0, deadline - monotonic())):
                 if broken:
                     self._samples.reset()
-                if self._counts.strange < ENOUGH:
+                if self._counts.strange < STRANGE_FRAMES_KEPT:
                     self._heard.update(frames["id"].tolist())
                 blocks.append(self._samples.feed(frames, arrived))
             block = concat(block for block in blocks if block is not None)
@@ -123,8 +126,10 @@ class CanImu(Driver):
             cuts = [i for i, chunk in enumerate(chunks) if chunk.broken]
             for start, end in pairwise([0, *cuts, len(chunks)]):
                 some = chunks[start:end]
-                frames = np.frombuffer(b"".join(chunk.data for chunk in some), FRAME)
-                many = [len(chunk.data) // FRAME.itemsize for chunk in some]
+                frames = np.frombuffer(
+                    b"".join(chunk.data for chunk in some), FRAME_DTYPE
+                )
+                many = [len(chunk.data) // FRAME_DTYPE.itemsize for chunk in some]
                 arrived = np.repeat([chunk.t_host for chunk in some], many)
                 self.health.received += frames.nbytes
                 yield frames, arrived, bool(some) and some[0].broken
@@ -138,7 +143,7 @@ class CanImu(Driver):
                 raise
             raise DeviceError(f"{end} without a sample: {self._missing()}") from end
 
-    def _silence(self, timeout: float, before: Health) -> str:
+    def _silence(self, timeout: float, before: LinkHealth) -> str:
         health = self._counts
         if health.errors and not health.samples and not health.strange:
             cause = "only error frames come; check bit rate, wiring and termination"
@@ -163,8 +168,8 @@ class CanImu(Driver):
 
 
 def _hex(identifier: int) -> str:
-    wide = identifier & EXTENDED
-    return f"0x{identifier & ~EXTENDED:0{8 if wide else 3}X}"
+    wide = identifier & EXTENDED_FLAG
+    return f"0x{identifier & ~EXTENDED_FLAG:0{8 if wide else 3}X}"
 
 
 def _check_installed() -> None:

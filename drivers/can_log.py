@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError, RecordingEnded
-from fieldcal.drivers.can_buses import Buses
-from fieldcal.drivers.can_frames import FRAME, Frames, Packed
-from fieldcal.drivers.pace import Pace
+from fieldcal.drivers.can_bus_filter import BusFilter
+from fieldcal.drivers.can_frames import FRAME_DTYPE, FrameBuffer, Frames
+from fieldcal.drivers.playback import PlaybackClock
 
-READERS = {
+READER_NAMES = {
     ".log": "CanutilsLogReader",
     ".asc": "ASCReader",
     ".blf": "BLFReader",
@@ -26,17 +26,17 @@ READERS = {
 }
 """What python-can calls the readers of each kind of log."""
 
-PIECE = 4096
+FRAMES_AT_ONCE = 4096
 """Frames read at once."""
 
 
-def is_log(place: str) -> bool:
+def is_can_log(place: str) -> bool:
     """Tell whether an address names a log and no channel.
 
-    >>> is_log("drive.log.gz"), is_log("can0")
+    >>> is_can_log("drive.log.gz"), is_can_log("can0")
     (True, False)
     """
-    return place.lower().removesuffix(".gz").endswith(tuple(READERS))
+    return place.lower().removesuffix(".gz").endswith(tuple(READER_NAMES))
 
 
 class PlayedCanLog:
@@ -55,17 +55,17 @@ class PlayedCanLog:
 
     """
 
-    def __init__(self, path: Path, buses: Buses, speed: float) -> None:
+    def __init__(self, path: Path, buses: BusFilter, speed: float) -> None:
         if not path.is_file():
             raise InputError(f"{path}: there is no such log")
         self._path, self._buses = path, buses
         self._pieces = self._read()
-        self._piece: Frames = next(self._pieces, np.empty(0, FRAME))
+        self._piece: Frames = next(self._pieces, np.empty(0, FRAME_DTYPE))
         if not len(self._piece):
             buses.finish()
             raise InputError(f"{path}: holds no frame; check that it is a CAN log")
         self._first = self.now = float(self._piece["t"][0])
-        self._pace = Pace(self._first, speed)
+        self._pace = PlaybackClock(self._first, speed)
 
     def take(self, timeout: float) -> Frames:
         """Return the frames that are due, or none after `timeout` seconds.
@@ -96,7 +96,7 @@ class PlayedCanLog:
         try:
             messages, more = _messages(self._path), True
             while more:
-                packed = Packed(PIECE)
+                packed = FrameBuffer(FRAMES_AT_ONCE)
                 self._buses.fill(packed, messages)
                 more = packed.full
                 if len(frames := self._buses.frames(packed)):
@@ -124,5 +124,5 @@ def _messages(path: Path) -> Iterator[Any]:
     mode = "rb" if ending == ".blf" else "rt"
     file = gzip.open(path, mode) if packed else path.open(mode)
     # the reader closes it, but not if it refuses to read it
-    with file, getattr(can, READERS[ending])(file) as reader:
+    with file, getattr(can, READER_NAMES[ending])(file) as reader:
         yield from reader

@@ -14,20 +14,26 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers import protocols
-from fieldcal.drivers.driver import Health
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, resolve
+from fieldcal.drivers.driver import LinkHealth
+from fieldcal.drivers.framing import (
+    Bytes,
+    FrameCandidates,
+    FrameScan,
+    Index,
+    select_frames,
+)
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.drivers.timebase import Timebase
 
-ENOUGH = 3
+LEAST_SAMPLES = 3
 """Samples that make a format likely."""
 
-LIKELY = 0.25
+LEAST_SCORE = 0.25
 """Score from which a format is named."""
 
 
@@ -55,7 +61,7 @@ class Codec(ABC):
     longest: ClassVar[int]
 
     def __init__(self, options: Options) -> None:
-        self.health = Health()
+        self.health = LinkHealth()
         self._rest = b""
         self._arrivals: list[tuple[int, float]] = []
         self._begin = 0
@@ -87,23 +93,23 @@ class Codec(ABC):
         self._rest = b""
 
     @property
-    def waiting(self) -> int:
+    def waiting_bytes(self) -> int:
         """Bytes kept until more come."""
         return len(self._rest)
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
+    def match(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes that came in so many seconds are of this format."""
-        return cls.decoded(data)
+        return cls.match_decoded(data)
 
     @classmethod
-    def decoded(cls, data: bytes, query: str = "") -> FormatMatch | None:
+    def match_decoded(cls, data: bytes, query: str = "") -> FormatMatch | None:
         """Judge bytes by the share that decodes with these options."""
         declared = f"{query}&rate=1" if query else "rate=1"
         codec = cls(Options("probe", declared))
         codec.feed(data, 0.0)
         health = codec.health
-        if health.samples < ENOUGH:
+        if health.samples < LEAST_SAMPLES:
             return None
         share = 1 - health.skipped / health.received
         return FormatMatch(share, query, health.samples)
@@ -114,7 +120,7 @@ class Codec(ABC):
         return Grain()
 
     @abstractmethod
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Say where frames may begin."""
 
     @abstractmethod
@@ -157,7 +163,7 @@ class Codec(ABC):
             self._arrivals.append((end, chunk.t_host))
         self.health.received += len(data) - len(self._rest)
         array = np.frombuffer(data, np.uint8)
-        found = resolve(self.scan(array), len(data))
+        found = select_frames(self.scan(array), len(data))
         self.health.bad += found.bad
         self.health.skipped += found.skipped
         block = None
@@ -175,19 +181,19 @@ class Codec(ABC):
         return np.repeat(marks[:, 1], np.diff(done, prepend=0))
 
 
-def recognise(data: bytes, seconds: float) -> tuple[str, FormatMatch] | None:
+def recognise_format(data: bytes, seconds: float) -> tuple[str, FormatMatch] | None:
     """Name the format that bytes fit best, and how well; None if they fit none."""
     found = []
-    for name in formats():
-        like = codec_class(name).likeness(data, seconds)
-        if like is not None and like.score > LIKELY:
+    for name in wire_formats():
+        like = codec_class(name).match(data, seconds)
+        if like is not None and like.score > LEAST_SCORE:
             found.append((name, like))
     return max(found, key=lambda pair: pair[1].score, default=None)
 
 
-def formats() -> tuple[str, ...]:
+def wire_formats() -> tuple[str, ...]:
     """Names of the wire formats there are."""
-    return names(protocols.__path__)
+    return module_names(protocols.__path__)
 
 
 def open_codec(name: str, options: Options) -> Codec:
@@ -204,7 +210,7 @@ def open_codec(name: str, options: Options) -> Codec:
 
 def codec_class(name: str) -> type[Codec]:
     """Return the class of a wire format; InputError if there is none."""
-    if name not in formats():
-        known = ", ".join(formats())
+    if name not in wire_formats():
+        known = ", ".join(wire_formats())
         raise InputError(f"no wire format {name!r}: there are {known}")
-    return class_in(f"{protocols.__name__}.{name}", Codec)  # type: ignore[type-abstract]
+    return plugin_class(f"{protocols.__name__}.{name}", Codec)  # type: ignore[type-abstract]

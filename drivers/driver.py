@@ -6,7 +6,7 @@ options as a query: ``serial:/dev/ttyUSB0?baud=115200&format=witmotion``.
 
 `receive` returns what has come, or None when nothing whole came in time: None is no
 fault, an exception is. A link that stumbles and comes back resumes the stream; the gap
-shows in the times and in `Health`.
+shows in the times and in `LinkHealth`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from time import monotonic, time
 from typing import Any, ClassVar, NamedTuple, Self
 
 from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
-from fieldcal.core.plugins import class_in
+from fieldcal.core.plugins import plugin_class
 from fieldcal.core.samples import Block, Grain, concat
 
-LOOK = 0.5
+SILENCE_INTERVAL = 0.5
 """How often whoever reads is told of a silence, s of the host's clock."""
 
 _STARTED = time() - monotonic()
@@ -33,11 +33,11 @@ def host_clock() -> float:
     return _STARTED + monotonic()
 
 
-REAL_TIME = 1e5
+NOT_REAL_TIME_PPM = 1e5
 """Difference of the clocks beyond which a device does not run in real time, ppm."""
 
 
-class ClockLine(NamedTuple):
+class ClockFit(NamedTuple):
     """The device's clock against the host's: a straight line through the arrivals.
 
     Attributes
@@ -55,7 +55,7 @@ class ClockLine(NamedTuple):
     @property
     def real_time(self) -> bool:
         """Whether the device runs beside the host's clock, not many times as fast."""
-        return abs(self.fast_ppm) < REAL_TIME
+        return abs(self.fast_ppm) < NOT_REAL_TIME_PPM
 
 
 class ReadBack(NamedTuple):
@@ -75,7 +75,7 @@ class ReadBack(NamedTuple):
 
 
 @dataclass(slots=True)
-class Health:
+class LinkHealth:
     """How the link does, counted since it was opened.
 
     Attributes
@@ -102,20 +102,21 @@ class Health:
     repeated: int = 0
     restarts: int = 0
     clocked: bool = True
-    clock: ClockLine | None = None
+    clock: ClockFit | None = None
 
 
 class Driver(ABC):
     """A link to one IMU: a context manager that yields blocks.
 
     Exceptions listed in `faults` become `DeviceError` with `name` in the text.
-    `on_silence`, if set, is called every `LOOK` s in which `blocks` has no sample.
+    `on_silence`, if set, is called every `SILENCE_INTERVAL` s in which `blocks` has no
+    sample.
     """
 
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
     name: str
-    health: Health
+    health: LinkHealth
     on_silence: Callable[[], None] | None = None
 
     @abstractmethod
@@ -173,7 +174,9 @@ class Driver(ABC):
         deadline, before = monotonic() + timeout, replace(self.health)
         while True:
             left = max(0.0, deadline - monotonic())
-            block = self._receive(min(left, LOOK) if self.on_silence else left)
+            block = self._receive(
+                min(left, SILENCE_INTERVAL) if self.on_silence else left
+            )
             if block is not None and len(block):
                 before = replace(self.health)
                 yield block
@@ -187,7 +190,7 @@ class Driver(ABC):
             elif monotonic() >= deadline:
                 raise DeviceSilent(self._silence(timeout, before))
 
-    def why_silent(self, before: Health) -> str:
+    def why_silent(self, before: LinkHealth) -> str:
         """Why no sample came since the link did like `before`, and what to do."""
         now = self.health
         if now.received == before.received:
@@ -210,7 +213,7 @@ class Driver(ABC):
             taken.append(block)
         return concat(taken)
 
-    def _silence(self, timeout: float, before: Health) -> str:
+    def _silence(self, timeout: float, before: LinkHealth) -> str:
         sent = "went silent" if self.health.samples else "has sent no sample"
         return f"{self.name} {sent} for {timeout:g} s: {self.why_silent(before)}"
 
@@ -247,7 +250,7 @@ def open_driver(url: str) -> Driver:
         raise InputError(
             f"no driver for {url!r}: write a scheme first, such as serial:/dev/ttyUSB0"
         )
-    imu = class_in(module, Driver)  # type: ignore[type-abstract]
+    imu = plugin_class(module, Driver)  # type: ignore[type-abstract]
     try:
         return imu(address)
     except imu.faults as fault:

@@ -23,7 +23,7 @@ Index = NDArray[np.integer[Any]]
 Mask = NDArray[np.bool_]
 
 
-class Candidates(NamedTuple):
+class FrameCandidates(NamedTuple):
     """Where frames may begin, in order; `good` holds for an open one as well.
 
     Attributes
@@ -50,7 +50,7 @@ class FrameScan(NamedTuple):
     skipped: int
 
 
-def disjoint(starts: Index, ends: Index) -> Mask:
+def keep_disjoint(starts: Index, ends: Index) -> Mask:
     """Keep the first of those that overlap, from left to right, (m,)."""
     keep = np.ones(len(starts), dtype=bool)
     clashes = np.flatnonzero(starts[1:] < ends[:-1]) + 1
@@ -65,17 +65,17 @@ def disjoint(starts: Index, ends: Index) -> Mask:
     return keep
 
 
-def resolve(candidates: Candidates, size: int) -> FrameScan:
+def select_frames(candidates: FrameCandidates, size: int) -> FrameScan:
     """Take the frames in order out of `size` bytes.
 
     >>> starts = np.array([0, 3, 11])
     >>> good = np.array([True, True, True])
-    >>> resolve(Candidates(starts, starts + 11, good, 16), 16)[:3]
+    >>> select_frames(FrameCandidates(starts, starts + 11, good, 16), 16)[:3]
     (array([0]), array([11]), 11)
     """
     starts, ends, good, undecided = candidates
     first, last = starts[good], ends[good]
-    kept = disjoint(first, last)
+    kept = keep_disjoint(first, last)
     first, last = first[kept], last[kept]
     rest = min(size, max(undecided, int(last[-1]) if len(last) else 0))
     if len(last) and last[-1] > size:
@@ -96,7 +96,7 @@ def find_headed_frames(
     longest: int,
     size: Callable[[Bytes, Index], Index],
     check: Callable[[Bytes, Index, Index], Mask],
-) -> Candidates:
+) -> FrameCandidates:
     """Look for frames that begin with two bytes and say how long they are.
 
     Parameters
@@ -121,10 +121,10 @@ def find_headed_frames(
     whole = np.flatnonzero(ends <= len(data))
     good[whole] = check(data, starts[whole], ends[whole])
     half = len(data) > 0 and int(data[-1]) == sync[0]
-    return Candidates(starts, ends, good, len(data) - half)
+    return FrameCandidates(starts, ends, good, len(data) - half)
 
 
-def rows(data: Bytes, starts: Index, size: int) -> Bytes:
+def byte_rows(data: Bytes, starts: Index, size: int) -> Bytes:
     """Return the `size` bytes from each start, (m, size)."""
     if len(starts) > 1 and starts[-1] - starts[0] == size * (len(starts) - 1):
         if np.all(np.diff(starts) == size):

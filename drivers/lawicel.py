@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from time import time
 
-from fieldcal.drivers.can_frames import pack
-from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import frame_row
 
 LONGEST = 1 + 8 + 1 + 128 + 4
 """Characters of the longest line."""
@@ -24,10 +24,10 @@ _DIGITS = {"t": 3, "T": 8, "d": 3, "D": 8, "b": 3, "B": 8}
 _ANSWERS = ("z", "Z", "V", "N", "F", "r", "R")
 
 
-class Lawicel:
+class LawicelDecoder:
     """A decoder with a memory for the line that is not whole yet."""
 
-    def __init__(self, health: CanHealth) -> None:
+    def __init__(self, health: CanLinkHealth) -> None:
         self._health = health
         self._rest = b""
 
@@ -54,7 +54,7 @@ class Lawicel:
             size = _SIZES[code]
             if len(body) not in (size, size + 2) or " " in text:
                 raise ValueError
-            return pack(now, int(text[1 : head - 1], 16), head > 5, body[:size])
+            return frame_row(now, int(text[1 : head - 1], 16), head > 5, body[:size])
         except (KeyError, ValueError, IndexError):
             self._health.bad += 1
             return b""

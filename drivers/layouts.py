@@ -1,8 +1,7 @@
-"""Take fields out of many frames at once, where most frames look alike.
+"""Extracts fields from many frames at once, where most frames have the same layout.
 
-A device that sends one kind of message sends the same fields at the same places again
-and again. So the fields of one frame are looked up byte by byte, and taken from all the
-frames whose layout is the same.
+A device mostly sends messages with the same fields at the same places. So the layout of
+one frame is read byte by byte, and applied to all frames that have the same layout.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.framing import Bytes, FrameScan, Index, as_doubles, rows
+from fieldcal.drivers.framing import Bytes, FrameScan, Index, as_doubles, byte_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +23,7 @@ class Layout:
     Attributes
     ----------
     fields : by key, first byte and length in the frame
-    marks : the bytes that say so: the same in every frame of this layout
+    marks : numbers of the bytes that determine the layout; equal in all its frames
 
     """
 
@@ -33,12 +32,12 @@ class Layout:
 
 
 @dataclass(frozen=True, slots=True)
-class AlikeFields:
+class SameLayoutFrames:
     """Frames of one layout.
 
     Attributes
     ----------
-    which : (m,) their numbers among all the frames
+    which : (m,) their indices among all frames
     frames : (m, bytes)
     fields : by key, first byte and length
 
@@ -63,7 +62,7 @@ class AlikeFields:
 
 
 class RawSamples(NamedTuple):
-    """Samples as frames carry them, without a common time.
+    """Samples as decoded from frames, before they get their time.
 
     Attributes
     ----------
@@ -82,8 +81,8 @@ class RawSamples(NamedTuple):
     seq: Array
 
 
-def in_order(parts: Iterable[RawSamples]) -> RawSamples | None:
-    """Join samples of several layouts in the order of their frames."""
+def join_in_frame_order(parts: Iterable[RawSamples]) -> RawSamples | None:
+    """Join samples of several layouts, sorted by the index of their frames."""
     some = list(parts)
     if not some:
         return None
@@ -94,28 +93,30 @@ def in_order(parts: Iterable[RawSamples]) -> RawSamples | None:
     return RawSamples(*(column[order] for column in joined))
 
 
-Walk = Callable[[bytes], Layout | None]
+LayoutReader = Callable[[bytes], Layout | None]
 
 
-def sort_by_layout(data: Bytes, found: FrameScan, walk: Walk) -> Iterator[AlikeFields]:
-    """Sort frames by layout; those that `walk` knows no layout for are left out."""
+def sort_by_layout(
+    data: Bytes, found: FrameScan, read_layout: LayoutReader
+) -> Iterator[SameLayoutFrames]:
+    """Sort frames by layout; frames without a layout are left out."""
     left = np.arange(len(found.starts))
     lengths = found.ends - found.starts
     while len(left):
         first = left[0]
         size = int(lengths[first])
-        layout = walk(data[found.starts[first] : found.ends[first]].tobytes())
+        layout = read_layout(data[found.starts[first] : found.ends[first]].tobytes())
         if layout is None:
             left = left[1:]
             continue
         candidates = lengths[left] == size
         same = left[candidates]
-        frames = rows(data, found.starts[same], size)
+        frames = byte_rows(data, found.starts[same], size)
         match = np.ones(len(same), dtype=bool)
         for mark in layout.marks:
             match &= frames[:, mark] == frames[0, mark]
         if not match.all():
             same, frames = same[match], frames[match]
             candidates[candidates] = match
-        yield AlikeFields(same, frames, layout.fields)
+        yield SameLayoutFrames(same, frames, layout.fields)
         left = left[~candidates]

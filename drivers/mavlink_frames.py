@@ -15,17 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
+from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index, Mask
 
-FIRST, SECOND = 0xFE, 0xFD
+VERSION_1, VERSION_2 = 0xFE, 0xFD
 """First bytes of packets of version 1 and 2."""
 
-HEADS = {FIRST: 6, SECOND: 10}
-SIGNATURE = 13
-LONGEST = 10 + 255 + 2 + SIGNATURE
+HEADER_BYTES = {VERSION_1: 6, VERSION_2: 10}
+SIGNATURE_BYTES = 13
+LONGEST_PACKET = 10 + 255 + 2 + SIGNATURE_BYTES
 
 
-class Packets(NamedTuple):
+class PacketHeaders(NamedTuple):
     """Whole packets: where each is, what it is, and who sent it, all (m,)."""
 
     starts: Index
@@ -36,12 +36,12 @@ class Packets(NamedTuple):
     systems: Index
     components: Index
 
-    def take(self, which: Index) -> Packets:
+    def take(self, which: Index) -> PacketHeaders:
         """Return some of them."""
-        return Packets(*(column[which] for column in self))
+        return PacketHeaders(*(column[which] for column in self))
 
 
-def candidates(data: Bytes, extras: Index) -> Candidates:
+def packet_candidates(data: Bytes, extras: Index) -> FrameCandidates:
     """Say where packets may begin, and which of them pass their check.
 
     Parameters
@@ -50,20 +50,20 @@ def candidates(data: Bytes, extras: Index) -> Candidates:
     extras : by number of the message, the byte of its definition; -1 if not known
 
     """
-    starts = np.flatnonzero((data == FIRST) | (data == SECOND))
-    padded = np.concatenate([data, np.zeros(HEADS[SECOND], np.uint8)])
-    second = padded[starts] == SECOND
-    heads = np.where(second, HEADS[SECOND], HEADS[FIRST])
+    starts = np.flatnonzero((data == VERSION_1) | (data == VERSION_2))
+    padded = np.concatenate([data, np.zeros(HEADER_BYTES[VERSION_2], np.uint8)])
+    second = padded[starts] == VERSION_2
+    heads = np.where(second, HEADER_BYTES[VERSION_2], HEADER_BYTES[VERSION_1])
     flags = np.where(second, padded[starts + 2], 0)
-    ends = starts + heads + padded[starts + 1] + 2 + SIGNATURE * (flags & 1)
+    ends = starts + heads + padded[starts + 1] + 2 + SIGNATURE_BYTES * (flags & 1)
     cut = starts + heads > len(data)
     ends[cut] = len(data) + 1
     extra = extras[np.minimum(_identifiers(padded, starts, second), len(extras) - 1)]
     possible = cut | ((flags < 2) & (extra >= 0))
     starts, ends, extra = starts[possible], ends[possible], extra[possible]
-    ends_of_check = ends - SIGNATURE * (flags[possible] & 1)
-    good = _checked(data, starts, ends, ends_of_check, extra)
-    return Candidates(starts, ends, good, len(data))
+    ends_of_check = ends - SIGNATURE_BYTES * (flags[possible] & 1)
+    good = _pass_check(data, starts, ends, ends_of_check, extra)
+    return FrameCandidates(starts, ends, good, len(data))
 
 
 def _identifiers(padded: Bytes, starts: Index, second: Index) -> Index:
@@ -72,7 +72,7 @@ def _identifiers(padded: Bytes, starts: Index, second: Index) -> Index:
     return np.where(second, wide, padded[starts + 5])
 
 
-def _checked(
+def _pass_check(
     data: Bytes, starts: Index, ends: Index, ends_of_check: Index, extra: Index
 ) -> Mask:
     """Whether the check of each holds, or it is not whole; inside a good one: no."""
@@ -96,15 +96,15 @@ def _checked(
     return good
 
 
-def packets(data: Bytes, found: FrameScan) -> Packets:
+def read_headers(data: Bytes, found: FrameScan) -> PacketHeaders:
     """Read the headers of whole packets."""
     starts = found.starts
-    second = data[starts] == SECOND
-    padded = np.concatenate([data, np.zeros(HEADS[SECOND], np.uint8)])
-    return Packets(
+    second = data[starts] == VERSION_2
+    padded = np.concatenate([data, np.zeros(HEADER_BYTES[VERSION_2], np.uint8)])
+    return PacketHeaders(
         starts,
         found.ends,
-        np.where(second, HEADS[SECOND], HEADS[FIRST]),
+        np.where(second, HEADER_BYTES[VERSION_2], HEADER_BYTES[VERSION_1]),
         padded[starts + 1].astype(int),
         _identifiers(padded, starts, second),
         np.where(second, padded[starts + 5], padded[starts + 3]).astype(int),
@@ -112,7 +112,7 @@ def packets(data: Bytes, found: FrameScan) -> Packets:
     )
 
 
-def payloads(data: Bytes, some: Packets, size: int) -> Bytes:
+def padded_payloads(data: Bytes, some: PacketHeaders, size: int) -> Bytes:
     """Return the first `size` bytes of each payload, (m, size), zeros filled in."""
     column = np.arange(size)
     at = (some.starts + some.heads)[:, None] + column

@@ -26,41 +26,41 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, FieldcalError, InputError, LinkLost
 from fieldcal.core.samples import Block, Grain
-from fieldcal.drivers.driver import Driver, Health, ReadBack
-from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_log
-from fieldcal.drivers.mavlink_talk import Talk, listed
-from fieldcal.drivers.options import Options, split
-from fieldcal.drivers.pace import speed
+from fieldcal.drivers.clock_comparison import ClockComparison
+from fieldcal.drivers.driver import Driver, LinkHealth, ReadBack
+from fieldcal.drivers.mavlink_dialog import AutopilotDialog, parameter_list
+from fieldcal.drivers.mavlink_log import PlayedMavlinkLog, is_mavlink_log
+from fieldcal.drivers.options import Options, split_address
+from fieldcal.drivers.playback import playback_speed
 from fieldcal.drivers.reader import Chunk, Reader
-from fieldcal.drivers.skew import Skew
 
 if TYPE_CHECKING:
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
     from fieldcal.drivers.mavlink_link import TwoWaySource
 
-GREETING = 6.0
+LONGEST_GREETING = 6.0
 """Longest time until it is known who is there and what it has installed, s."""
 
-HEARTBEAT = 3.0
+LONGEST_HEARTBEAT_WAIT = 3.0
 """How long a first heartbeat may take, s."""
 
-USUAL = 50.0
+USUAL_RATE_HZ = 50.0
 """Rate that is asked for, Hz: a radio link carries it."""
 
-FIRST = 2.0
+LONGEST_FIRST_WAIT = 2.0
 """Longest wait for samples that tell unit and rate, s: there may be none yet."""
 
-RETURN = 4.0
+LONGEST_GIVE_BACK = 4.0
 """How long giving back the installed calibration may take, s."""
 
-QUIET = 2.0
+QUIET_TIME = 2.0
 """Time without samples after which the rate is asked for again, s: a reboot."""
 
-FEW, RECENT = 16, 256
+LEAST_RATE_SAMPLES, MOST_RATE_SAMPLES = 16, 256
 """Least and most samples that the rate is told from."""
 
 
-BAROMETER_SAYS = (
+BAROMETER_REMARK = (
     "the temperature in HIGHRES_IMU is that of this autopilot's barometer, so it is"
     " left out; message=RAW_IMU has that of the sensor"
 )
@@ -77,23 +77,23 @@ class MavlinkImu(Driver):
 
     def __init__(self, address: str) -> None:
         _check_installed()
-        from fieldcal.drivers.mavlink_samples import Decoder
+        from fieldcal.drivers.mavlink_samples import MavlinkDecoder
 
-        endpoint, options = split(address, "mavlink")
+        endpoint, options = split_address(address, "mavlink")
         if not endpoint:
             raise InputError("mavlink: name a link, such as mavlink:udp:0.0.0.0:14550")
         self.name = endpoint
-        self._decoder = Decoder(options)
-        self._asked = options.number("rate", USUAL, 0.0, 1e4)
-        self.health: Health = self._decoder.health
-        self._skew = Skew(self.health)
+        self._decoder = MavlinkDecoder(options)
+        self._asked = options.number("rate", USUAL_RATE_HZ, 0.0, 1e4)
+        self.health: LinkHealth = self._decoder.health
+        self._skew = ClockComparison(self.health)
         message = (self._decoder.message, self._decoder.kind.identifier)
         without = options.choice("installed", ("keep", "identity"), "keep")
-        self._talk = Talk(
+        self._dialog = AutopilotDialog(
             message,
             self._asked,
             self._decoder.instance,
-            self._decoder.wants,
+            self._decoder.accepts,
             without == "identity",
         )
         self._log: PlayedMavlinkLog | None = None
@@ -101,22 +101,22 @@ class MavlinkImu(Driver):
         self._closed = False
         self._line: TwoWaySource | None = None
         self._early: list[Block] = []
-        self._recent: deque[float] = deque(maxlen=RECENT)
+        self._recent: deque[float] = deque(maxlen=MOST_RATE_SAMPLES)
         self._last = monotonic()
         self._restarts, self._asked_again = 0, False
-        if is_log(endpoint):
-            self._log = PlayedMavlinkLog(Path(endpoint), speed(options))
+        if is_mavlink_log(endpoint):
+            self._log = PlayedMavlinkLog(Path(endpoint), playback_speed(options))
             options.finish()
             return
         self._open(endpoint, options)
 
     def _open(self, endpoint: str, options: Options) -> None:
-        from fieldcal.drivers.mavlink_link import opener
+        from fieldcal.drivers.mavlink_link import endpoint_opener
 
         baud = int(options.number("baud", 57600, 50, 1e8))
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
         options.finish()
-        open_line = opener(endpoint, baud)
+        open_line = endpoint_opener(endpoint, baud)
 
         def connect() -> TwoWaySource:
             self._line = open_line()
@@ -127,7 +127,7 @@ class MavlinkImu(Driver):
             self._greet()
         except LinkLost:
             # it talked and went: what came is handed out first, then this is met again
-            if not self._early or self._talk.unset:
+            if not self._early or self._dialog.pending:
                 self.close()
                 raise
         except BaseException:
@@ -140,13 +140,13 @@ class MavlinkImu(Driver):
         heard = [f"asked for {self._asked:g} Hz, got {self.rate:.4g} Hz"]
         slow = self._log is None and self._asked > 0 and self.rate > 0
         remark = [self.installed.remark] if self.installed else []
-        warm = [BAROMETER_SAYS] if self._decoder.thermometer == "barometer" else []
-        return [*self._talk.says, *filter(None, remark), *warm, *heard * slow]
+        warm = [BAROMETER_REMARK] if self._decoder.thermometer == "barometer" else []
+        return [*self._dialog.says, *filter(None, remark), *warm, *heard * slow]
 
     @property
-    def installed(self) -> Installed | None:
+    def installed(self) -> InstalledCalibration | None:
         """The calibration that the autopilot has; None while it is not known."""
-        return self._talk.installed
+        return self._dialog.installed
 
     @property
     def grain(self) -> Grain:
@@ -182,8 +182,8 @@ class MavlinkImu(Driver):
     @property
     def read_back(self) -> ReadBack:
         """How often the installed calibration was read, and had changed."""
-        same, changed = self._talk.readings
-        return ReadBack(same, changed, self._asked_again or self._talk.rereads)
+        same, changed = self._dialog.readings
+        return ReadBack(same, changed, self._asked_again or self._dialog.is_rereading)
 
     def read_again(self) -> None:
         """Have the installed calibration read again by whoever receives."""
@@ -219,19 +219,19 @@ class MavlinkImu(Driver):
             self._reader.close()
 
     def _give_back(self) -> None:
-        self._talk.give_back()
-        deadline = monotonic() + RETURN
+        self._dialog.give_back()
+        deadline = monotonic() + LONGEST_GIVE_BACK
         fault: Exception | None = None
         try:
-            while self._talk.unset and monotonic() < deadline:
-                self._say(self._talk.due(monotonic()))
+            while self._dialog.pending and monotonic() < deadline:
+                self._say(self._dialog.bytes_due(monotonic()))
                 self._listen(self._take(0.05))
         except FieldcalError as error:
             fault = error
-        if self._talk.unset:
+        if self._dialog.pending:
             raise DeviceError(
                 f"{self.name} could not be given back its calibration: set by hand "
-                f"{listed(self._talk.unset)}"
+                f"{parameter_list(self._dialog.pending)}"
             ) from fault
 
     def _take(self, timeout: float) -> list[Chunk]:
@@ -243,21 +243,21 @@ class MavlinkImu(Driver):
         """Return the samples that have come, and answer the rest."""
         chunks = self._take(timeout)
         block = self._listen(chunks)
-        quiet = monotonic() - self._last > QUIET
+        quiet = monotonic() - self._last > QUIET_TIME
         if block is not None or quiet:
             self._last = monotonic()
         restarts, self._restarts = self._restarts, self.health.restarts
         broken = any(chunk.broken for chunk in chunks)
-        if broken or self._restarts > restarts or (quiet and self._talk.settled):
-            self._talk.again()
+        if broken or self._restarts > restarts or (quiet and self._dialog.settled):
+            self._dialog.start_over()
         if self._asked_again:
             self._asked_again = False
-            self._talk.read()
-        if self._talk.vehicle:
-            self._decoder.choose(*self._talk.vehicle)
+            self._dialog.read_again()
+        if self._dialog.vehicle:
+            self._decoder.choose_vehicle(*self._dialog.vehicle)
         self._check_one()
         if self._log is None and self._line is not None:
-            self._say(self._talk.due(monotonic()))
+            self._say(self._dialog.bytes_due(monotonic()))
         if block is not None:
             self._recent.extend(block.t.tolist())
             self._skew.add(block.t, block.t_host)
@@ -266,9 +266,9 @@ class MavlinkImu(Driver):
     def _listen(self, chunks: list[Chunk]) -> Block | None:
         """Decode, and tell the conversation what was said beside the samples."""
         block = self._decoder.feed_all(chunks)
-        for message in self._decoder.aside:
-            self._talk.hear(message)
-        self._decoder.aside.clear()
+        for message in self._decoder.other_messages:
+            self._dialog.hear(message)
+        self._decoder.other_messages.clear()
         return block
 
     def _say(self, data: bytes) -> None:
@@ -281,23 +281,26 @@ class MavlinkImu(Driver):
     def _greet(self) -> None:
         """Listen and ask until all is answered; samples that come meanwhile wait."""
         began = monotonic()
-        while not self._talk.settled and monotonic() < began + GREETING:
+        while not self._dialog.settled and monotonic() < began + LONGEST_GREETING:
             block = self._hear(0.05)
             if block is not None:
                 self._early.append(block)
-            if self._talk.vehicle is None and monotonic() > began + HEARTBEAT:
+            if (
+                self._dialog.vehicle is None
+                and monotonic() > began + LONGEST_HEARTBEAT_WAIT
+            ):
                 if self._early:
                     return
-                raise DeviceError(self._silence(HEARTBEAT, Health()))
-        if self._talk.installed is not None and self._talk.installed.taken_out:
+                raise DeviceError(self._silence(LONGEST_HEARTBEAT_WAIT, LinkHealth()))
+        if self._dialog.installed is not None and self._dialog.installed.taken_out:
             self._early.clear()  # these came before the calibration was out
-            self._decoder.drop()
-        self._meet(monotonic() + FIRST)
+            self._decoder.drop_waiting()
+        self._meet(monotonic() + LONGEST_FIRST_WAIT)
 
     def _meet(self, until: float) -> None:
         """Listen until the unit and the rate are known; the samples wait."""
         while monotonic() < until:
-            if self._decoder.acc_unit and len(self._recent) >= FEW:
+            if self._decoder.acc_unit and len(self._recent) >= LEAST_RATE_SAMPLES:
                 return
             block = self._hear(0.05)
             if block is not None:
@@ -305,29 +308,29 @@ class MavlinkImu(Driver):
 
     def _check_one(self) -> None:
         """Refuse to choose between several vehicles."""
-        several = {*self._decoder.sources, *self._talk.others}
-        if self._talk.vehicle:
-            several.add(self._talk.vehicle)
+        several = {*self._decoder.sources, *self._dialog.others}
+        if self._dialog.vehicle:
+            several.add(self._dialog.vehicle)
         if len(several) > 1:
             named = ", ".join(f"system={s}&component={c}" for s, c in sorted(several))
             raise InputError(f"{self.name} carries several vehicles: name one, {named}")
 
-    def _silence(self, timeout: float, before: Health) -> str:
+    def _silence(self, timeout: float, before: LinkHealth) -> str:
         health, wanted = self.health, self._decoder.message
-        others = sorted(self._decoder.heard - {wanted})
+        others = sorted(self._decoder.messages_heard - {wanted})
         if health.received == before.received:
             cause = "not a byte came; check link, port and baud rate"
-        elif others and wanted not in self._decoder.heard:
+        elif others and wanted not in self._decoder.messages_heard:
             cause = f"no {wanted} comes, but {others[0]}; try message={others[0]}"
-        elif wanted in self._decoder.heard and not health.samples:
+        elif wanted in self._decoder.messages_heard and not health.samples:
             cause = f"{wanted} comes, but of another sensor; check instance and system"
-        elif self._talk.vehicle:
+        elif self._dialog.vehicle:
             cause = f"an autopilot is there, but sends no {wanted}; try another message"
         else:
             cause = "bytes come, but no heartbeat of an autopilot; check baud rate and"
             cause += f" what is plugged in: `fieldcal ports --probe {self.name}`"
         sent = "went silent" if health.samples else "has sent no sample"
-        asked = "".join(f" ({sentence})" for sentence in self._talk.says)
+        asked = "".join(f" ({sentence})" for sentence in self._dialog.says)
         return f"{self.name} {sent} for {timeout:g} s: {cause}{asked}"
 
 

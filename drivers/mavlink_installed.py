@@ -1,4 +1,4 @@
-"""The calibration that an autopilot has built into what it sends, and the next one.
+"""The calibration that an autopilot applies to its samples, and the next one.
 
 An autopilot sends  U = (r - o) k  of the sensor's own output r, with the offset o and
 the scale k among its parameters, axis by axis.                                 (1)
@@ -26,18 +26,18 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 
 ARDUPILOT, PX4 = 3, 12
-"""Numbers of the programs in a heartbeat."""
+"""Numbers of the autopilot programs in a heartbeat."""
 
 AXES = "XYZ"
 
-AT_START = "INS_GYR_CAL"
-"""Whether ArduPilot averages its gyroscopes at each start, as it usually does."""
+GYRO_CAL_AT_START = "INS_GYR_CAL"
+"""Parameter of ArduPilot: whether it averages its gyroscopes at each start."""
 
 
-def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
-    """Parameters with offsets, scales and mounting, by what they are.
+def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
+    """Names of the parameters for offsets, scales and mounting, by what they hold.
 
-    >>> names(ARDUPILOT, 1)["acc_scale"]
+    >>> parameter_names(ARDUPILOT, 1)["acc_scale"]
     ('INS_ACC2SCAL_X', 'INS_ACC2SCAL_Y', 'INS_ACC2SCAL_Z')
     """
     if autopilot == ARDUPILOT:
@@ -59,14 +59,14 @@ def names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
     return {}
 
 
-def other_processing(autopilot: int, instance: int) -> tuple[str, ...]:
-    """Parameters of what else is done to the samples: low-pass, temperature, at start.
+def other_processing_parameters(autopilot: int, instance: int) -> tuple[str, ...]:
+    """Parameters of other processing: low-pass, temperature, averaging at start.
 
-    Not every program has them; where one is not answered, nothing is concluded.
+    Not every program has them; one without an answer is ignored.
     """
     if autopilot == ARDUPILOT:
         corrects = f"INS_TCAL{instance + 1}_ENABLE"
-        return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects, AT_START)
+        return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects, GYRO_CAL_AT_START)
     if autopilot == PX4:
         cutoffs = ("IMU_ACCEL_CUTOFF", "IMU_GYRO_CUTOFF")
         return (*cutoffs, "TC_A_ENABLE", "TC_G_ENABLE")
@@ -74,17 +74,17 @@ def other_processing(autopilot: int, instance: int) -> tuple[str, ...]:
 
 
 @dataclass(slots=True)
-class Installed:
-    """What an autopilot says of its own calibration.
+class InstalledCalibration:
+    """Calibration that is installed on an autopilot, by its parameters.
 
     Attributes
     ----------
     autopilot : number of its program in the heartbeat
     instance : which of its sensors, from 0
-    values : by name of the parameter, as far as they came
-    taken_out : whether the autopilot was told to do without, o = 0 and k = 1
-    used : what its parameters were when they were last read, all of them: what is in
-        the samples. Where nothing is taken out these are among `values`.
+    values : values received, by name of the parameter
+    taken_out : whether the autopilot was told to use o = 0 and k = 1
+    in_samples : all parameters as they were last read; these are applied to the
+        samples. Unless `taken_out`, they are also in `values`.
 
     """
 
@@ -92,12 +92,12 @@ class Installed:
     instance: int
     values: dict[str, float] = field(default_factory=dict)
     taken_out: bool = False
-    used: dict[str, float] = field(default_factory=dict)
+    in_samples: dict[str, float] = field(default_factory=dict)
 
     @property
     def missing(self) -> list[str]:
-        """Parameters that have not come, or came as no number."""
-        known = names(self.autopilot, self.instance).values()
+        """Parameters that have not been received, or are no finite number."""
+        known = parameter_names(self.autopilot, self.instance).values()
         return [
             name
             for some in known
@@ -106,9 +106,9 @@ class Installed:
         ]
 
     @property
-    def impossible(self) -> str:
-        """What no autopilot works with, one sentence; empty if all can be."""
-        scales = names(self.autopilot, self.instance).get("acc_scale", ())
+    def damage(self) -> str:
+        """Error text for values that are impossible; empty if there are none."""
+        scales = parameter_names(self.autopilot, self.instance).get("acc_scale", ())
         odd = {n: v for n, v in self.values.items() if not np.isfinite(v)}
         odd |= {n: v for n in scales if (v := self.values.get(n, 1.0)) <= 0}
         if not odd:
@@ -121,9 +121,9 @@ class Installed:
 
     @property
     def remark(self) -> str:
-        """What the operator should know of it, one sentence; empty if nothing."""
-        if self.impossible:
-            return self.impossible
+        """Remark for the operator, one sentence; empty if there is none."""
+        if self.damage:
+            return self.damage
         on = [n for n, v in self.values.items() if n.endswith("_ENABLE") and v]
         if not on:
             return ""
@@ -133,19 +133,19 @@ class Installed:
             " recording"
         )
 
-    def of(self, what: str) -> Array:
+    def vector(self, what: str) -> Array:
         """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
-        some = names(self.autopilot, self.instance).get(what, ("",) * 3)
+        some = parameter_names(self.autopilot, self.instance).get(what, ("",) * 3)
         return np.array([self.values.get(name, np.nan) for name in some])
 
-    def next(
+    def parameters_after(
         self, acc_bias: Array, acc_scale: Array, gyr_bias: Array
     ) -> Mapping[str, float]:
         """Return the parameters to install after a recalibration, (2).
 
         Parameters
         ----------
-        acc_bias, acc_scale, gyr_bias : (3,) as found from what was sent, m/s^2, rad/s
+        acc_bias, acc_scale, gyr_bias : (3,) as estimated from the samples, m/s^2, rad/s
 
         Raises
         ------
@@ -153,9 +153,9 @@ class Installed:
             If a parameter is not known, or the board is mounted turned.
 
         """
-        if self.impossible:
-            raise InputError(self.impossible)
-        known = names(self.autopilot, self.instance)
+        if self.damage:
+            raise InputError(self.damage)
+        known = parameter_names(self.autopilot, self.instance)
         if self.missing or not known:
             lacking = ", ".join(self.missing) or "any parameter of this autopilot"
             raise InputError(
@@ -169,11 +169,11 @@ class Installed:
                 "installed calibration: set it to 0, and record again"
             )
         there = 0.0 if self.taken_out else 1.0
-        k = self.of("acc_scale") ** there
+        k = self.vector("acc_scale") ** there
         new = {
-            "acc_offset": there * self.of("acc_offset") + acc_bias / k,  # (2)
+            "acc_offset": there * self.vector("acc_offset") + acc_bias / k,  # (2)
             "acc_scale": k / acc_scale,
-            "gyr_offset": there * self.of("gyr_offset") + gyr_bias,
+            "gyr_offset": there * self.vector("gyr_offset") + gyr_bias,
         }
         return {
             name: float(value)
@@ -182,7 +182,7 @@ class Installed:
         }
 
     def as_table(self) -> dict[str, Any]:
-        """What a recording keeps of it."""
+        """Table that a recording keeps."""
         return {
             "autopilot": self.autopilot,
             "instance": self.instance,
@@ -193,9 +193,12 @@ class Installed:
         }
 
     def _in_samples(self) -> dict[str, list[float]] | None:
-        """Offsets and scales of (1) that are in the samples; None if unknown."""
-        known = names(self.autopilot, self.instance)
-        used = {what: [self.used.get(n, np.nan) for n in known[what]] for what in known}
+        """Offsets and scales (1) that were applied to the samples; None if unknown."""
+        known = parameter_names(self.autopilot, self.instance)
+        used = {
+            what: [self.in_samples.get(n, np.nan) for n in known[what]]
+            for what in known
+        }
         if not known or not np.isfinite(np.concatenate([*used.values()])).all():
             return None
         if used.pop("rotation") != [0.0] or min(used["acc_scale"]) <= 0:
@@ -203,13 +206,13 @@ class Installed:
         return used
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Installed:
-        """Read back what a recording kept.
+    def from_table(cls, table: Mapping[str, Any]) -> InstalledCalibration:
+        """Read the table that a recording keeps.
 
         Raises
         ------
         InputError
-            If it is not that.
+            If it is not such a table.
 
         """
         try:
@@ -223,11 +226,11 @@ class Installed:
             ) from error
 
 
-def identity(installed: Installed) -> dict[str, float]:
-    """Parameters that are no calibration; none where not all are known."""
+def identity_parameters(installed: InstalledCalibration) -> dict[str, float]:
+    """Parameters of a calibration that changes nothing; empty if not all are known."""
     if installed.missing:
         return {}
-    known = names(installed.autopilot, installed.instance)
+    known = parameter_names(installed.autopilot, installed.instance)
     nothing = {"acc_offset": 0.0, "acc_scale": 1.0, "gyr_offset": 0.0}
     return {
         name: value for what, value in nothing.items() for name in known.get(what, ())

@@ -17,15 +17,15 @@ from typing import Protocol
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import SerialPort
-from fieldcal.drivers.tcp import POLL, Tcp, socket_error
+from fieldcal.drivers.tcp import POLL_TIME, TcpLink, socket_error
 
-WAITING = 1 << 20
+RECEIVE_BUFFER = 1 << 20
 """Bytes that the kernel is asked to keep for us."""
 
-MOST = 512
+MOST_DATAGRAMS = 512
 """Datagrams taken at once."""
 
-SIZE = 1 << 16
+LARGEST_DATAGRAM = 1 << 16
 
 
 class TwoWaySource(ByteSource, Protocol):
@@ -35,7 +35,7 @@ class TwoWaySource(ByteSource, Protocol):
         """Send; OSError if the other end is gone."""
 
 
-class Udp:
+class UdpLink:
     """Datagrams, from a peer that speaks first, or to one that waits.
 
     Parameters
@@ -49,7 +49,7 @@ class Udp:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._peer = None if waits else place
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WAITING)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
             if waits:
                 self._socket.bind(place)
             self._socket.setblocking(False)
@@ -58,13 +58,13 @@ class Udp:
             raise DeviceError(socket_error(place, fault)) from fault
 
     def read(self) -> bytes:
-        """Return all datagrams that are there, waiting `POLL` s for the first."""
+        """Return all datagrams that are there, waiting `POLL_TIME` s for the first."""
         parts: list[bytes] = []
-        select.select([self._socket], [], [], POLL)
+        select.select([self._socket], [], [], POLL_TIME)
         # a refused datagram is told on the next read: nobody is there yet
         with suppress(BlockingIOError, ConnectionRefusedError):
-            while len(parts) < MOST:
-                data, peer = self._socket.recvfrom(SIZE)
+            while len(parts) < MOST_DATAGRAMS:
+                data, peer = self._socket.recvfrom(LARGEST_DATAGRAM)
                 self._peer = peer
                 parts.append(data)
         return b"".join(parts)
@@ -80,7 +80,7 @@ class Udp:
         self._socket.close()
 
 
-def opener(endpoint: str, baud: int) -> Callable[[], TwoWaySource]:
+def endpoint_opener(endpoint: str, baud: int) -> Callable[[], TwoWaySource]:
     """Return what opens an endpoint, and opens it again.
 
     Raises
@@ -91,18 +91,18 @@ def opener(endpoint: str, baud: int) -> Callable[[], TwoWaySource]:
     """
     scheme, _, rest = endpoint.partition(":")
     if scheme in ("udp", "udpin"):
-        place = _place(endpoint, rest)
-        return lambda: Udp(place, waits=True)
+        place = _host_and_port(endpoint, rest)
+        return lambda: UdpLink(place, waits=True)
     if scheme == "udpout":
-        place = _place(endpoint, rest)
-        return lambda: Udp(place, waits=False)
+        place = _host_and_port(endpoint, rest)
+        return lambda: UdpLink(place, waits=False)
     if scheme == "tcp":
-        place = _place(endpoint, rest)
-        return lambda: Tcp(place)
+        place = _host_and_port(endpoint, rest)
+        return lambda: TcpLink(place)
     return lambda: SerialPort(endpoint, baud)
 
 
-def _place(endpoint: str, rest: str) -> tuple[str, int]:
+def _host_and_port(endpoint: str, rest: str) -> tuple[str, int]:
     host, _, port = rest.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise InputError(

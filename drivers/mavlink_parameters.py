@@ -1,13 +1,13 @@
-"""Parameters of an autopilot, read and set over any MAVLink link, and not believed.
+"""Reads and sets parameters of an autopilot over any MAVLink link, with verification.
 
-PARAM_REQUEST_READ asks for one, PARAM_SET sets one, PARAM_VALUE answers both. An answer
-to PARAM_SET says what was understood, not what is kept, so whoever writes reads again,
-once no answer is on its way any more. Questions are put `TRIES` times, since links lose
-packets; what is no number is no answer. A link that hangs up is opened again: an
-autopilot may start anew meanwhile.
+PARAM_REQUEST_READ asks for one, PARAM_SET sets one, PARAM_VALUE answers both. The
+answer to PARAM_SET does not prove that the value is kept. So a written parameter is
+read again, after late answers have arrived. Requests are sent up to `TRIES` times,
+since links lose packets; nan and infinity are no answers. A link that is closed is
+opened again, since an autopilot may restart.
 
-A parameter travels as a float of 32 bits; whole numbers of PX4 as their bits in one,
-so that one has to be read, which tells its type, before it is set.
+A parameter is sent as a 32-bit float. PX4 sends the bits of an integer in that float,
+so a parameter must be read, which gives its type, before it is set.
 """
 
 from __future__ import annotations
@@ -20,31 +20,37 @@ from typing import Any, Self
 import numpy as np
 
 from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.drivers.mavlink_dialog import (
+    GROUND_STATION,
+    INT32,
+    NO_AUTOPILOT,
+    REAL32,
+    parameter_list,
+)
 from fieldcal.drivers.mavlink_installed import PX4
-from fieldcal.drivers.mavlink_link import TwoWaySource, opener
-from fieldcal.drivers.mavlink_talk import INT32, NO_AUTOPILOT, REAL32, STATION, listed
-from fieldcal.drivers.options import split
+from fieldcal.drivers.mavlink_link import TwoWaySource, endpoint_opener
+from fieldcal.drivers.options import split_address
 
-BEAT, PATIENCE = 1.0, 0.7
-"""Between two heartbeats, and until a question is put again, s."""
+HEARTBEAT_INTERVAL, PATIENCE = 1.0, 0.7
+"""Time between two heartbeats, and until a request is repeated, s."""
 
 TRIES = 4
-"""How often a question is put."""
+"""How often a request is sent."""
 
 ROUNDS = 3
-"""How often all parameters are set, and read back, before that has failed."""
+"""How often all parameters are set and read back at most."""
 
-QUIET, ENOUGH = 0.5, 3.0
-"""Time without an answer after which none is on its way, and the longest wait, s."""
+QUIET_TIME, LONGEST_SETTLING = 0.5, 3.0
+"""Time without an answer after which no more is expected, and the longest wait, s."""
 
-AWAY, AGAIN = 20.0, 0.5
-"""How long a link that hung up is tried again, and how often, s."""
+RECONNECT_TIME, RECONNECT_INTERVAL = 20.0, 0.5
+"""How long opening a closed link is tried, and the time between attempts, s."""
 
-HEARTBEAT = 5.0
-"""How long a first heartbeat may take, s."""
+LONGEST_HEARTBEAT_WAIT = 5.0
+"""Longest wait for the first heartbeat, s."""
 
 ARMED = 128
-"""In a heartbeat's mode: motors may turn."""
+"""Bit of the mode in a heartbeat: motors may turn."""
 
 
 class ParameterLink:
@@ -54,8 +60,8 @@ class ParameterLink:
     ----------
     address : as of the driver, ``mavlink:`` left out; only ``baud``, ``system`` and
         ``component`` matter here
-    connect : opens the line, and opens it again; by default what the address says
-    clock, pause : s of the host, and to let some go by
+    connect : opens the link, also again; by default the one of the address
+    clock, pause : time of the host, s, and a function that waits for some s
 
     Attributes
     ----------
@@ -67,7 +73,7 @@ class ParameterLink:
     DeviceError
         If the link cannot be opened, or no autopilot is heard.
     InputError
-        If there are several, and none is named.
+        If there are several, and the address names none.
 
     """
 
@@ -80,14 +86,14 @@ class ParameterLink:
     ) -> None:
         from pymavlink.dialects.v20 import all as dialect
 
-        endpoint, options = split(address, "mavlink")
+        endpoint, options = split_address(address, "mavlink")
         baud = int(options.number("baud", 57600, 50, 1e8))
         wanted = {
             name: int(options.number(name, 0, 0, 255))
             for name in ("system", "component")
         }
         self.name, self._wanted = endpoint, wanted
-        self._out = dialect.MAVLink(None, *STATION)
+        self._out = dialect.MAVLink(None, *GROUND_STATION)
         self._in = dialect.MAVLink(None)
         self._in.robust_parsing = True
         self._heard: dict[str, float] = {}
@@ -97,7 +103,7 @@ class ParameterLink:
         self.autopilot, self.armed = 0, False
         self._target = (0, 0)
         self._clock, self._pause, self._answered = clock, pause, -np.inf
-        self._connect = connect or opener(endpoint, baud)
+        self._connect = connect or endpoint_opener(endpoint, baud)
         self._line: TwoWaySource = self._connect()
         try:
             self._greet()
@@ -106,7 +112,7 @@ class ParameterLink:
             raise
 
     def read(self, names: Iterable[str]) -> dict[str, float]:
-        """Values of parameters, as the autopilot keeps them now.
+        """Current values of parameters.
 
         Raises
         ------
@@ -137,34 +143,36 @@ class ParameterLink:
         return {name: self._heard[name] for name in wanted}
 
     def write(self, values: Mapping[str, float]) -> None:
-        """Set parameters, and read each back from what is kept.
+        """Set parameters, and read each back.
 
         Raises
         ------
         DeviceError
-            If one is not kept as it was set.
+            If a value differs from the one that was set.
 
         """
         for _ in range(ROUNDS):
             self._set(values)
             self._settle()
             kept = self.read(values)
-            wrong = {n: kept[n] for n, v in values.items() if not same(kept[n], v)}
+            wrong = {
+                n: kept[n] for n, v in values.items() if not same_float32(kept[n], v)
+            }
             if not wrong:
                 return
         raise DeviceError(
             f"{self.name}: the autopilot did not take what was set: it keeps"
-            f" {listed(wrong)}"
+            f" {parameter_list(wrong)}"
         )
 
     def _set(self, values: Mapping[str, float]) -> None:
-        """Set parameters until each was answered as it was set, or often enough."""
+        """Send values until each is acknowledged, or up to `TRIES` times."""
         for name in values:
             self._heard.pop(name, None)
 
         def ask() -> None:
             for name, value in values.items():
-                if not same(self._heard.get(name), value):
+                if not same_float32(self._heard.get(name), value):
                     sent, kind = self._as_sent(name, value)
                     self._send(
                         self._out.param_set_encode(
@@ -173,21 +181,24 @@ class ParameterLink:
                     )
 
         self._until(
-            lambda: all(same(self._heard.get(n), v) for n, v in values.items()), ask
+            lambda: all(same_float32(self._heard.get(n), v) for n, v in values.items()),
+            ask,
         )
 
     def _as_sent(self, name: str, value: float) -> tuple[float, int]:
-        """A value as it travels, and its type: PX4 takes none of another type."""
+        """A value as it is sent, and its type; PX4 refuses another type."""
         if name not in self._whole:
             return value, REAL32
         (bits,) = struct.unpack("<f", struct.pack("<i", round(value)))
         return bits, INT32
 
     def _settle(self) -> None:
-        """Let answers that are late come before anything is asked anew."""
+        """Wait for late answers before anything is requested again."""
         begin = self._clock()
         self._answered = max(self._answered, begin)
-        while self._clock() < min(self._answered + QUIET, begin + ENOUGH):
+        while self._clock() < min(
+            self._answered + QUIET_TIME, begin + LONGEST_SETTLING
+        ):
             self._listen()
 
     def close(self) -> None:
@@ -201,7 +212,7 @@ class ParameterLink:
         self.close()
 
     def _until(self, done: Callable[[], bool], ask: Callable[[], None]) -> None:
-        """Ask until it is done, or was asked often enough."""
+        """Call `ask` until `done`, up to `TRIES` times."""
         for _ in range(TRIES):
             ask()
             deadline = self._clock() + PATIENCE
@@ -211,18 +222,18 @@ class ParameterLink:
                     return
 
     def _greet(self) -> None:
-        deadline = self._clock() + HEARTBEAT
+        deadline = self._clock() + LONGEST_HEARTBEAT_WAIT
         while not self._vehicles and self._clock() < deadline:
             self._listen()
         if not self._vehicles:
             raise DeviceError(
-                f"{self.name}: no heartbeat of an autopilot came in {HEARTBEAT:g} s;"
-                " check link, port and baud rate"
+                f"{self.name}: no heartbeat of an autopilot came in"
+                f" {LONGEST_HEARTBEAT_WAIT:g} s; check link, port and baud rate"
             )
         named = all(self._wanted.values())
-        settle = self._clock() + (0.0 if named else BEAT)
+        settle = self._clock() + (0.0 if named else HEARTBEAT_INTERVAL)
         while self._clock() < settle:
-            self._listen()  # others on the same link say so within a second
+            self._listen()  # others on the same link send a heartbeat within a second
         if len(self._vehicles) > 1:
             several = ", ".join(
                 f"system={s}&component={c}" for s, c in sorted(self._vehicles)
@@ -235,8 +246,8 @@ class ParameterLink:
         self.armed = bool(heartbeat.base_mode & ARMED)
 
     def _listen(self) -> None:
-        """Say that we are there, and take in what comes within a moment."""
-        if self._clock() - self._beat >= BEAT:
+        """Send a heartbeat if one is due, and process what arrives."""
+        if self._clock() - self._beat >= HEARTBEAT_INTERVAL:
             self._beat = self._clock()
             self._send(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
         try:
@@ -262,7 +273,7 @@ class ParameterLink:
                 self._heard[message.param_id] = float(struct.unpack("<i", bits)[0])
             elif np.isfinite(
                 value
-            ):  # the shortest number that is this float of 32 bits
+            ):  # the shortest number that equals this 32-bit float
                 self._heard[message.param_id] = float(str(np.float32(value)))
             self._answered = self._clock()
 
@@ -275,11 +286,11 @@ class ParameterLink:
             self._reopen(fault)
 
     def _reopen(self, fault: OSError) -> None:
-        """Open a line that hung up again; what was asked is asked anew by who waits."""
+        """Open a closed link again; the caller repeats its request."""
         self._line.close()
-        until = self._clock() + AWAY
+        until = self._clock() + RECONNECT_TIME
         while self._clock() < until:
-            self._pause(AGAIN)
+            self._pause(RECONNECT_INTERVAL)
             try:
                 self._line = self._connect()
             except (OSError, DeviceError):
@@ -288,11 +299,11 @@ class ParameterLink:
         raise DeviceError(f"{self.name} hung up: {fault}; check the link") from fault
 
 
-def same(kept: float | None, wanted: float) -> bool:
-    """Whether a value that was kept is the one wanted, as floats of 32 bits are.
+def same_float32(kept: float | None, wanted: float) -> bool:
+    """Whether two values are equal as 32-bit floats; False if `kept` is None.
 
-    >>> same(0.1, 0.1 + 1e-10), same(0.1, 0.1001), same(None, 0.1)
-    (True, False, False)
+    >>> [same_float32(kept, 0.1) for kept in (0.1 + 1e-10, 0.1001, None)]
+    [True, False, False]
     """
     if kept is None or not np.isfinite(kept):
         return False

@@ -5,8 +5,8 @@ those that send the message, the first is taken unless one was chosen. Units are
 from the first samples, which wait until they are, see `mavlink_units`.
 
 The temperature of RAW_IMU and SCALED_IMU is the sensor's. That of HIGHRES_IMU is the
-barometer's in the programs of `BAROMETER`, and says nothing of the sensor. Source:
-GCS_Common.cpp of ArduPilot, HIGHRES_IMU.hpp of PX4.
+barometer's in the programs of `BAROMETER_AUTOPILOTS`, and says nothing of the sensor.
+Source: GCS_Common.cpp of ArduPilot, HIGHRES_IMU.hpp of PX4.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, as_doubles
+from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, as_doubles
 from fieldcal.drivers.mavlink_frames import (
-    LONGEST,
-    Packets,
-    candidates,
-    packets,
-    payloads,
+    LONGEST_PACKET,
+    PacketHeaders,
+    packet_candidates,
+    padded_payloads,
+    read_headers,
 )
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_units import (
     ACCELERATIONS,
     RATES,
-    recognised_unit,
-    refuse_units,
+    recognise_unit,
+    unit_error,
     untruncated_mean,
 )
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.stamps import Stamps
+from fieldcal.drivers.stamp_timebase import StampTimebase
 
 Fields = NDArray[np.void]
 
@@ -59,7 +59,7 @@ class MessageKind(NamedTuple):
     whole: bool
 
 
-KINDS = {
+MESSAGE_KINDS = {
     "HIGHRES_IMU": MessageKind(105, _HIGHRES, 1e-6, False),
     "RAW_IMU": MessageKind(27, _RAW, 1e-6, True),
     "SCALED_IMU": MessageKind(26, _SCALED, 1e-3, True),
@@ -69,43 +69,43 @@ KINDS = {
 INSTANCES = {"SCALED_IMU": 0, "SCALED_IMU2": 1, "SCALED_IMU3": 2}
 """Which sensor a message speaks of that has no field for it."""
 
-ASIDE = (0, 22, 77)
+OTHER_MESSAGES = (0, 22, 77)
 """Heartbeats, values of parameters, answers to commands."""
 
-MOST_ASIDE = 1000
+MOST_OTHER_MESSAGES = 1000
 """Such messages kept until they are asked for."""
 
-FEW, ENOUGH = 16, 160
+UNIT_SAMPLES, MOST_UNIT_SAMPLES = 16, 160
 """Samples that tell the unit, and after which it is given up."""
 
-BAROMETER = (ARDUPILOT, PX4)
+BAROMETER_AUTOPILOTS = (ARDUPILOT, PX4)
 """Programs whose HIGHRES_IMU has the temperature of the barometer."""
 
 ACC_UPDATED, GYR_UPDATED, TEMPERATURE_UPDATED = 0o7, 0o70, 1 << 12
 """Bits of HIGHRES_IMU's fields_updated."""
 
 
-class Decoder(Codec):
+class MavlinkDecoder(Codec):
     """A decoder of one message of one vehicle.
 
     Attributes
     ----------
-    aside : messages besides the samples, as pymavlink makes them
+    other_messages : messages besides the samples, as pymavlink makes them
     sources : system and component of all that send the message
-    heard : names of the IMU messages that came, chosen or not
+    messages_heard : names of the IMU messages that came, chosen or not
     acc_unit : unit of acceleration in the message; empty until it is known
     autopilots : numbers of the programs that sent a heartbeat, by system and component
 
     """
 
-    longest = LONGEST
+    longest = LONGEST_PACKET
 
     def __init__(self, options: Options) -> None:
         from pymavlink.dialects.v20 import all as dialect
 
         super().__init__(options)
-        self.message = options.choice("message", tuple(KINDS), "HIGHRES_IMU")
-        self.kind = KINDS[self.message]
+        self.message = options.choice("message", tuple(MESSAGE_KINDS), "HIGHRES_IMU")
+        self.kind = MESSAGE_KINDS[self.message]
         self._system = int(options.number("system", 0, 0, 255))
         self._component = int(options.number("component", 0, 0, 255))
         self.instance = INSTANCES.get(self.message, 0)
@@ -115,15 +115,15 @@ class Decoder(Codec):
         usual = "mrad/s" if self.kind.whole else "rad/s"
         self.gyr_unit = options.choice("gyr_unit", tuple(RATES), usual)
         self._cut = options.choice("rounding", ("cut", "nearest"), "cut") == "cut"
-        self.aside: list[Any] = []
+        self.other_messages: list[Any] = []
         self.sources: set[tuple[int, int]] = set()
-        self.heard: set[str] = set()
+        self.messages_heard: set[str] = set()
         self.autopilots: dict[tuple[int, int], int] = {}
         self._vehicle: tuple[int, int] | None = None
         self._waiting: list[tuple[Fields, Array]] = []
         span = 2.0**32 * self.kind.tick if self.kind.tick > 1e-6 else float("inf")
         resolution = self.kind.tick if self.kind.tick > 1e-6 else 0.0
-        self._clock = Stamps(self.health, resolution, span)
+        self._clock = StampTimebase(self.health, resolution, span)
         self._parser = dialect.MAVLink(None)
         self._broken = dialect.MAVError
         self._extras = np.full(max(dialect.mavlink_map) + 2, -1)
@@ -148,62 +148,64 @@ class Decoder(Codec):
         if self.kind.whole:
             return "imu"
         program = self.autopilots.get(self._vehicle or (0, 0))
-        return "barometer" if program in BAROMETER else ""
+        return "barometer" if program in BAROMETER_AUTOPILOTS else ""
 
-    def wants(self, system: int, component: int) -> bool:
+    def accepts(self, system: int, component: int) -> bool:
         """Whether the options allow this one."""
         return self._system in (0, system) and self._component in (0, component)
 
-    def choose(self, system: int, component: int) -> None:
+    def choose_vehicle(self, system: int, component: int) -> None:
         """Take the samples of this one, if none was taken so far."""
         self._vehicle = self._vehicle or (system, component)
 
-    def drop(self) -> None:
+    def drop_waiting(self) -> None:
         """Forget the samples that wait for their unit."""
         self._waiting = []
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Say where packets may begin."""
-        return candidates(data, self._extras)
+        return packet_candidates(data, self._extras)
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Make samples of whole packets, and keep the others that matter."""
-        whole = packets(data, found)
+        whole = read_headers(data, found)
         self._put_aside(data, whole)
-        for name, kind in KINDS.items():
-            if name not in self.heard and np.any(whole.identifiers == kind.identifier):
-                self.heard.add(name)
+        for name, kind in MESSAGE_KINDS.items():
+            if name not in self.messages_heard and np.any(
+                whole.identifiers == kind.identifier
+            ):
+                self.messages_heard.add(name)
         of = np.flatnonzero(whole.identifiers == self.kind.identifier)
         if not len(of):
             return None
         mine = of[self._chosen(whole.take(of))]
         size = self.kind.layout.itemsize
-        bodies = payloads(data, whole.take(mine), size)
+        bodies = padded_payloads(data, whole.take(mine), size)
         fields = np.ascontiguousarray(bodies).view(self.kind.layout)[:, 0]
         keep = self._fresh(fields)
         return self._in_units(fields[keep], t_host[mine[keep]])
 
-    def _put_aside(self, data: Bytes, whole: Packets) -> None:
-        for i in np.flatnonzero(np.isin(whole.identifiers, ASIDE)).tolist():
+    def _put_aside(self, data: Bytes, whole: PacketHeaders) -> None:
+        for i in np.flatnonzero(np.isin(whole.identifiers, OTHER_MESSAGES)).tolist():
             text = bytearray(data[whole.starts[i] : whole.ends[i]].tobytes())
             try:
                 message = self._parser.decode(text)
             except self._broken:
                 self.health.bad += 1
                 continue
-            self.aside.append(message)
+            self.other_messages.append(message)
             if message.get_type() == "HEARTBEAT":
                 who = (message.get_srcSystem(), message.get_srcComponent())
                 self.autopilots[who] = int(message.autopilot)
-        del self.aside[:-MOST_ASIDE]
+        del self.other_messages[:-MOST_OTHER_MESSAGES]
 
-    def _chosen(self, some: Packets) -> NDArray[np.bool_]:
+    def _chosen(self, some: PacketHeaders) -> NDArray[np.bool_]:
         """Which packets are the vehicle's."""
         pairs = list(zip(some.systems.tolist(), some.components.tolist(), strict=True))
-        allowed = [pair for pair in pairs if self.wants(*pair)]
+        allowed = [pair for pair in pairs if self.accepts(*pair)]
         self.sources.update(allowed)
         if allowed:
-            self.choose(*allowed[0])
+            self.choose_vehicle(*allowed[0])
         return np.array([pair == self._vehicle for pair in pairs])
 
     def _fresh(self, fields: Fields) -> NDArray[np.bool_]:
@@ -226,12 +228,14 @@ class Decoder(Codec):
         fields = np.concatenate([some for some, _ in self._waiting])
         t_host = np.concatenate([some for _, some in self._waiting])
         acc = as_doubles(fields["acc"])
-        for end in range(FEW, min(len(acc), ENOUGH) + 1, FEW):
-            if unit := recognised_unit(acc[end - FEW : end], self.kind.whole):
+        for end in range(
+            UNIT_SAMPLES, min(len(acc), MOST_UNIT_SAMPLES) + 1, UNIT_SAMPLES
+        ):
+            if unit := recognise_unit(acc[end - UNIT_SAMPLES : end], self.kind.whole):
                 self.acc_unit, self._waiting = unit, []
                 return self._block(fields, t_host)
-        if len(acc) >= ENOUGH:
-            raise refuse_units(acc[:ENOUGH], self.kind.whole, self.message)
+        if len(acc) >= MOST_UNIT_SAMPLES:
+            raise unit_error(acc[:MOST_UNIT_SAMPLES], self.kind.whole, self.message)
         return None
 
     def _block(self, fields: Fields, t_host: Array) -> Block | None:

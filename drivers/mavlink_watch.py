@@ -1,111 +1,114 @@
-"""Reads what an autopilot has installed again and again, and tells whether it changed.
+"""Reads the installed calibration of an autopilot repeatedly, and detects changes.
 
 An autopilot changes its own calibration: it averages its gyroscopes at each start
 (ArduPilot's INS_GYR_CAL) or at rest (PX4's SENS_IMU_AUTOCAL), and somebody else may set
 a parameter meanwhile. So one reading holds for the samples before it only if the next
 one says the same.
 
-A *round* asks for every parameter; after a restart `STABLE` rounds in a row must agree,
-since the first may come from before the gyroscopes were averaged. No I/O and no clock.
+A *round* asks for every parameter; after a restart `STABLE_ROUNDS` rounds in a row must
+agree, since the first may come from before the gyroscopes were averaged. No I/O and no
+clock.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fieldcal.drivers.mavlink_installed import Installed, names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
 
-STABLE = 2
-"""Rounds in a row that must say the same after a restart."""
+STABLE_ROUNDS = 2
+"""Successive rounds that must agree after a restart."""
 
-CLOSE = 1e-6
-"""Relative difference of a value that is the same: it travels in 32 bits."""
+RELATIVE_TOLERANCE = 1e-6
+"""Relative difference of equal values, which are sent in 32 bits."""
 
 
 class InstalledWatch:
-    """Rounds of questions for the installed calibration of one sensor.
+    """Rounds of requests for the installed calibration of one sensor.
 
     Parameters
     ----------
-    installed : what is known, which is kept up to date
+    installed : the calibration to keep up to date
 
     Attributes
     ----------
-    readings : rounds that said what was known before
-    changes : rounds that said something else
-    answers : whether it has ever answered for all parameters
+    readings : rounds without a change
+    changes : rounds with a change
+    has_answered : whether all parameters were ever received
 
     """
 
-    def __init__(self, installed: Installed) -> None:
+    def __init__(self, installed: InstalledCalibration) -> None:
         self.installed = installed
-        known = names(installed.autopilot, installed.instance)
+        known = parameter_names(installed.autopilot, installed.instance)
         self._names = {name for some in known.values() for name in some}
         self._heard: dict[str, float] = {}
-        self._left = STABLE if self._names else 0
+        self._left = STABLE_ROUNDS if self._names else 0
         self.readings = self.changes = 0
-        self.answers = not self._names
+        self.has_answered = not self._names
 
     @property
-    def waits(self) -> bool:
+    def is_reading(self) -> bool:
         """Whether a round is under way."""
         return self._left > 0
 
     @property
-    def open(self) -> list[str]:
-        """Parameters that this round has not heard yet."""
+    def unheard(self) -> list[str]:
+        """Parameters that this round has not received yet."""
         return sorted(self._names - self._heard.keys())
 
-    def again(self, rounds: int = 1) -> None:
-        """Begin anew: what comes from now on counts, until so many rounds agree."""
+    def start_over(self, rounds: int = 1) -> None:
+        """Start a new round; read until so many rounds agree."""
         self._heard = {}
         self._left = max(self._left, rounds) if self._names else 0
 
     def give_up(self) -> None:
-        """Ask no more: it does not answer; what it did say is known."""
+        """Stop reading without an answer; values received so far are kept."""
         self._left = 0
         self.installed.values |= self._heard
 
     def hear(self, name: str, value: float) -> bool:
-        """Take note of a value; whether it ends a round."""
+        """Process a value; returns whether it completes a round."""
         if name not in self._names:
             return False
-        if self.answers and not self.waits:
-            if close(self.installed.used.get(name), value):
+        if self.has_answered and not self.is_reading:
+            if is_unchanged(self.installed.in_samples.get(name), value):
                 return False
-            self.again(STABLE)  # it was told unasked that something has changed
+            self.start_over(STABLE_ROUNDS)  # an unrequested value shows a change
         self._heard[name] = value
-        if self.open:
+        if self.unheard:
             return False
         self._end()
         return True
 
     def _end(self) -> None:
-        """Compare what a round has heard with what was known."""
-        used = self.installed.used
-        if self.answers and all(close(used.get(n), v) for n, v in self._heard.items()):
+        """Compare the values of a round with the known ones."""
+        used = self.installed.in_samples
+        if self.has_answered and all(
+            is_unchanged(used.get(n), v) for n, v in self._heard.items()
+        ):
             self.readings += 1
             self._left -= 1
         else:
-            self.changes += self.answers
-            self._left = max(self._left, STABLE) - 1
-        self.answers = True
+            self.changes += self.has_answered
+            self._left = max(self._left, STABLE_ROUNDS) - 1
+        self.has_answered = True
         self._know(self._heard)
         self._heard = {}
 
     def _know(self, heard: Mapping[str, float]) -> None:
-        self.installed.used = dict(heard)
+        self.installed.in_samples = dict(heard)
         if not self.installed.taken_out:
             self.installed.values |= heard
 
 
-def close(kept: float | None, value: float) -> bool:
-    """Whether a parameter is what it was.
+def is_unchanged(kept: float | None, value: float) -> bool:
+    """Whether a parameter has its earlier value; both may be nan.
 
-    >>> close(0.1, 0.10000000149), close(0.1, 0.1001), close(None, 0.1)
-    (True, False, False)
+    >>> [is_unchanged(kept, 0.1) for kept in (0.10000000149, 0.1001, None)]
+    [True, False, False]
     """
     if kept is None:
         return False
     both_unknown = kept != kept and value != value
-    return both_unknown or abs(kept - value) <= CLOSE * abs(value)
+    return both_unknown or abs(kept - value) <= RELATIVE_TOLERANCE * abs(value)

@@ -74,7 +74,7 @@ class Options:
             )
         return number
 
-    def fixed(self, **values: str) -> Options:
+    def with_fixed(self, **values: str) -> Options:
         """Return these options with some that cannot be chosen."""
         for name in values:
             if name in self._given:
@@ -99,10 +99,10 @@ class Options:
             )
 
 
-def split(address: str, owner: str) -> tuple[str, Options]:
+def split_address(address: str, owner: str) -> tuple[str, Options]:
     """Split an address into what is before the question mark, and its options.
 
-    >>> place, options = split("/dev/ttyUSB0?baud=9600", "serial")
+    >>> place, options = split_address("/dev/ttyUSB0?baud=9600", "serial")
     >>> place, options.number("baud", 115200)
     ('/dev/ttyUSB0', 9600.0)
     """

@@ -7,25 +7,25 @@ from time import monotonic
 from typing import NamedTuple
 
 from fieldcal.core.errors import DeviceError
-from fieldcal.drivers.codec import codec_class, formats, recognise
-from fieldcal.drivers.mavlink_heard import detect_autopilot
+from fieldcal.drivers.codec import codec_class, recognise_format, wire_formats
+from fieldcal.drivers.mavlink_detection import detect_autopilot
 from fieldcal.drivers.reader import ByteSource
 from fieldcal.drivers.serial_imu import open_port
 
-SILENT = 2
+SILENT_RATES = 2
 """Baud rates at which not a byte came, after which there is no device."""
 
-OPEN = (
+UNKNOWN_GYRO_UNIT = (
     "; nothing tells the unit of its gyroscopes at rest: rad/s is taken, add"
     " &gyr_unit=deg/s if they send that (a run sees it by the first turn)"
 )
 """What is said of lines whose rates may be in either unit."""
 
-ENOUGH = 4000
+ENOUGH_BYTES = 4000
 """Bytes after which a format shows."""
 
 
-AT_ONCE, OLD = 0.003, 0.3
+OLD_BYTE_DELAY, LONGEST_OLD_READ = 0.003, 0.3
 """Bytes that are there within the first time, s, had come before we listened; they are
 read for at most the second time, s: a quick device always has some."""
 
@@ -52,28 +52,28 @@ class DetectedDevice(NamedTuple):
     says: str
 
 
-def bauds() -> list[int]:
+def baud_rates() -> list[int]:
     """Baud rates to try: what most formats use first."""
     ranked: dict[int, float] = {}
-    for name in formats():
+    for name in wire_formats():
         for rank, baud in enumerate(codec_class(name).bauds):
             ranked[baud] = ranked.get(baud, 0.0) + 1 / (1 + rank)
     return sorted(ranked, key=lambda baud: -ranked[baud])
 
 
-def probe(
+def probe_port(
     port: str, seconds: float, rates: Iterable[int] | None = None
 ) -> DetectedDevice:
     """Listen at one baud rate after the other, at most so many seconds each."""
     heard = silent = 0
-    for baud in bauds() if rates is None else rates:
+    for baud in baud_rates() if rates is None else rates:
         try:
-            data, found = _answer(port, baud, seconds)
+            data, found = _listen_at(port, baud, seconds)
         except (DeviceError, OSError) as fault:
             return DetectedDevice(port, "", "", 0, 0.0, str(fault))
         heard += len(data)
         silent += not data
-        if silent >= SILENT and not heard:
+        if silent >= SILENT_RATES and not heard:
             break
         if found:
             return found
@@ -85,7 +85,7 @@ def probe(
     return DetectedDevice(port, "", "", 0, 0.0, says)
 
 
-def _told(
+def _identify(
     port: str, baud: int, data: bytes, took: float, old: int = 0
 ) -> DetectedDevice | None:
     """Say whose bytes these are; None if that is not known.
@@ -94,14 +94,14 @@ def _told(
     the others came in `took` s.
     """
     took *= len(data) / max(1, len(data) - old)
-    if known := recognise(data, took):
+    if known := recognise_format(data, took):
         name, like = known
         query = f"&{like.query}" if like.query else ""
         url = f"serial:{port}?format={name}&baud={baud}{query}"
         rate = like.samples / took
         says = f"{name} at {baud} baud, about {rate:.0f} samples a second"
         if "gx" in query and "gyr_unit" not in query:
-            says += OPEN
+            says += UNKNOWN_GYRO_UNIT
         return DetectedDevice(port, url, name, baud, rate, says)
     if heard := detect_autopilot(data):
         query = f"&{heard.query}" if heard.query else ""
@@ -114,27 +114,29 @@ def _told(
     return None
 
 
-def _answer(
+def _listen_at(
     port: str, baud: int, seconds: float
 ) -> tuple[bytes, DetectedDevice | None]:
     """Bytes of a port, and whose they are; it stays open until that is known."""
     link = open_port(port, baud)
     try:
-        data = _waiting(link)
+        data = _read_old_bytes(link)
         old, took, begin = len(data), 0.0, monotonic()
-        while took < seconds and not (len(data) > old + ENOUGH and took > seconds / 4):
+        while took < seconds and not (
+            len(data) > old + ENOUGH_BYTES and took > seconds / 4
+        ):
             data += link.read()
             took = monotonic() - begin
-        return bytes(data), _told(port, baud, bytes(data), took, old)
+        return bytes(data), _identify(port, baud, bytes(data), took, old)
     finally:
         link.close()
 
 
-def _waiting(link: ByteSource) -> bytearray:
+def _read_old_bytes(link: ByteSource) -> bytearray:
     """What had come before we listened, such as all that a pty keeps for nobody."""
     data, begin = bytearray(), monotonic()
-    while (asked := monotonic()) - begin < OLD:
+    while (asked := monotonic()) - begin < LONGEST_OLD_READ:
         data += link.read()
-        if monotonic() - asked > AT_ONCE:
+        if monotonic() - asked > OLD_BYTE_DELAY:
             break
     return data

@@ -19,10 +19,10 @@ from typing import NamedTuple, Protocol
 from fieldcal.core.errors import DeviceError, LinkLost
 from fieldcal.drivers.driver import host_clock
 
-BATCH = 0.02
+DELIVERY_INTERVAL = 0.02
 """Shortest time between two deliveries, s: a batch costs the same however long."""
 
-RETRY = 0.1
+RETRY_INTERVAL = 0.1
 """Time between two attempts to open a broken link again, s."""
 
 
@@ -93,7 +93,9 @@ class Reader:
         """
         deadline = time.monotonic() + timeout
         with self._changed:
-            self._await(self._limit // 2, min(deadline, self._delivered + BATCH))
+            self._await(
+                self._limit // 2, min(deadline, self._delivered + DELIVERY_INTERVAL)
+            )
             self._await(1, deadline)
             chunks, self._chunks, self._held = self._chunks, [], 0
             self._delivered = time.monotonic()
@@ -169,7 +171,7 @@ class Reader:
         try:
             while not self._closing and time.monotonic() < self._deadline:
                 with self._changed:
-                    self._changed.wait_for(lambda: self._closing, RETRY)
+                    self._changed.wait_for(lambda: self._closing, RETRY_INTERVAL)
                 try:
                     self._source = self._connect()
                 except (OSError, DeviceError):

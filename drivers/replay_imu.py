@@ -21,17 +21,17 @@ from fieldcal.core.errors import InputError, RecordingEnded
 from fieldcal.core.samples import Block, Grain, concat
 from fieldcal.drivers import can_log, mavlink_log
 from fieldcal.drivers.codec import open_codec
-from fieldcal.drivers.driver import Driver, Health
-from fieldcal.drivers.options import Options, split
-from fieldcal.drivers.pace import Pace, speed
+from fieldcal.drivers.driver import Driver, LinkHealth
+from fieldcal.drivers.options import Options, split_address
+from fieldcal.drivers.playback import PlaybackClock, playback_speed
 from fieldcal.evaluation.observations import reported_grain
 from fieldcal.session.folder import Session
-from fieldcal.session.sample_files import ENDINGS, read
+from fieldcal.session.sample_files import ENDINGS, read_samples
 
-PIECE = 0.5
+LONGEST_DELIVERY = 0.5
 """Longest stretch delivered at once, s of device time."""
 
-CUT = 1 << 20
+BYTES_AT_ONCE = 1 << 20
 """Bytes of a log decoded at once."""
 
 
@@ -39,14 +39,14 @@ class ReplayImu(Driver):
     """A recording that is played as if the device were there."""
 
     def __init__(self, address: str) -> None:
-        place, options = split(address, "replay")
+        place, options = split_address(address, "replay")
         bytes_of_a_port = bool(options.text("format"))
         self._player: Driver
-        if can_log.is_log(place) and not bytes_of_a_port:
+        if can_log.is_can_log(place) and not bytes_of_a_port:
             from fieldcal.drivers import can_imu
 
             self._player = can_imu.CanImu(address)
-        elif mavlink_log.is_log(place) and not bytes_of_a_port:
+        elif mavlink_log.is_mavlink_log(place) and not bytes_of_a_port:
             from fieldcal.drivers import mavlink_imu
 
             self._player = mavlink_imu.MavlinkImu(address)
@@ -88,17 +88,17 @@ class _ReplayedSamples(Driver):
     """Samples of a recording, delivered when they are due."""
 
     def __init__(self, address: str) -> None:
-        place, options = split(address, "replay")
-        played_at = speed(options)
+        place, options = split_address(address, "replay")
+        played_at = playback_speed(options)
         self.name = place
         self._grain = Grain()
         self._block = self._load(Path(place), options)
         options.finish()
         if not len(self._block):
             raise InputError(f"{place} holds no sample; check format and options")
-        self.health = Health()
+        self.health = LinkHealth()
         self._next = 0
-        self._pace = Pace(float(self._block.t[0]), played_at)
+        self._pace = PlaybackClock(float(self._block.t[0]), played_at)
         self._now = float(self._block.t_host[0])
 
     def _load(self, place: Path, options: Options) -> Block:
@@ -107,9 +107,9 @@ class _ReplayedSamples(Driver):
             self._grain = reported_grain(session)
             return session.block
         if place.is_file() and not place.name.endswith(ENDINGS):
-            block, self._grain = decoded(place, options)
+            block, self._grain = decode_file(place, options)
             return block
-        return load(place)
+        return load_samples(place)
 
     @property
     def grain(self) -> Grain:
@@ -132,7 +132,7 @@ class _ReplayedSamples(Driver):
         t, i = self._block.t, self._next
         if i == len(t):
             raise RecordingEnded(self.name, float(t[-1] - t[0]))
-        until = min(self._pace.wait(float(t[i]), timeout), t[i] + PIECE)
+        until = min(self._pace.wait(float(t[i]), timeout), t[i] + LONGEST_DELIVERY)
         if until < t[i]:
             return None
         end = int(np.searchsorted(t, until, side="right"))
@@ -146,7 +146,7 @@ class _ReplayedSamples(Driver):
         self._next = len(self._block)
 
 
-def load(place: Path) -> Block:
+def load_samples(place: Path) -> Block:
     """Read the samples of a file.
 
     Raises
@@ -157,10 +157,10 @@ def load(place: Path) -> Block:
     """
     if not place.is_file():
         raise InputError(f"{place}: there is no such session or log")
-    return read(place)[0]
+    return read_samples(place)[0]
 
 
-def decoded(place: Path, options: Options) -> tuple[Block, Grain]:
+def decode_file(place: Path, options: Options) -> tuple[Block, Grain]:
     """Decode the bytes of a port; the samples, and what their format rounds to.
 
     Raises
@@ -178,6 +178,6 @@ def decoded(place: Path, options: Options) -> tuple[Block, Grain]:
     opened = gzip.open if place.suffix == ".gz" else open
     blocks = []
     with opened(place, "rb") as file:
-        while data := file.read(CUT):
+        while data := file.read(BYTES_AT_ONCE):
             blocks.append(codec.feed(data))
     return concat(block for block in blocks if block is not None), codec.grain

@@ -16,20 +16,20 @@ import serial
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block, Grain
-from fieldcal.drivers.codec import open_codec, recognise
+from fieldcal.drivers.clock_comparison import ClockComparison
+from fieldcal.drivers.codec import open_codec, recognise_format
 from fieldcal.drivers.driver import Driver
-from fieldcal.drivers.mavlink_heard import detect_autopilot
-from fieldcal.drivers.options import split
+from fieldcal.drivers.mavlink_detection import detect_autopilot
+from fieldcal.drivers.options import split_address
 from fieldcal.drivers.reader import Chunk, Reader
-from fieldcal.drivers.skew import Skew
-from fieldcal.drivers.tcp import POLL, Tcp
+from fieldcal.drivers.tcp import POLL_TIME, TcpLink
 
-SOCKET = "socket://"
+SOCKET_PREFIX = "socket://"
 
-RECENT = 1 << 14
+RECENT_BYTES = 1 << 14
 """Bytes kept to tell what it is that comes, if it is not the format."""
 
-REASONS = {
+PORT_ERRORS = {
     errno.ENOENT: "there is no such port; plug it in, or see `fieldcal ports`",
     errno.ENXIO: "nothing is plugged in there; see `fieldcal ports`",
     errno.ENODEV: "nothing is plugged in there; see `fieldcal ports`",
@@ -43,7 +43,7 @@ REASONS = {
 }
 
 
-class _Whole(serial.Serial):  # type: ignore[misc]
+class _UnflushedPort(serial.Serial):  # type: ignore[misc]
     """A port that keeps what came while it was being opened."""
 
     def _reset_input_buffer(self) -> None:
@@ -63,17 +63,21 @@ class SerialPort:
     def __init__(self, port: str, baud: int) -> None:
         try:
             if "://" in port:
-                self._serial = serial.serial_for_url(port, baud, timeout=POLL)
+                self._serial = serial.serial_for_url(port, baud, timeout=POLL_TIME)
             else:
-                self._serial = _Whole(port, baud, timeout=POLL, exclusive=True)
+                self._serial = _UnflushedPort(
+                    port, baud, timeout=POLL_TIME, exclusive=True
+                )
         except ValueError as fault:
             raise InputError(f"cannot open {port} at {baud} baud: {fault}") from fault
         except Exception as fault:
             # not only OSError: pyserial lets termios.error through
-            raise DeviceError(f"cannot open {port}: {reason(fault)}") from fault
+            raise DeviceError(
+                f"cannot open {port}: {port_error_text(fault)}"
+            ) from fault
 
     def read(self) -> bytes:
-        """Return all that is there, waiting `POLL` seconds for the first byte."""
+        """Return all that is there, waiting `POLL_TIME` seconds for the first byte."""
         data: bytes = self._serial.read(max(1, self._serial.in_waiting))
         return data
 
@@ -86,17 +90,17 @@ class SerialPort:
         self._serial.close()
 
 
-def open_port(port: str, baud: int) -> SerialPort | Tcp:
+def open_port(port: str, baud: int) -> SerialPort | TcpLink:
     """Open a port, or ``socket://HOST:PORT``; errors as of these.
 
     pyserial reads a socket byte by byte, and forgets the last ones when it closes.
     """
-    if not port.startswith(SOCKET):
+    if not port.startswith(SOCKET_PREFIX):
         return SerialPort(port, baud)
-    host, _, number = port.removeprefix(SOCKET).rstrip("/").rpartition(":")
+    host, _, number = port.removeprefix(SOCKET_PREFIX).rstrip("/").rpartition(":")
     if not host or not number.isdecimal() or not 0 < int(number) < 65536:
         raise InputError(f"{port} needs host and port, as in socket://192.168.1.5:4001")
-    return Tcp((host, int(number)))
+    return TcpLink((host, int(number)))
 
 
 class SerialImu(Driver):
@@ -105,7 +109,7 @@ class SerialImu(Driver):
     faults: ClassVar[tuple[type[Exception], ...]] = (OSError,)
 
     def __init__(self, address: str) -> None:
-        port, options = split(address, "serial")
+        port, options = split_address(address, "serial")
         if not port:
             raise InputError("serial: name a port, such as serial:/dev/ttyUSB0")
         self.name = port
@@ -113,7 +117,7 @@ class SerialImu(Driver):
         self._codec = open_codec(self._format, options)
         self._heard: list[Chunk] = []
         self.health = self._codec.health
-        self._skew = Skew(self.health)
+        self._skew = ClockComparison(self.health)
         baud = int(options.number("baud", self._codec.bauds[0], 50, 1e8))
         self._baud = baud
         patience = options.number("reconnect", 10.0, 0.0, 86400.0)
@@ -140,7 +144,7 @@ class SerialImu(Driver):
                 self._heard = []
                 self._skew.add(block.t, block.t_host)
                 return block
-            self._heard = recent([*self._heard, *chunks])
+            self._heard = last_chunks([*self._heard, *chunks])
             if monotonic() >= deadline:
                 return None
 
@@ -150,7 +154,7 @@ class SerialImu(Driver):
 
     def _garbage(self) -> str:
         data = b"".join(chunk.data for chunk in self._heard)
-        known = recognise(data, self._heard[-1].t_host - self._heard[0].t_host)
+        known = recognise_format(data, self._heard[-1].t_host - self._heard[0].t_host)
         if known is None and (heard := detect_autopilot(data)):
             query = f"&{heard.query}" if heard.query else ""
             return (
@@ -173,8 +177,8 @@ class SerialImu(Driver):
         return f"{said}; try format={name}{query}"
 
 
-def recent(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """Return the last chunks: as few as hold `RECENT` bytes, or all.
+def last_chunks(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """Return the last chunks: as few as hold `RECENT_BYTES` bytes, or all.
 
     What comes is judged by how many bytes came in which time, and a link that floods
     with noise must not fill the memory.
@@ -182,19 +186,19 @@ def recent(chunks: Sequence[Chunk]) -> list[Chunk]:
     kept: list[Chunk] = []
     size = 0
     for chunk in reversed(chunks):
-        if size >= RECENT:
+        if size >= RECENT_BYTES:
             break
         kept.append(chunk)
         size += len(chunk.data)
     return kept[::-1]
 
 
-def reason(fault: BaseException) -> str:
+def port_error_text(fault: BaseException) -> str:
     """Say why a port did not open, and what to do."""
     link: BaseException | None = fault
     while link is not None:
         number = link.args[0] if link.args else None
-        if isinstance(number, int) and number in REASONS:
-            return REASONS[number]
+        if isinstance(number, int) and number in PORT_ERRORS:
+            return PORT_ERRORS[number]
         link = link.__context__
     return str(fault)

@@ -1,4 +1,4 @@
-"""A stream of bytes from a network socket, as a reader wants it."""
+"""A TCP connection as a source of bytes."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ import socket
 
 from fieldcal.core.errors import DeviceError
 
-POLL = 0.1
-"""Longest wait for a byte before the reader looks whether it should end, s."""
+POLL_TIME = 0.1
+"""Longest wait for a byte, s; then the reader checks whether it should end."""
 
-SIZE = 1 << 16
-CALL = 5.0
-"""How long a call may take to be answered, s."""
+BYTES_AT_ONCE = 1 << 16
+CONNECT_TIMEOUT = 5.0
+"""Longest time for connecting, s."""
 
 
-class Tcp:
-    """A call to a device that waits for one.
+class TcpLink:
+    """A TCP connection to a device.
 
     Raises
     ------
     DeviceError
-        If nobody answers.
+        If the connection fails.
 
     """
 
     def __init__(self, place: tuple[str, int]) -> None:
         self._place = place
         try:
-            self._socket = socket.create_connection(place, CALL)
+            self._socket = socket.create_connection(place, CONNECT_TIMEOUT)
         except OSError as fault:
             raise DeviceError(socket_error(place, fault)) from fault
 
     def read(self) -> bytes:
-        """Return all that is there, waiting `POLL` seconds for the first byte.
+        """Return all that is there, waiting `POLL_TIME` seconds for the first byte.
 
         Raises
         ------
@@ -41,10 +41,10 @@ class Tcp:
             If the peer has closed.
 
         """
-        ready, _, _ = select.select([self._socket], [], [], POLL)
+        ready, _, _ = select.select([self._socket], [], [], POLL_TIME)
         if not ready:
             return b""
-        data = self._socket.recv(SIZE)
+        data = self._socket.recv(BYTES_AT_ONCE)
         if not data:
             raise ConnectionResetError(f"{self._place[0]}:{self._place[1]} has closed")
         return data

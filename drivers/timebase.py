@@ -1,10 +1,11 @@
-"""The time of each sample: what gives it, and how from a declared rate.
+"""Timebase: gives each sample its time; here from a declared rate.
 
     t_k = k / rate, k counting also the samples known to be missing             (1)
 
-Where a device that has run in real time says nothing for more than `PAUSE`, and what
-comes then is not the samples of that time in a heap, time goes on as the host saw it.
-All in s; k sample number. `Stamps` and `Arrivals` are beside this, and `Clock` chooses.
+If a device that runs in real time is silent for more than `LEAST_PAUSE`, and does not
+send the samples of that time afterwards, the time of the host is added. All in s; k
+sample number. `StampTimebase` and `ArrivalTimebase` are alternatives; `ChosenTimebase`
+selects one of them.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from typing import Protocol
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 
-PAUSE = 1.0
-"""Arrivals so far apart are no jitter, s."""
+LEAST_PAUSE = 1.0
+"""Least time between arrivals that is no jitter, s."""
 
-AT_ONCE = 0.05
-"""What waited in a buffer comes within this, s."""
+BUFFERED_TIME = 0.05
+"""Time within which buffered samples arrive, s."""
 
-IN_STEP = 0.2
-"""How far a device that runs in real time may be off its declared rate, relative."""
+RATE_TOLERANCE = 0.2
+"""Relative difference from the declared rate up to which a device runs in real time."""
 
 _NAN = float("nan")
 
@@ -43,11 +44,11 @@ class Timebase(Protocol):
 
         """
 
-    def broken(self) -> None:
-        """Take note that the link was away before the next sample."""
+    def link_broken(self) -> None:
+        """Note that the link was interrupted before the next sample."""
 
 
-class Rate:
+class RateTimebase:
     """Times from a declared rate, (1).
 
     Parameters
@@ -57,17 +58,19 @@ class Rate:
 
     """
 
-    def __init__(self, health: Health, rate: float) -> None:
+    def __init__(self, health: LinkHealth, rate: float) -> None:
         self._health, self._period = health, 1.0 / rate
         self._base, self._k = 0.0, -1
         self._host = self._host0 = _NAN
         self._broken = False
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
-        """Return times (n,); over a broken link time goes on as the host saw it."""
+        """Return times (n,); the host's time bridges an interruption of the link."""
         if self._broken:
             self._mend(float(t_host[0]))
-        pauses = np.flatnonzero(np.diff(t_host, prepend=self._host) > PAUSE).tolist()
+        pauses = np.flatnonzero(
+            np.diff(t_host, prepend=self._host) > LEAST_PAUSE
+        ).tolist()
         edges = [*dict.fromkeys([0, *pauses]), len(steps)]
         parts = []
         for begin, end in pairwise(edges):
@@ -87,19 +90,19 @@ class Rate:
         return t
 
     def _pause(self, steps: Array, t_host: Array) -> None:
-        """Tell a device that was silent from samples that only waited for us."""
+        """Add the missing time, if the samples of a pause were not merely buffered."""
         told, seen = self._k * self._period, self._host - self._host0
-        if not (seen > PAUSE and abs(told / seen - 1) < IN_STEP):
-            return  # it does not run in real time: arrivals say nothing of it
-        came = np.sum(steps[t_host < t_host[0] + AT_ONCE]) * self._period
-        waited = max(0.0, float(came) - AT_ONCE)
+        if not (seen > LEAST_PAUSE and abs(told / seen - 1) < RATE_TOLERANCE):
+            return  # not in real time: arrivals give no information
+        came = np.sum(steps[t_host < t_host[0] + BUFFERED_TIME]) * self._period
+        waited = max(0.0, float(came) - BUFFERED_TIME)
         away = float(t_host[0]) - self._host
         if waited < away / 2:
             self._health.missing += round((away - waited) / self._period) - 1
             self._mend(float(t_host[0]))
 
-    def broken(self) -> None:
-        """Have the next sample begin after a gap."""
+    def link_broken(self) -> None:
+        """Note that a gap precedes the next sample."""
         self._broken = self._k >= 0
 
     def _mend(self, host: float) -> None:

@@ -77,11 +77,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 @contextlib.contextmanager
 def _nothing_carried_out() -> Iterator[None]:
     """Show what is in the text of others on both streams instead of doing it."""
-    from fieldcal.core.shown import ShownStream
+    from fieldcal.core.escaping import EscapingStream
 
     before = sys.stdout, sys.stderr
     if all(before):  # a program without a console has none
-        sys.stdout, sys.stderr = (cast(TextIO, ShownStream(s)) for s in before)
+        sys.stdout, sys.stderr = (cast(TextIO, EscapingStream(s)) for s in before)
     try:
         yield
     finally:
@@ -101,14 +101,18 @@ def _named(argv: Sequence[str] | None) -> int:
 def _guarded(name: str, arguments: list[str]) -> int:
     """Turn errors into one sentence and an exit code."""
     from fieldcal.core.errors import FieldcalError
-    from fieldcal.core.shown import one_line
+    from fieldcal.core.escaping import escape_line
 
     command, printed = _load(name), False
     try:
         code = command.run(_command_parser(name, command).parse_args(arguments))
         return _flushed(code)
     except FieldcalError as error:
-        said, code, printed = one_line(str(error)), error.exit_code, error.printed
+        said, code, printed = (
+            escape_line(str(error)),
+            error.exit_code,
+            error.printed,
+        )
     except KeyboardInterrupt:
         said, code = "interrupted", INTERRUPTED
     except BrokenPipeError:

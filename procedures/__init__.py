@@ -1,10 +1,9 @@
-"""Procedures: plans for an operator or a script, one a file, found by their names.
+"""Procedures: plans for an operator or a script, one in each file, found by name.
 
-To add one, write procedures/<name>.py with ``POSITIONS``, the positions it takes unless
-the session says others, and ``plan``, a generator of steps
-(`fieldcal.planning.steps`) that returns a `Calibration`. A plan touches no device, no
-clock and no screen. One that finds its positions on the way (`Add`) says in ``MOST``
-how many there are at most.
+To add one, write procedures/<name>.py with ``POSITIONS``, the default positions, and
+``plan``, a generator of steps (`fieldcal.planning.steps`) that returns a `Calibration`.
+A plan uses no device, no clock and no screen. If it chooses positions during the run
+(`Add`), ``MOST`` is their largest number.
 """
 
 from __future__ import annotations
@@ -22,26 +21,26 @@ from fieldcal.session.description import Description
 
 
 class Procedure(Protocol):
-    """What the module of a procedure has."""
+    """Members of a procedure's module."""
 
     POSITIONS: tuple[Position, ...]
     plan: Callable[..., Plan[Calibration]]
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Every procedure there is, in alphabetical order."""
-    return plugins.names(__path__)
+def procedure_names() -> tuple[str, ...]:
+    """Names of all procedures, in alphabetical order."""
+    return plugins.module_names(__path__)
 
 
-def most(about: Description, name: str) -> int | None:
-    """Positions that it ends with at most; None where they are known beforehand."""
-    if name not in names() or not hasattr(procedure(name), "MOST"):
+def max_positions(about: Description, name: str) -> int | None:
+    """Largest number of positions; None for a procedure with fixed positions."""
+    if name not in procedure_names() or not hasattr(load_procedure(name), "MOST"):
         return None
     said = about.raw.get("run", {}).get("most")
-    return int(said or vars(procedure(name))["MOST"])
+    return int(said or vars(load_procedure(name))["MOST"])
 
 
-def procedure(name: str) -> Procedure:
-    """Procedure of that name, which is one of `names`."""
+def load_procedure(name: str) -> Procedure:
+    """Module of a procedure; `name` must be one of `procedure_names`."""
     return cast(Procedure, import_module(f"{__name__}.{name}"))

@@ -1,11 +1,11 @@
-"""As many positions as it takes: each is the one worth most after those before.
+"""Adaptive procedure: chooses the most informative next position, until GO.
 
-It begins with home and both joints turned. After each window it is judged what the
-calibration is good for and what the recording may conceal; the next position is the one
-of the ladder that is expected to tell most of both (`fieldcal.planning.expected_gain`).
-It ends at GO with no position left that would tell much, or where the operator leaves
-out what would; at a cause that is certain and that no position mends; or at the largest
-number of positions.
+It begins with home and both joints turned. After each window the calibration is judged,
+and the recording is examined for unmodelled effects. The next position is the one of
+the ladder with the largest expected gain for both (`fieldcal.planning.expected_gain`).
+The procedure ends at GO, if no position has a considerable gain or the operator left
+out the one that has; at a cause that is certain and that no position removes; or at the
+largest number of positions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,12 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import CalibrationFailed, Skipped
-from fieldcal.core.positions import TWO, Position, forces, ladder
+from fieldcal.core.positions import (
+    TWO_POSITIONS,
+    Position,
+    ladder_settings,
+    specific_forces,
+)
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import angle_setting
 from fieldcal.model import thresholds
@@ -31,52 +36,52 @@ from fieldcal.planning.holding import (
     with_skipped_positions,
 )
 from fieldcal.planning.steps import Judge, Plan, add, note
-from fieldcal.procedures import most
+from fieldcal.procedures import max_positions
 from fieldcal.session.description import Description
 from fieldcal.windows import Average
 
-POSITIONS: tuple[Position, ...] = TWO
-"""What it begins with."""
+POSITIONS: tuple[Position, ...] = TWO_POSITIONS
+"""The first positions."""
 
 MOST = 9
-"""Positions after which it ends, unless the plan says another number."""
+"""Largest number of positions, unless the plan states another."""
 
 LADDER = ((0.0, -22.5, 22.5, -45.0, 45.0), (0.0, -2.5, 2.5, -5.0, 5.0))
-"""Angles alpha and beta that it chooses from unless the plan says others, deg."""
+"""Angles alpha and beta to choose from, unless the plan states others, deg."""
 
-REQUIRED = ("acc_bias", "acc_scale", "gyr_bias")
-"""Groups that are judged whether they were determined or not."""
+REQUIRED_GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
+"""Groups of parameters that are judged, whether determined or not."""
 
-LITTLE = 0.1
-"""Gain, ln, that is not worth a position once it is GO: of one parameter at its limit,
-or of one cause as likely as not, a third."""
+LEAST_GAIN = 0.1
+"""Gain, ln, below which a position is not taken after GO: a third of the gain for one
+parameter at its limit, or for one cause with a probability of one half."""
 
-ALIKE = 0.02
-"""Gains, ln, that differ by less are alike: then the shortest way counts."""
+GAIN_TOLERANCE = 0.02
+"""Difference of gains, ln, that count as equal; the nearest position is then chosen."""
 
 
 def plan(
     about: Description, seconds: float = 30.0, sigma: float | None = None
 ) -> Plan[Calibration]:
-    """Hold the positions of `about`, and further ones until it is known."""
+    """Hold the positions of `about`, and further ones as needed."""
     held = yield from hold_each(about.positions, seconds, sigma)
     positions = list(about.positions)
     refused = {p.degrees for i, p in enumerate(positions) if i not in held}
     content = False
     while True:
         so_far: InterimResult = yield Judge(quick=True)
-        worth, places = _worth(so_far, about, positions, refused)
-        allowed = most(about, "adaptive") or MOST
-        end = _end(so_far, worth, len(positions), allowed, content)
-        if end and so_far.incremental:  # it ends by nothing but a search in full
+        worth, places = _position_gains(so_far, about, positions, refused)
+        allowed = max_positions(about, "adaptive") or MOST
+        end = _reason_to_end(so_far, worth, len(positions), allowed, content)
+        if end and so_far.incremental:  # only a full search may end the procedure
             so_far = yield Judge()
-            worth, places = _worth(so_far, about, positions, refused)
-            end = _end(so_far, worth, len(positions), allowed, content)
+            worth, places = _position_gains(so_far, about, positions, refused)
+            end = _reason_to_end(so_far, worth, len(positions), allowed, content)
         if end:
             yield from note(end)
-            return _ended(so_far, positions, held)
-        place = _choice(worth, places, positions[-1])
-        yield from note(_why(so_far, worth, place))
+            return _final_calibration(so_far, positions, held)
+        place = _best_position(worth, places, positions[-1])
+        yield from note(_reason_for_position(so_far, worth, place))
         one = places[place]
         number = yield from add(one)
         positions.append(one)
@@ -88,57 +93,57 @@ def plan(
             content = so_far.sufficient
 
 
-def _run(about: Description) -> dict[str, Any]:
+def _run_table(about: Description) -> dict[str, Any]:
     return dict(about.raw.get("run", {}))
 
 
-def candidates(about: Description) -> list[Position]:
-    """Positions that the ladder of a session can be set to."""
-    said = _run(about).get("ladder")
+def candidate_positions(about: Description) -> list[Position]:
+    """Positions to which the ladder of a session can be set."""
+    said = _run_table(about).get("ladder")
     if said is not None:
         joints = (said["alpha_deg"], said["beta_deg"])
     elif {p.degrees for p in POSITIONS} <= {p.degrees for p in about.positions}:
         joints = LADDER
     else:
-        return [Position.deg(a, b) for a, b in ladder(about.positions)]
+        return [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
     return [Position.deg(a, b) for a, b in product(*joints)]
 
 
-def _worth(
+def _position_gains(
     so_far: InterimResult,
     about: Description,
     positions: Sequence[Position],
     refused: Collection[tuple[float, float] | None],
 ) -> tuple[PositionGains | None, list[Position]]:
-    """What each position that is left to choose would tell; None if nobody knows."""
-    places = [p for p in candidates(about) if p.degrees not in refused]
+    """Expected gain of each remaining position; None if it cannot be calculated."""
+    places = [p for p in candidate_positions(about) if p.degrees not in refused]
     explanation = so_far.explanation
     if explanation is None or not places:
         return None, places
     angle = float(np.deg2rad(angle_setting(about)))
     likely = explanation.posterior.weights_on_grid
     gain = ExpectedGain(
-        explanation.rows, explanation.inferred, likely, _allowed(so_far), angle
+        explanation.rows, explanation.inferred, likely, _allowed_sigmas(so_far), angle
     )
     return gain.of(places), places
 
 
-def _allowed(so_far: InterimResult) -> dict[str, float]:
-    """Uncertainty that is allowed of each parameter that has to be known."""
-    names = [f"{g}.{a}" for g in REQUIRED for a in "xyz"]
+def _allowed_sigmas(so_far: InterimResult) -> dict[str, float]:
+    """Largest uncertainty of each required parameter."""
+    names = [f"{g}.{a}" for g in REQUIRED_GROUPS for a in "xyz"]
     return {n: so_far.limits.sigma(group_of(n)) or np.inf for n in names}
 
 
-def _end(
+def _reason_to_end(
     so_far: InterimResult,
     worth: PositionGains | None,
     held: int,
     most: int,
     content: bool,
 ) -> str:
-    """Why it ends here, for the operator; empty if it goes on.
+    """Reason to end the procedure, for the operator; empty to continue.
 
-    `content` is whether the operator left out what was asked for beyond GO.
+    `content` is whether the operator left out a position that was requested after GO.
     """
     count = f"after {held} positions"
     if worth is None:
@@ -147,30 +152,30 @@ def _end(
             or "there is none left to choose from"
         )
         return f"{count} nothing can be said of a further one: {why}"
-    little = float(worth.gain.max()) < LITTLE
+    little = float(worth.gain.max()) < LEAST_GAIN
     if so_far.sufficient and little:
         return f"{count} all is known that was asked for"
     if so_far.sufficient and content:
         return "it is GO, and what would tell more was left out"
-    name = _named(so_far)
-    if name and not _uncertain(so_far):
+    name = _certain_causes(so_far)
+    if name and not _fails_by_uncertainty(so_far):
         return f"{count} it is clear what is wrong: {name}"
     if held >= most:
         return f"{count}, the most that were asked for, it ends"
     return ""
 
 
-def _uncertain(so_far: InterimResult) -> bool:
-    """Whether what fails is that something is not known well enough."""
+def _fails_by_uncertainty(so_far: InterimResult) -> bool:
+    """Whether a check of an uncertainty fails, or there is no calibration."""
     return so_far.calibration is None or any(
         n.endswith("uncertainty") or n == "level" for n in so_far.failed_checks
     )
 
 
-def _named(so_far: InterimResult) -> str:
-    """The cause that is certain, and nothing else may stand in its place.
+def _certain_causes(so_far: InterimResult) -> str:
+    """Names of the probable causes, if all are certain and have no alias; else empty.
 
-    What a calibration finds anyway, the tilt of the base among it, is not wrong.
+    Parameters of the calibration, and the tilt of the base, do not count.
     """
     if so_far.sufficient or so_far.explanation is None:
         return ""
@@ -185,20 +190,25 @@ def _named(so_far: InterimResult) -> str:
     return ", ".join(s.name for s in sure) if len(sure) == len(wrong) else ""
 
 
-def _choice(
+def _best_position(
     worth: PositionGains | None, places: Sequence[Position], last: Position
 ) -> int:
-    """The place worth most; of those alike the one nearest to the last position."""
+    """Index of the position of largest gain; of equal ones the nearest to `last`."""
     if worth is None:
         raise CalibrationFailed("there is no position left to choose from")
-    best = np.flatnonzero(worth.gain >= worth.gain.max() - ALIKE).tolist()
-    there, here = forces([places[i] for i in best], 1.0), forces([last], 1.0)
+    best = np.flatnonzero(worth.gain >= worth.gain.max() - GAIN_TOLERANCE).tolist()
+    there, here = (
+        specific_forces([places[i] for i in best], 1.0),
+        specific_forces([last], 1.0),
+    )
     nearest: int = best[int(np.argmin(np.linalg.norm(there - here, axis=1)))]
     return nearest
 
 
-def _why(so_far: InterimResult, worth: PositionGains | None, place: int) -> str:
-    """Why the next position is asked for."""
+def _reason_for_position(
+    so_far: InterimResult, worth: PositionGains | None, place: int
+) -> str:
+    """Reason for the next position, for the operator."""
     told = worth.most_improved(place) if worth else ""
     what = f"the {parameter_title(told)}" if "." in told else f"whether there is {told}"
     if so_far.sufficient:
@@ -207,7 +217,7 @@ def _why(so_far: InterimResult, worth: PositionGains | None, place: int) -> str:
     return f"not GO yet ({lacking}); the next position tells {what}"
 
 
-def _ended(
+def _final_calibration(
     so_far: InterimResult, positions: Sequence[Position], held: dict[int, Average]
 ) -> Calibration:
     if so_far.calibration is None:

@@ -1,14 +1,14 @@
-"""Five positions: the tilt of the base as well, so that it need not be level.
+"""Five positions: also estimates the tilt of the base, which need not be level.
 
-The joint estimate of all parameters from the same averages is several times better
-than the equations one after the other. Source: Avrutov and Pozniak 2023, (15)-(34).
+All parameters are estimated jointly, which is several times more precise than the
+successive equations of the source. Source: Avrutov and Pozniak 2023, (15)-(34).
 """
 
 from __future__ import annotations
 
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.procedures.positions import plan
 
 __all__ = ["POSITIONS", "plan"]
 
-POSITIONS: tuple[Position, ...] = FIVE
+POSITIONS: tuple[Position, ...] = FIVE_POSITIONS

@@ -1,13 +1,12 @@
-"""Any positions: all that they determine, estimated jointly.
+"""Positions of the user's choice: estimates jointly all parameters that they determine.
 
-For sets of positions of one's own. What they leave undetermined is named in the
-warnings.
+Parameters that they do not determine are named in the warnings.
 """
 
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.positions import WIDE, Position
+from fieldcal.core.positions import WIDE_POSITIONS, Position
 from fieldcal.evaluation.observations import angle_setting, build_observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
@@ -15,7 +14,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 
-POSITIONS: tuple[Position, ...] = WIDE
+POSITIONS: tuple[Position, ...] = WIDE_POSITIONS
 
 
 def plan(

@@ -1,15 +1,15 @@
 """Two positions: bias and scale factor of the accelerometers, bias of the gyroscopes.
 
-Home, then both joints turned by small angles. The base must be level: what it is tilted
-by goes into the biases (one degree: 0.17 m/s^2), and two positions cannot see it. How
-level it is has to be said, and is part of every uncertainty.
+Home, then both joints turned by small angles. The base must be level: its tilt enters
+the biases (0.17 m/s^2 for one degree), and two positions cannot determine it. The level
+of the base must be stated, and is part of every uncertainty.
 Source: Avrutov and Pozniak 2023, (11)-(14), (36), (45)-(48).
 """
 
 from __future__ import annotations
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.positions import TWO, Position
+from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.evaluation.observations import angle_setting, build_observations
 from fieldcal.planning.holding import hold_each, with_skipped_positions
 from fieldcal.planning.steps import Plan
@@ -17,7 +17,7 @@ from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors
 from fieldcal.solve import solve
 
-POSITIONS: tuple[Position, ...] = TWO
+POSITIONS: tuple[Position, ...] = TWO_POSITIONS
 
 
 def plan(

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
-from fieldcal.drivers.driver import Driver, Health
+from fieldcal.drivers.driver import Driver, LinkHealth
 from fieldcal.sim_device.device import VirtualDevice
 
 BLOCK_S = 0.1
@@ -38,7 +38,7 @@ class InProcess(Driver):
     def __init__(self, device: VirtualDevice) -> None:
         self.device = device
         self.name = "virtual device"
-        self.health = Health()
+        self.health = LinkHealth()
         self._n = max(1, round(BLOCK_S * device.rate))
 
     def receive(self, timeout: float) -> Block | None:

@@ -15,7 +15,7 @@ from typing import ClassVar
 from urllib.parse import parse_qsl
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import class_in
+from fieldcal.core.plugins import plugin_class
 from fieldcal.core.samples import Block
 
 
@@ -80,7 +80,7 @@ def open_wire(spec: str) -> Wire:
             f"no wire format {name!r} for the virtual device; there are "
             f"{', '.join(formats())}"
         )
-    encoder = class_in(module, Wire)  # type: ignore[type-abstract]
+    encoder = plugin_class(module, Wire)  # type: ignore[type-abstract]
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet
 import tomlkit
 
-from fieldcal.core.positions import FIVE
-from fieldcal.session.sample_files import to_batch
+from fieldcal.core.positions import FIVE_POSITIONS
+from fieldcal.session.sample_files import to_record_batch
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -23,10 +23,10 @@ TILT = (0.8, -0.5)
 
 def five_positions(folder: Path, about: Mapping[str, Any] | None = None) -> Path:
     """Write a session of five positions, off by `TILT`; `about` goes into its toml."""
-    starts = 5.0 + 40.0 * np.arange(len(FIVE))
+    starts = 5.0 + 40.0 * np.arange(len(FIVE_POSITIONS))
     windows = [
         (p.alpha or 0.0, p.beta or 0.0, float(s), float(s) + 30.0)
-        for p, s in zip(FIVE, starts, strict=True)
+        for p, s in zip(FIVE_POSITIONS, starts, strict=True)
     ]
     off = dict(zip(("alpha0_deg", "beta0_deg"), TILT, strict=True))
     effects = (checked_effect("angle_offset", off), checked_effect("earth_rate", {}))
@@ -35,7 +35,7 @@ def five_positions(folder: Path, about: Mapping[str, Any] | None = None) -> Path
     positions = [
         dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
         | {"start_s": w[2], "end_s": w[3]}
-        for p, w in zip(FIVE, windows, strict=True)
+        for p, w in zip(FIVE_POSITIONS, windows, strict=True)
     ]
     tables = {
         "format": 1,
@@ -45,6 +45,6 @@ def five_positions(folder: Path, about: Mapping[str, Any] | None = None) -> Path
         **(about or {}),
     }
     (folder / "session.toml").write_text(tomlkit.dumps(tables))
-    table = pa.Table.from_batches([to_batch(block)])
+    table = pa.Table.from_batches([to_record_batch(block)])
     pyarrow.parquet.write_table(table, folder / "samples.parquet")
     return folder

@@ -10,9 +10,9 @@ import pytest
 
 from fieldcal.core.errors import DeviceError
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.drivers.can_frames import FRAME, Frames, pack
-from fieldcal.drivers.can_groups import CanHealth
-from fieldcal.drivers.can_map import Part, read_map
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import FRAME_DTYPE, Frames, frame_row
+from fieldcal.drivers.can_map import FramePart, read_map
 from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.driver import Driver
 from fieldcal.drivers.options import Options
@@ -52,13 +52,13 @@ def sample(i: int, seq: bool = True) -> list[bytes]:
     rows = []
     for identifier in (32, 33):
         data = struct.pack("<3hBx", i, 2 * i, 3 * i, i % 256 if seq else 0)
-        rows.append(pack(i / 100 + identifier * 1e-5, identifier, False, data))
+        rows.append(frame_row(i / 100 + identifier * 1e-5, identifier, False, data))
     return rows
 
 
 def climate(degrees: float, t: float = 0.0) -> bytes:
     """A frame of the temperature."""
-    return pack(
+    return frame_row(
         t, 34, False, struct.pack("<hHI", round((degrees + 273.15) * 100), 0, 0)
     )
 
@@ -70,21 +70,21 @@ def stream(n: int, seq: bool = True) -> list[bytes]:
 
 def frames(rows: list[bytes]) -> Frames:
     """All of them at once."""
-    return np.frombuffer(b"".join(rows), FRAME)
+    return np.frombuffer(b"".join(rows), FRAME_DTYPE)
 
 
 @cache
-def parts(query: str) -> list[Part]:
+def parts(query: str) -> list[FramePart]:
     """Read a map once."""
     return read_map(Options("can", query))
 
 
 def decode(
     dbc: object, query: str, rows: list[bytes], cuts: list[int] | None = None
-) -> tuple[Block, CanHealth]:
+) -> tuple[Block, CanLinkHealth]:
     """Samples of the frames, given in pieces cut before these numbers."""
     mapped = f"dbc={dbc}&rate=100{query and '&'}{query}"
-    health = CanHealth()
+    health = CanLinkHealth()
     decoder = CanAssembler(parts(mapped), health, Options("can", mapped))
     edges = [0, *(cuts or []), len(rows)]
     blocks = []

@@ -15,7 +15,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldcal.calibration import Nominal
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations
@@ -112,7 +112,7 @@ def practice(name: str) -> tuple[Observations, dict[str, Any]]:
     observations = Observations.of(
         positions,
         averages,
-        gravity(site["latitude_deg"], site["height_m"]),
+        normal_gravity(site["latitude_deg"], site["height_m"]),
         latitude=float(np.deg2rad(site["latitude_deg"])),
         nominal=Nominal(**{k: tuple(v) for k, v in about["nominal"].items()}),
     )

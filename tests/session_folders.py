@@ -11,7 +11,7 @@ import pyarrow as pa
 import tomlkit
 
 from fieldcal.core.samples import Block
-from fieldcal.session.sample_files import to_batch
+from fieldcal.session.sample_files import to_record_batch
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile
 from fieldcal.sim_device.replay import HeldWindow, simulate
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -37,7 +37,7 @@ def write_session(
     if positions:
         about["position"] = list(positions)
     (folder / "session.toml").write_text(tomlkit.dumps(about))
-    batch = to_batch(block)
+    batch = to_record_batch(block)
     with pa.ipc.new_stream(folder / "samples.arrows", batch.schema) as file:
         file.write_batch(batch)
     return folder

@@ -9,7 +9,7 @@ import numpy as np
 from fieldcal.core.samples import Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import Description, parse
+from fieldcal.session.description import Description, parse_description
 
 RATE, G = 50.0, 9.8
 FORCE = {0.0: (0.0, -G, 0.0), 90.0: (-G, 0.0, 0.0)}
@@ -23,7 +23,9 @@ def place(start: float, end: float, alpha: float | None = 0.0) -> dict[str, Any]
 
 def about(*places: dict[str, Any], **tables: Any) -> Description:
     site = {"gravity": G, "latitude_deg": 50.0}
-    return parse({"format": 1, "site": site, "position": list(places), **tables})
+    return parse_description(
+        {"format": 1, "site": site, "position": list(places), **tables}
+    )
 
 
 def samples(seconds: float, seed: int = 1, acc: float = 0.01) -> Block:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.session.folder import Session
 from fieldcal.sim_device import Profile
 
@@ -83,7 +83,7 @@ def test_the_tests_that_walk_what_there_is_find_what_was_added(tree: Path) -> No
 def test_a_command(tree: Path) -> None:
     assert "say how strong gravity is at a place" in said(tree, "--help")
     g = float(said(tree, "gravity", "50.45", "170").split()[0])
-    assert g == pytest.approx(gravity(50.45, 170.0), abs=1e-5)
+    assert g == pytest.approx(normal_gravity(50.45, 170.0), abs=1e-5)
 
 
 def test_a_procedure_and_an_exporter(tree: Path, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from bench import five_positions
 import fieldcal
 from fieldcal.calibration import wording
 from fieldcal.cli import COMMANDS
-from fieldcal.core.positions import SETS, Position
+from fieldcal.core.positions import POSITION_SETS, Position
 from fieldcal.diagnosis.result import Verdict
 from fieldcal.effects import catalogue
 from fieldcal.session.folder import Session
@@ -101,7 +101,7 @@ def test_the_session_that_is_shown_can_be_read(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("drawn")
 def test_drawings_of_positions_turn_the_axes_as_the_frames_say() -> None:
     positions = import_module("drawn.positions")
-    for positions_of in SETS.values():
+    for positions_of in POSITION_SETS.values():
         page = positions.drawings(positions_of)
         assert len(list(ElementTree.fromstring(page))) == len(positions_of)
     ends = {}

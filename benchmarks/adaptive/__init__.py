@@ -24,7 +24,7 @@ from benchmarks.adaptive.least_error import error as error
 from benchmarks.adaptive.least_error import least
 from benchmarks.adaptive.led import APART, Run, led
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.positions import TWO
+from fieldcal.core.positions import TWO_POSITIONS
 from fieldcal.procedures.adaptive import LADDER
 
 USUAL, SEED = 60, 71_000_000
@@ -115,7 +115,7 @@ def _print_errors(rows: Mapping[str, Sequence[tuple[Bench, Run]]]) -> None:
     ]
     print(f"error of adaptive over that of nine: median {np.median(ratio):.2f}")
     stated = float(np.median([b.angles_deg for b, _ in rows["adaptive"]]))
-    begun = [p.degrees or (0.0, 0.0) for p in TWO]
+    begun = [p.degrees or (0.0, 0.0) for p in TWO_POSITIONS]
     nine = error(NINE, APART, stated)
     for count in (4, 5, 6):
         best = least(count, begun, list(product(*LADDER)), APART, stated) / nine

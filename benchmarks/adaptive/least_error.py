@@ -19,7 +19,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from fieldcal.core.frames import in_turned_axes
+from fieldcal.core.frames import in_procedure_axes
 from fieldcal.core.samples import Array
 
 G = 9.81
@@ -94,4 +94,4 @@ def _force(alpha: float, beta: float, tilt: Place = (0.0, 0.0)) -> Array:
     """Specific force on a base that is tilted about x and z, (3,)."""
     up = np.array([0.0, -G, 0.0])
     up = up + np.cross([tilt[0], 0.0, tilt[1]], up)
-    return in_turned_axes(np.array(alpha), np.array(beta), up)
+    return in_procedure_axes(np.array(alpha), np.array(beta), up)

@@ -67,7 +67,7 @@ class NavigatorRuns:
             record(folder, self.sensors, rng, tilt_deg=self.tilt_deg, **self.how)
             start = time.perf_counter()
             found = calibrate_navigator(
-                folder, description.read(folder / "session.toml")
+                folder, description.read_description(folder / "session.toml")
             )
             seconds = time.perf_counter() - start
         named = {

@@ -139,7 +139,7 @@ class Session:
         truth, off = self.profile.truth, self.off
         positions = [self._told(w) for w in self.windows]
         site = self.profile.site
-        return description.parse(
+        return description.parse_description(
             {
                 "format": 1,
                 "device": {"name": "concealed", "grade": self.profile.device.grade},

@@ -21,7 +21,7 @@ KINDS = (
     "", "lever_arm", "g_sensitivity", "time_delay", "cubic", "bandwidth",
     "second_order", "stamp_error", "increments", "flexible_mount",
 )  # fmt: skip
-ABOUT = description.parse({"format": 1})
+ABOUT = description.parse_description({"format": 1})
 
 
 @dataclass(frozen=True)

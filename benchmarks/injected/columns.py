@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from benchmarks.injected.parts import Parts
-from fieldcal.core.frames import force_home, in_turned_axes
-from fieldcal.core.positions import angles, forces
+from fieldcal.core.frames import in_procedure_axes, specific_force_at_home
+from fieldcal.core.positions import alpha_beta_angles, specific_forces
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.result import FoundEffect
 from fieldcal.session.description import Description
@@ -109,26 +109,26 @@ ANGLES = ("base_tilt", "angle_offset", "angle_scale", "gravity_error")
 
 def _of_angles(name: str, parts: Parts, about: Description) -> Iterator[Array]:
     """Change of the force by two angles, or by its length."""
-    alpha, beta = angles(about.positions)
+    alpha, beta = alpha_beta_angles(about.positions)
     alpha, beta = alpha[parts.window], beta[parts.window]
-    home = force_home(about.gravity)
+    home = specific_force_at_home(about.gravity)
 
     def changed(to: Array) -> Array:
-        change = (to - in_turned_axes(alpha, beta, home)) / STEP
+        change = (to - in_procedure_axes(alpha, beta, home)) / STEP
         return np.hstack([change @ about.mounting, np.zeros((len(alpha), 3))])
 
     if name == "gravity_error":
-        yield changed(in_turned_axes(alpha, beta, home * (1 + STEP)))
+        yield changed(in_procedure_axes(alpha, beta, home * (1 + STEP)))
     elif name == "base_tilt":
         for axis in ((STEP, 0.0, 0.0), (0.0, 0.0, STEP)):
-            yield changed(in_turned_axes(alpha, beta, home + np.cross(axis, home)))
+            yield changed(in_procedure_axes(alpha, beta, home + np.cross(axis, home)))
     else:
         by = (1.0, 1.0) if name == "angle_offset" else (alpha, beta)
-        yield changed(in_turned_axes(alpha + STEP * by[0], beta, home))
-        yield changed(in_turned_axes(alpha, beta + STEP * by[1], home))
+        yield changed(in_procedure_axes(alpha + STEP * by[0], beta, home))
+        yield changed(in_procedure_axes(alpha, beta + STEP * by[1], home))
 
 
 def force_said(parts: Parts, about: Description) -> Array:
     """Force on each part by the angles, (m, 3), device axes; nan where unknown."""
-    there: Array = forces(about.positions, about.gravity) @ about.mounting
+    there: Array = specific_forces(about.positions, about.gravity) @ about.mounting
     return there[parts.window]

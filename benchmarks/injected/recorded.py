@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal.core.frames import angles_of
+from fieldcal.core.frames import angles_of_force_direction
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importers import open_recording
@@ -120,11 +120,13 @@ def _told(held: Held) -> Made:
 
 def _said(positions: Sequence[Mapping[str, Any]]) -> Description:
     tables = [dict(p) for p in positions]
-    return description.parse({"format": 1, "site": SITE, "position": tables})
+    return description.parse_description(
+        {"format": 1, "site": SITE, "position": tables}
+    )
 
 
 def _face(name: str, start: float, end: float) -> dict[str, Any]:
-    alpha, beta = np.rad2deg(angles_of(FACES[name]))
+    alpha, beta = np.rad2deg(angles_of_force_direction(FACES[name]))
     return {
         "name": name,
         "alpha_deg": float(alpha),

@@ -54,7 +54,7 @@ class Bench:
 
     Attributes
     ----------
-    places : positions, a name of `SETS`
+    places : positions, a name of `POSITION_SETS`
     faces : positions behind these in which the device is laid by hand
     latitude, height : of the site, deg and m
     tilt : about z and about x, rad

@@ -88,7 +88,7 @@ def listed_often(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, about={**written.about, "position": rows})
 
 
-def gravity_said(written: Written, bench: Bench, rng: Rng) -> Written:
+def gravity_stated(written: Written, bench: Bench, rng: Rng) -> Written:
     """The gravity that is written down is off by 0.05 to 0.3 %."""
     off = rng.uniform(5e-4, 3e-3) * rng.choice([-1, 1])
     return _site(written, gravity=bench.gravity * (1 + off))
@@ -200,6 +200,6 @@ SAID: dict[str, After] = {
     "mounting not said": default_mounting,
     "windows overlapping": overlapping,
     "windows listed 20 times": listed_often,
-    "gravity said wrongly": gravity_said,
+    "gravity said wrongly": gravity_stated,
     "level said wrongly": level_said_wrongly,
 }

@@ -20,7 +20,7 @@ from benchmarks._words import how_many
 from benchmarks.injected.recorded import REAL
 from benchmarks.joint import OFFSET, SIGMA, G, bound, observed
 from benchmarks.papers.sway import through_sway
-from fieldcal.core.positions import FIVE, TWO
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS
 from fieldcal.core.samples import Array
 from fieldcal.solve.closed_form import two_position
 from fieldcal.solve.five_position import axis_estimates
@@ -49,12 +49,12 @@ def tilted() -> Array:
 
     On the device of the experiment, which reads +g on y at home.
     """
-    a, b = np.array([[p.alpha, p.beta] for p in TWO]).T + ONE_DEG
+    a, b = np.array([[p.alpha, p.beta] for p in TWO_POSITIONS]).T + ONE_DEG
     force = G * np.array(
         [-np.sin(a), np.cos(a) * np.cos(b), -np.cos(a) * np.sin(b)]
     )  # (15)
     # the axes of that device stand the other way: its y and z are turned over
-    found = two_position(observed(TWO, force.T * [1, -1, -1]))
+    found = two_position(observed(TWO_POSITIONS, force.T * [1, -1, -1]))
     sign = np.array([1, -1, -1, 1, 1, 1])
     errors: Array = (found.values - [0, 0, 0, 1, 1, 1]) * sign
     return errors
@@ -62,8 +62,8 @@ def tilted() -> Array:
 
 def printed_sigma() -> dict[str, float]:
     """What (20), (26)-(33) make of 1 mm/s^2 in each mean, deg, by table 3's names."""
-    means, _ = OFFSET.means(FIVE)
-    each = axis_estimates(observed(FIVE, means))
+    means, _ = OFFSET.means(FIVE_POSITIONS)
+    each = axis_estimates(observed(FIVE_POSITIONS, means))
     spread = SIGMA * np.sqrt((np.asarray(each.gain) ** 2).sum(axis=(1, 2)))
     by_name = dict(zip(each.names, spread.tolist(), strict=True))
     return {key: by_name[f"{axis}.{name}"] for key, (axis, name) in ANGLES.items()}
@@ -152,7 +152,7 @@ def two_positions(tables: Tables) -> None:
 def five_positions(tables: Tables) -> None:
     """Table 3: errors of the angles, and the noise that would make them."""
     seconds, sigma = tables["table3"]["averaging_s"], printed_sigma()
-    limit = dict(zip(("alpha", "beta"), bound(OFFSET, FIVE)[6:], strict=True))
+    limit = dict(zip(("alpha", "beta"), bound(OFFSET, FIVE_POSITIONS)[6:], strict=True))
     print("\ntable 3, deg; sigma for 1 mm/s^2 in each mean")
     heading = "".join(f"{s:>8} s" for s in seconds)
     print(f"{'':14}{heading}  printed solution  bound of one joint fit")

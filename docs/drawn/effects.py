@@ -9,7 +9,7 @@ import io
 from functools import cache
 from typing import Any
 
-from fieldcal.core.positions import WIDE
+from fieldcal.core.positions import WIDE_POSITIONS
 from fieldcal.core.samples import Array, Block
 from fieldcal.physics.effect import Effect
 from fieldcal.sim_device.effects import kind
@@ -52,7 +52,7 @@ def windows() -> list[tuple[float, float, float, float]]:
     each = WINDOW + PAUSE
     return [
         (p.alpha or 0.0, p.beta or 0.0, 2.0 + i * each, 2.0 + i * each + WINDOW)
-        for i, p in enumerate(WIDE)
+        for i, p in enumerate(WIDE_POSITIONS)
     ]
 
 

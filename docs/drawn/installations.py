@@ -13,7 +13,7 @@ from html import escape
 import numpy as np
 
 from drawn.positions import AXES, HEIGHT, WIDTH, polygon, seen
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.core.samples import Array
 
 SHADES = {"device": "#30475e", "object": "#8aa0b8", "under": "#b08968"}
@@ -102,7 +102,7 @@ def drawings(installation: Installation) -> str:
 
 def _figure(installation: Installation, alpha: float, beta: float) -> str:
     where = "home" if alpha == beta == 0 else f"α = {alpha:g}°, β = {beta:g}°"
-    base = turn(np.deg2rad(alpha), np.deg2rad(beta)).T
+    base = direction_cosines(np.deg2rad(alpha), np.deg2rad(beta)).T
     ground = np.array([[-1.5, 1, -1.3], [1.5, 1, -1.3], [1.5, 1, 1.3], [-1.5, 1, 1.3]])
     parts = [polygon(seen(ground)[0], 'fill="currentColor" opacity="0.08"')]
     faces = [face for box in installation.boxes for face in _faces(box, base)]

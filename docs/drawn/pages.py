@@ -9,7 +9,7 @@ from drawn import architecture, installations
 from drawn.effects import given, picture
 from drawn.positions import drawings
 from drawn.screens import screens
-from fieldcal.core.positions import SETS
+from fieldcal.core.positions import POSITION_SETS
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Effect
 
@@ -25,7 +25,7 @@ def make(folder: Path) -> None:
     for part in ("effects", "screens"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     _write(folder / "architecture.html", architecture.drawing())
-    for name, positions in SETS.items():
+    for name, positions in POSITION_SETS.items():
         _write(folder / f"positions_{name}.html", drawings(positions))
     for name, one in installations.INSTALLATIONS.items():
         _write(folder / f"installation_{name}.html", installations.drawings(one))

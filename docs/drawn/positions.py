@@ -12,7 +12,7 @@ from html import escape
 
 import numpy as np
 
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 
@@ -41,7 +41,7 @@ def _figure(number: int, position: Position) -> str:
 
 
 def _svg(position: Position, name: str) -> str:
-    base = turn(position.alpha or 0.0, position.beta or 0.0).T
+    base = direction_cosines(position.alpha or 0.0, position.beta or 0.0).T
     away = seen(base.T)[1] > 0
     hidden, shown = ([a for a in range(3) if away[a] == side] for side in (True, False))
     parts = [_ground(), *axes(base, hidden), *_faces(base), *axes(base, shown)]

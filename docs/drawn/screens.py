@@ -21,7 +21,7 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.decision_view import show_decision
 from fieldcal.commands.run_results import first_result
 from fieldcal.commands.table import show
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.history.store import History
 from fieldcal.planning.steps import Hold
 from fieldcal.procedures.five_position import plan
@@ -51,7 +51,7 @@ TABLES = {
     },
     "position": [
         {"alpha_deg": round(p.degrees[0], 6), "beta_deg": round(p.degrees[1], 6)}
-        for p in FIVE
+        for p in FIVE_POSITIONS
         if p.degrees
     ],
 }
@@ -79,7 +79,7 @@ class Filmed:
             file=io.StringIO(), width=WIDTH, height=HEIGHT, force_terminal=True
         )
         self._console = ConsoleOperator(
-            "fieldcal · five_position", FIVE, ManualMover(), console
+            "fieldcal · five_position", FIVE_POSITIONS, ManualMover(), console
         )
         self.pictures: dict[str, str] = {}
 
@@ -116,7 +116,7 @@ def screens() -> dict[str, str]:
     operator = Filmed(driver)
     with TemporaryDirectory() as place:
         folder = Path(place) / "first"
-        about = description.parse(TABLES)
+        about = description.parse_description(TABLES)
         with Recorder(folder, TABLES) as recorder:
             found = Engine(driver, operator, about, recorder).run(plan(about))
         history = History(Path(place) / "history.sqlite")

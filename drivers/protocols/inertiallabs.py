@@ -17,22 +17,22 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.drivers.checks import sums16
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.checksums import word_sums
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import (
     Bytes,
-    Candidates,
+    FrameCandidates,
     FrameScan,
     Index,
     Mask,
     find_headed_frames,
 )
 from fieldcal.drivers.layouts import (
-    AlikeFields,
     Layout,
     RawSamples,
-    in_order,
+    SameLayoutFrames,
+    join_in_frame_order,
     sort_by_layout,
 )
 from fieldcal.drivers.options import Options
@@ -75,26 +75,26 @@ class InertialLabsCodec(Codec):
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)
-        self._clock = Clock(self.health, options, resolution=1e-3, span=WEEK)
+        self._clock = ChosenTimebase(self.health, options, resolution=1e-3, span=WEEK)
 
     @property
     def grain(self) -> Grain:
         """One count."""
         return Grain(ACC_UNIT, GYR_UNIT)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0xAA 0x55."""
         return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a packet."""
         super().reset()
-        self._clock.broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole packets."""
-        parts = [_samples(some) for some in sort_by_layout(data, found, walk)]
-        raw = in_order(part for part in parts if part is not None)
+        parts = [_samples(some) for some in sort_by_layout(data, found, read_layout)]
+        raw = join_in_frame_order(part for part in parts if part is not None)
         return self._timed(self._clock, raw, t_host)
 
 
@@ -109,11 +109,11 @@ def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     good = np.zeros(len(starts), dtype=bool)
     first, last = starts[enough], ends[enough]
     said = data[last - 2].astype(np.uint16) | data[last - 1].astype(np.uint16) << 8
-    good[enough] = sums16(data, first + 2, last - 2) == said
+    good[enough] = word_sums(data, first + 2, last - 2) == said
     return good
 
 
-def walk(packet: bytes) -> Layout | None:
+def read_layout(packet: bytes) -> Layout | None:
     """Where the values of a packet are, by identifier; None if it is no such packet."""
     if (packet[2], packet[3]) != KIND:
         return None
@@ -131,7 +131,7 @@ def walk(packet: bytes) -> Layout | None:
     return Layout(fields, (2, 3, *range(HEAD, HEAD + 1 + count)))
 
 
-def _samples(some: AlikeFields) -> RawSamples | None:
+def _samples(some: SameLayoutFrames) -> RawSamples | None:
     if ACC not in some.fields and GYR not in some.fields:
         return None
     six = np.hstack(

@@ -17,22 +17,22 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.checks import fletcher
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.checksums import fletcher_sums
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import (
     Bytes,
-    Candidates,
+    FrameCandidates,
     FrameScan,
     Index,
     Mask,
     find_headed_frames,
 )
 from fieldcal.drivers.layouts import (
-    AlikeFields,
     Layout,
     RawSamples,
-    in_order,
+    SameLayoutFrames,
+    join_in_frame_order,
     sort_by_layout,
 )
 from fieldcal.drivers.options import Options
@@ -55,25 +55,25 @@ class MipCodec(Codec):
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)
-        self._clock = Clock(self.health, options, span=WEEK)
+        self._clock = ChosenTimebase(self.health, options, span=WEEK)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0x75 0x65."""
         return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a packet."""
         super().reset()
-        self._clock.broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole packets."""
         parts = [
             _samples(some)
-            for some in sort_by_layout(data, found, walk)
+            for some in sort_by_layout(data, found, read_layout)
             if ACC in some.fields or GYR in some.fields
         ]
-        return self._timed(self._clock, in_order(parts), t_host)
+        return self._timed(self._clock, join_in_frame_order(parts), t_host)
 
 
 def _size(data: Bytes, starts: Index) -> Index:
@@ -82,12 +82,12 @@ def _size(data: Bytes, starts: Index) -> Index:
 
 def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     body = ends - TAIL
-    first, second = fletcher(data, starts, body)
+    first, second = fletcher_sums(data, starts, body)
     good: Mask = (first == data[body]) & (second == data[body + 1])
     return good
 
 
-def _samples(some: AlikeFields) -> RawSamples:
+def _samples(some: SameLayoutFrames) -> RawSamples:
     six = np.hstack([some.numbers(ACC, ">f4", 3) * G0, some.numbers(GYR, ">f4", 3)])
     temperature = some.numbers(TEMPERATURE, ">f4", 3)[:, 2]
     stamps = some.numbers(REFERENCE, ">u8", 1)[:, 0] * 1e-9
@@ -100,7 +100,7 @@ SIZES = {ACC: 12, GYR: 12, TEMPERATURE: 12, REFERENCE: 8, 0xD3: 12, 0x12: 12}
 """Bytes of the data of the fields used."""
 
 
-def walk(packet: bytes) -> Layout | None:
+def read_layout(packet: bytes) -> Layout | None:
     """Where the fields of a packet of inertial data are; None if it is of no use."""
     if packet[2] != INERTIAL:
         return None

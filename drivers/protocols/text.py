@@ -24,13 +24,13 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec, FormatMatch
-from fieldcal.drivers.columns import guess
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask
+from fieldcal.drivers.column_guess import guess_text_options
+from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index, Mask
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.sequence import Sequence
+from fieldcal.drivers.sample_counter import SampleCounter
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 LONGEST = 1024
@@ -38,14 +38,14 @@ LONGEST = 1024
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
-USED = ("t", "seq", *CHANNELS, "temperature")
+KNOWN_COLUMNS = ("t", "seq", *CHANNELS, "temperature")
 DEFAULT = "t,ax,ay,az,gx,gy,gz,temperature"
 
 NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[nN][aA][nN])\s*")
 
 LF, CR, TAB, SPACE, STAR = b"\n\r\t *"
 
-CHECK = len("*hh")
+CHECKSUM_LENGTH = len("*hh")
 
 
 def _table(characters: bytes) -> Mask:
@@ -86,13 +86,13 @@ class TextCodec(Codec):
         coarse = 1e-3 if unit == "ms" else 0.0
         resolution = options.number("t_resolution", coarse, 0, 1)
         span = 2**bits * self._t_unit if bits else float("inf")
-        self._clock = Clock(self.health, options, resolution, span)
+        self._clock = ChosenTimebase(self.health, options, resolution, span)
         self._whole = self._checked
-        self._seq = Sequence()
+        self._seq = SampleCounter()
         self._check()
 
     def _check(self) -> None:
-        used = [name for name in self._names if name in USED]
+        used = [name for name in self._names if name in KNOWN_COLUMNS]
         if len(set(used)) < len(used):
             raise InputError(f"columns={','.join(self._names)}: a name occurs twice")
         if not any(set(three) <= set(used) for three in (CHANNELS[:3], CHANNELS[3:])):
@@ -101,16 +101,16 @@ class TextCodec(Codec):
             )
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
+    def match(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge bytes by how their lines look; the columns are guessed."""
-        query = guess(data, seconds)
+        query = guess_text_options(data, seconds)
         if query is None:
             return None
-        like = cls.decoded(data, query)
+        like = cls.match_decoded(data, query)
         # lines of numbers may also be a format of their own
         return like and FormatMatch(0.5 * like.score, query, like.samples)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every line that has ended."""
         newlines = np.flatnonzero(data == LF)
         ends = newlines + 1
@@ -126,14 +126,14 @@ class TextCodec(Codec):
         good = self._passed(data, starts)
         lines = ~good
         good[lines] = self._well_formed(data, starts[lines], newlines[lines])
-        return Candidates(starts, ends, good, rest)
+        return FrameCandidates(starts, ends, good, rest)
 
     def reset(self) -> None:
         """Forget half a line, and distrust the next."""
         super().reset()
         self._whole = self._checked
-        self._seq.broken()
-        self._clock.broken()
+        self._seq.link_broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Make samples of well-formed lines."""
@@ -165,7 +165,7 @@ class TextCodec(Codec):
         first = data[starts]
         if len(self._prefix):
             return ~self._ours(data, starts) & (LETTERS | REMARKS | DOLLAR)[first]
-        if self._names[0] in USED:
+        if self._names[0] in KNOWN_COLUMNS:
             return (LETTERS | REMARKS)[first]
         return REMARKS[first]
 
@@ -174,7 +174,7 @@ class TextCodec(Codec):
         stop = newlines - (data[newlines - 1] == CR)
         good: Mask = self._ours(data, starts) & (newlines - starts < LONGEST)
         if self._checked:
-            stop = stop - CHECK
+            stop = stop - CHECKSUM_LENGTH
             good &= stop > starts
             stop = np.maximum(stop, starts)
             high, low = (data.take(stop + i, mode="clip") for i in (1, 2))
@@ -201,7 +201,7 @@ class TextCodec(Codec):
         text[ends - 1] = self._separator
         tail = ends - 1 - (text[ends - 2] == CR)
         text[tail[tail < ends - 1]] = SPACE
-        for i in range(1, 1 + CHECK * self._checked):
+        for i in range(1, 1 + CHECKSUM_LENGTH * self._checked):
             text[tail - i] = SPACE
         head = starts + DOLLAR[text[starts]]
         text[starts[DOLLAR[text[starts]]]] = SPACE
@@ -222,7 +222,7 @@ class TextCodec(Codec):
         )
         columns = len(self._names)
         values = np.full((n, columns), np.nan)
-        used = [i for i, name in enumerate(self._names) if name in USED]
+        used = [i for i, name in enumerate(self._names) if name in KNOWN_COLUMNS]
         try:
             if "_" in text:
                 raise ValueError

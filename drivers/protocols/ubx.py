@@ -20,19 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.drivers.checks import fletcher
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.checksums import fletcher_sums
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec, FormatMatch
 from fieldcal.drivers.framing import (
     Bytes,
-    Candidates,
+    FrameCandidates,
     FrameScan,
     Index,
     Mask,
+    byte_rows,
     find_headed_frames,
-    rows,
 )
-from fieldcal.drivers.layouts import RawSamples, in_order
+from fieldcal.drivers.layouts import RawSamples, join_in_frame_order
 from fieldcal.drivers.options import Options
 
 Words = NDArray[np.uint32]
@@ -66,7 +66,7 @@ class UbxCodec(Codec):
         self._held: Array = np.empty((0, 9))
         self._usual: Mask | None = None
         span = 2**32 * 1e-3 if meas else 2**TAG_BITS * tick
-        self._clock = Clock(self.health, options, span=span)
+        self._clock = ChosenTimebase(self.health, options, span=span)
 
     @property
     def grain(self) -> Grain:
@@ -74,11 +74,11 @@ class UbxCodec(Codec):
         return Grain(float(SCALES[0]), float(SCALES[3]))
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
+    def match(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes are one or the other message."""
-        return cls.decoded(data) or cls.decoded(data, "message=meas")
+        return cls.match_decoded(data) or cls.match_decoded(data, "message=meas")
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0xB5 0x62."""
         return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
@@ -86,7 +86,7 @@ class UbxCodec(Codec):
         """Forget half a message."""
         super().reset()
         self._held = self._held[:0]
-        self._clock.broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Put the values of one tag together."""
@@ -100,12 +100,12 @@ class UbxCodec(Codec):
         parts = []
         for kind in np.unique(kinds[ours]).tolist():
             which = np.flatnonzero(ours & (kinds == kind))
-            payload = rows(data, starts[which], kind >> 8)[:, HEAD:-TAIL]
+            payload = byte_rows(data, starts[which], kind >> 8)[:, HEAD:-TAIL]
             read = _meas if self._number == MEAS else _raw
             values = read(payload)
             if values is not None:
                 parts.append(_samples(which, *values))
-        order = in_order(parts)
+        order = join_in_frame_order(parts)
         if order is None:
             return None
         raw, arrived = self._join(order, t_host[order.which])
@@ -149,9 +149,9 @@ def _samples(which: Index, words: Words, tags: Index) -> RawSamples:
     kinds = words >> 24 & 0x3F
     values = (words << 8).view(np.int32) >> 8  # with the sign of 24 bits
     if (kinds == kinds[0]).all() and (begins == begins[0]).all():
-        columns = _like_the_first_message(kinds[0], values, begins[0])
+        columns = _columns_if_alike(kinds[0], values, begins[0])
     else:
-        columns = _one_by_one(kinds.ravel(), values.ravel(), begins.ravel())
+        columns = _columns_one_by_one(kinds.ravel(), values.ravel(), begins.ravel())
     columns *= SCALES
     message = which[np.flatnonzero(begins) // words.shape[1]]
     stamps = tags[begins].astype(float)
@@ -174,7 +174,7 @@ def _merged(table: Array) -> Array:
     return joined
 
 
-def _like_the_first_message(kinds: Index, values: Index, begins: Mask) -> Array:
+def _columns_if_alike(kinds: Index, values: Index, begins: Mask) -> Array:
     """Columns of samples where all messages hold the same kinds in the same order."""
     sample = np.cumsum(begins) - 1
     columns = np.full((len(values), sample[-1] + 1, len(SCALES)), np.nan)
@@ -184,7 +184,7 @@ def _like_the_first_message(kinds: Index, values: Index, begins: Mask) -> Array:
     return columns.reshape(-1, len(SCALES))
 
 
-def _one_by_one(kinds: Index, values: Index, begins: Mask) -> Array:
+def _columns_one_by_one(kinds: Index, values: Index, begins: Mask) -> Array:
     """Columns of samples, whatever kinds the messages hold."""
     sample = np.cumsum(begins) - 1
     columns = np.full((sample[-1] + 1, len(SCALES)), np.nan)
@@ -200,7 +200,7 @@ def _size(data: Bytes, starts: Index) -> Index:
 
 def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
     body = ends - TAIL
-    first, second = fletcher(data, starts + 2, body)
+    first, second = fletcher_sums(data, starts + 2, body)
     good: Mask = (first == data[body]) & (second == data[body + 1])
     return good
 

@@ -20,15 +20,15 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.checks import crc16
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.checksums import crc16
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index
+from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index
 from fieldcal.drivers.layouts import (
-    AlikeFields,
     Layout,
     RawSamples,
-    in_order,
+    SameLayoutFrames,
+    join_in_frame_order,
     sort_by_layout,
 )
 from fieldcal.drivers.options import Options
@@ -85,32 +85,32 @@ class VectornavCodec(Codec):
             "source", ("uncompensated", "compensated"), "uncompensated"
         )
         self._pairs = COMPENSATED if source == "compensated" else UNCOMPENSATED
-        self._clock = Clock(self.health, options)
+        self._clock = ChosenTimebase(self.health, options)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0xFA that a possible header follows."""
         starts, ends, undecided = _lengths(data)
         good = np.ones(len(starts), dtype=bool)
         whole = np.flatnonzero(ends <= len(data))
         good[whole] = crc16(data, starts[whole] + 1, ends[whole]) == 0
-        return Candidates(starts, ends, good, undecided)
+        return FrameCandidates(starts, ends, good, undecided)
 
     def reset(self) -> None:
         """Forget half a message."""
         super().reset()
-        self._clock.broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole messages."""
         parts = []
-        for some in sort_by_layout(data, found, walk):
+        for some in sort_by_layout(data, found, read_layout):
             pair = next((p for p in self._pairs if set(p) <= set(some.fields)), None)
             if pair is not None:
                 parts.append(_samples(some, pair))
-        return self._timed(self._clock, in_order(parts), t_host)
+        return self._timed(self._clock, join_in_frame_order(parts), t_host)
 
 
-def _samples(some: AlikeFields, pair: tuple[int, int]) -> RawSamples:
+def _samples(some: SameLayoutFrames, pair: tuple[int, int]) -> RawSamples:
     acc, gyr = (some.numbers(key, "<f4", 6 if key == IMU else 3) for key in pair)
     temperature = some.numbers(TEMPERATURE, "<f4", 1)
     if MAG_PRES in some.fields:
@@ -147,7 +147,7 @@ def _lengths(data: Bytes) -> tuple[Index, Index, int]:
     return at[keep], ends[keep], int(undecided[0]) if len(undecided) else len(data)
 
 
-def walk(frame: bytes) -> Layout:
+def read_layout(frame: bytes) -> Layout:
     """Where the fields of a message are."""
     present = [g for g in range(len(LENGTHS)) if frame[1] >> g & 1]
     first = 2 + 2 * len(present)

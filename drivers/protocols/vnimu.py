@@ -20,7 +20,7 @@ class VnimuCodec(TextCodec):
     bauds = (115200, 921600, 230400, 460800, 57600, 128000)
 
     def __init__(self, options: Options) -> None:
-        fixed = options.fixed(
+        fixed = options.with_fixed(
             columns="-,-,-,ax,ay,az,gx,gy,gz,temperature,-",
             prefix="VNIMU",
             checksum="xor",
@@ -33,6 +33,6 @@ class VnimuCodec(TextCodec):
         return Grain(1e-3, 1e-6)
 
     @classmethod
-    def likeness(cls, data: bytes, seconds: float) -> FormatMatch | None:
+    def match(cls, data: bytes, seconds: float) -> FormatMatch | None:
         """Judge whether bytes are such lines."""
-        return cls.decoded(data)
+        return cls.match_decoded(data)

@@ -24,9 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec
-from fieldcal.drivers.framing import Bytes, Candidates, FrameScan, Index, Mask, rows
+from fieldcal.drivers.framing import (
+    Bytes,
+    FrameCandidates,
+    FrameScan,
+    Index,
+    Mask,
+    byte_rows,
+)
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
@@ -47,19 +54,21 @@ class WitmotionSamples(NamedTuple):
     t_host: Array
 
 
-class Frames(NamedTuple):
+class WitmotionFrames(NamedTuple):
     """Frames (n, 11), where they stood in the stream, and when they were all there."""
 
     raw: Bytes
     at: Index
     t_host: Array
 
-    def only(self, which: slice | Mask) -> Frames:
+    def select(self, which: slice | Mask) -> WitmotionFrames:
         """Return some of them."""
-        return Frames(self.raw[which].copy(), self.at[which], self.t_host[which])
+        return WitmotionFrames(
+            self.raw[which].copy(), self.at[which], self.t_host[which]
+        )
 
 
-UNDECIDED = 3
+LEAST_UNSTAMPED = 3
 """Samples without a stamp after which the device is taken to send none."""
 
 
@@ -75,10 +84,10 @@ class WitmotionCodec(Codec):
         gyr = options.number("gyr_range", 2000.0, 1.0, 40000.0)
         self._acc = acc * ACC_UNITS["g"] / 32768
         self._gyr = gyr * GYR_UNITS["deg/s"] / 32768
-        self._clock = Clock(self.health, options, resolution=1e-3)
+        self._clock = ChosenTimebase(self.health, options, resolution=1e-3)
         self._decided = False
         none = np.empty((0, SIZE), np.uint8)
-        self._frames = Frames(none, np.empty(0, np.int64), np.empty(0))
+        self._frames = WitmotionFrames(none, np.empty(0, np.int64), np.empty(0))
         self._cycle = 0
         self._paired: int | None = None
         self._held = WitmotionSamples(np.empty((0, 6)), *[np.empty(0)] * 4)
@@ -89,7 +98,7 @@ class WitmotionCodec(Codec):
         """One count of 16 bits."""
         return Grain(self._acc, self._gyr)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0x55 that a kind follows."""
         at = np.flatnonzero(data[:-1] == 0x55)
         kind = data[at + 1]
@@ -102,31 +111,31 @@ class WitmotionCodec(Codec):
         eight = four[:-4] + four[4:]
         good[: len(whole)] = eight[whole] + two[whole + 8] == data[whole + 10]
         undecided = len(data) - (len(data) > 0 and int(data[-1]) == 0x55)
-        return Candidates(at, at + SIZE, good, undecided)
+        return FrameCandidates(at, at + SIZE, good, undecided)
 
     def reset(self) -> None:
         """Forget half a frame and half a sample."""
         super().reset()
-        self._frames = self._frames.only(slice(0))
+        self._frames = self._frames.select(slice(0))
         self._paired = None
-        self._clock.broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Put the halves of each sample together."""
         old = self._frames
-        frames = Frames(
-            np.concatenate([old.raw, rows(data, found.starts, SIZE)]),
+        frames = WitmotionFrames(
+            np.concatenate([old.raw, byte_rows(data, found.starts, SIZE)]),
             np.concatenate([old.at, found.starts + self._begin]),
             np.concatenate([old.t_host, t_host]),
         )
-        again = _repeats(frames.raw)
+        again = _is_repeat(frames.raw)
         again[: len(old.at)] = False
         if again.any():
-            frames = frames.only(~again)
-        self._frames = frames.only(slice(-2, None))
+            frames = frames.select(~again)
+        self._frames = frames.select(slice(-2, None))
         return self._deliver(self._pair(frames, len(old.at)))
 
-    def _pair(self, frames: Frames, old: int) -> WitmotionSamples:
+    def _pair(self, frames: WitmotionFrames, old: int) -> WitmotionSamples:
         """Samples whose second half is not among the first `old` frames."""
         kind, far = frames.raw[:, 1], np.diff(frames.at) >= 3 * SIZE
         begins = np.zeros(len(kind), dtype=np.int64)
@@ -172,7 +181,7 @@ class WitmotionCodec(Codec):
                 samples = WitmotionSamples(
                     *(column[stamped[0] :] for column in samples)
                 )
-            elif len(samples.stamp) < UNDECIDED:
+            elif len(samples.stamp) < LEAST_UNSTAMPED:
                 self._held = samples
                 return None
             self._decided = True
@@ -194,7 +203,7 @@ def _days(date: Words) -> Words:
     return months.astype("M8[D]").astype(np.int64) + day - 1
 
 
-def _repeats(raw: Bytes) -> Mask:
+def _is_repeat(raw: Bytes) -> Mask:
     """Frames that say word for word what the one before said, (n,)."""
     again = np.zeros(len(raw), dtype=bool)
     again[1:] = raw[1:, 1] == raw[:-1, 1]

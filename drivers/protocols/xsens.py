@@ -19,26 +19,26 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.checks import sums
-from fieldcal.drivers.clock import Clock
+from fieldcal.drivers.checksums import byte_sums
+from fieldcal.drivers.chosen_timebase import ChosenTimebase
 from fieldcal.drivers.codec import Codec
 from fieldcal.drivers.framing import (
     Bytes,
-    Candidates,
+    FrameCandidates,
     FrameScan,
     Index,
     Mask,
     find_headed_frames,
 )
 from fieldcal.drivers.layouts import (
-    AlikeFields,
     Layout,
     RawSamples,
-    in_order,
+    SameLayoutFrames,
+    join_in_frame_order,
     sort_by_layout,
 )
 from fieldcal.drivers.options import Options
-from fieldcal.drivers.sequence import Sequence
+from fieldcal.drivers.sample_counter import SampleCounter
 
 SYNC = b"\xfa\xff"
 HEAD, LONGEST = 6, 2055
@@ -65,23 +65,23 @@ class XsensCodec(Codec):
 
     def __init__(self, options: Options) -> None:
         super().__init__(options)
-        self._clock = Clock(self.health, options, span=2**32 * TICK)
-        self._seq = Sequence(span=2**16)
+        self._clock = ChosenTimebase(self.health, options, span=2**32 * TICK)
+        self._seq = SampleCounter(span=2**16)
 
-    def scan(self, data: Bytes) -> Candidates:
+    def scan(self, data: Bytes) -> FrameCandidates:
         """Every 0xFA 0xFF."""
         return find_headed_frames(data, SYNC, HEAD, LONGEST, _size, _check)
 
     def reset(self) -> None:
         """Forget half a message."""
         super().reset()
-        self._seq.broken()
-        self._clock.broken()
+        self._seq.link_broken()
+        self._clock.link_broken()
 
     def decode(self, data: Bytes, found: FrameScan, t_host: Array) -> Block | None:
         """Take the samples out of whole messages."""
-        parts = [_samples(some) for some in sort_by_layout(data, found, walk)]
-        raw = in_order(part for part in parts if part is not None)
+        parts = [_samples(some) for some in sort_by_layout(data, found, read_layout)]
+        raw = join_in_frame_order(part for part in parts if part is not None)
         steps = None if raw is None else self._seq.steps(raw.seq)
         return self._timed(self._clock, raw, t_host, steps)
 
@@ -93,11 +93,11 @@ def _size(data: Bytes, starts: Index) -> Index:
 
 
 def _check(data: Bytes, starts: Index, ends: Index) -> Mask:
-    good: Mask = sums(data, starts + 1, ends) == 0
+    good: Mask = byte_sums(data, starts + 1, ends) == 0
     return good
 
 
-def walk(message: bytes) -> Layout | None:
+def read_layout(message: bytes) -> Layout | None:
     """Where the values of a message are, by identifier; None if it is no MTData2."""
     if message[2] != MTDATA2:
         return None
@@ -117,12 +117,12 @@ def walk(message: bytes) -> Layout | None:
     return Layout(fields, tuple(marks))
 
 
-def _samples(some: AlikeFields) -> RawSamples | None:
-    acc, gyr = _reals(some, *ACC), _reals(some, *GYR)
+def _samples(some: SameLayoutFrames) -> RawSamples | None:
+    acc, gyr = _numbers_of(some, *ACC), _numbers_of(some, *GYR)
     if acc is None and gyr is None:
         return None
     unknown = np.full((len(some.frames), 3), np.nan)
-    temperature = _reals(some, TEMPERATURE)
+    temperature = _numbers_of(some, TEMPERATURE)
     return RawSamples(
         some.which,
         np.hstack([unknown if part is None else part for part in (acc, gyr)]),
@@ -132,7 +132,7 @@ def _samples(some: AlikeFields) -> RawSamples | None:
     )
 
 
-def _reals(some: AlikeFields, *kinds: int) -> Array | None:
+def _numbers_of(some: SameLayoutFrames, *kinds: int) -> Array | None:
     """Values of the first of these kinds that there is, (m, n)."""
     key = some.first_of(tuple(kind | p for kind in kinds for p in range(len(BYTES))))
     if key is None:

@@ -23,9 +23,9 @@ from fieldcal.acceptance.verification import Verification
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
-from fieldcal.core.positions import forces
+from fieldcal.core.positions import specific_forces
 from fieldcal.evaluation.observations import angle_setting
-from fieldcal.history.family import expected
+from fieldcal.history.family import next_run_distribution
 from fieldcal.model import thresholds
 from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
@@ -120,7 +120,7 @@ def unstated_angles_warning(about: Description) -> str:
     faces = len(about.positions) - len(oriented)
     if said or _set_by_program(about) or len(oriented) < 2 or faces >= FACES:
         return ""
-    if np.abs(forces(oriented, 1.0)).max(axis=0).min() > UPRIGHT:
+    if np.abs(specific_forces(oriented, 1.0)).max(axis=0).min() > UPRIGHT:
         return ""
     return (
         "nobody stated how well the angles are set, and they are taken as set to"
@@ -165,7 +165,7 @@ def _shown_by_family(
         repeat = limits.repeat(group_of(name))
         if not earlier or repeat is None:
             continue
-        usual = expected(
+        usual = next_run_distribution(
             np.array([c.value(name) for c in earlier]),
             np.array([c.uncertainty(name) for c in earlier]),
             repeat,

@@ -29,11 +29,11 @@ from fieldcal.acceptance.verification import Verification, planned_verification,
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.observations import UsableWindows
-from fieldcal.history.store import History, HistoryRun, family
+from fieldcal.history.store import History, HistoryRun, family_runs
 from fieldcal.session.folder import Session
-from fieldcal.session.installed import tells_an_offset
+from fieldcal.session.installed_calibration import subtracts_gyro_offset
 from fieldcal.windows import Average, average
 from fieldcal.windows.dead_axis import broken_axis_messages
 
@@ -65,7 +65,7 @@ def assess(
         try:
             here = str(session.folder.resolve())
             runs = [run for run in history.runs(serial) if run.session != here]
-            usual = family(runs)
+            usual = family_runs(runs)
             earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
@@ -144,8 +144,8 @@ def _undetermined_by_omission(
     verb = "is" if len(lost) == 1 else "are"
     them = "it" if out == 1 else "them"
     return (
-        f"{which} left out; without {them} {join(lost)} {verb} not determined: record"
-        f" {them} again"
+        f"{which} left out; without {them} {join_words(lost)} {verb} not determined:"
+        f" record {them} again"
     )
 
 
@@ -158,7 +158,9 @@ def _removed_biases(
     """Sentences if biases of the size found were subtracted from the recording."""
     held = windows.at_rest(session).averages
     seen = np.nan_to_num(calibration.vector("acc_bias")[0])
-    gyroscopes = BiasSpread(limits.gyr_bias_repeat, tells_an_offset(session.marks()))
+    gyroscopes = BiasSpread(
+        limits.gyr_bias_repeat, subtracts_gyro_offset(session.marks())
+    )
     repeat = limits.acc_bias_repeat, gyroscopes
     return removed_bias_sentences(held, session.block, repeat, seen, limits.fit_chance)
 
@@ -222,7 +224,7 @@ def _link(
     Gaps between the used pieces of a window do not count as missing.
     """
     samples = missing = 0
-    block, gaps = session.block, session.about.without
+    block, gaps = session.block, session.about.excluded_spans
     period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
     for window in windows:
         t = block.between(window.start, np.nextafter(window.end, np.inf)).t

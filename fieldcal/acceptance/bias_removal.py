@@ -51,8 +51,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import chi2_tail, of_odds
 from fieldcal.core.frames import EARTH_RATE
+from fieldcal.core.probability import chi2_tail, probability_of_log_odds
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
@@ -138,7 +138,7 @@ def _removal_probability(
     )
     stays = keeps.likelihood(means, own, seen)
     odds = zero - stays + np.log(TRACKING)  # (5)
-    chance = float(of_odds(odds))
+    chance = float(probability_of_log_odds(odds))
     return chance, f"(χ² about zero {chi2:.2g} of {count} means)"
 
 

@@ -13,7 +13,7 @@ from fieldcal.acceptance.check import Check, unit_suffix
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.history.family import expected
+from fieldcal.history.family import next_run_distribution
 
 
 def check_change(
@@ -67,7 +67,7 @@ def _compared(
         return None
     value = calibration.value(name)
     sigma = float(np.hypot(calibration.uncertainty(name), warmth))
-    usual = expected(
+    usual = next_run_distribution(
         np.array([c.value(name) for c in earlier]),
         np.array([c.uncertainty(name) for c in earlier]),
         repeat,

@@ -38,9 +38,9 @@ from fieldcal.acceptance.witnesses import (
 )
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.escaping import escape_line
 from fieldcal.core.positions import Position
-from fieldcal.core.shown import one_line
+from fieldcal.core.probability import chi2_tail
 from fieldcal.session.description import Description
 from fieldcal.solve.doubt import DoubtfulPosition
 from fieldcal.windows import Average
@@ -75,7 +75,7 @@ class Circumstances:
     Attributes
     ----------
     temperatures : mean of each window, deg C, nan where unknown
-    link : counts of `driver.Health`; empty where unknown
+    link : counts of `driver.LinkHealth`; empty where unknown
     verification : residual of a position that was not fitted; None without one
     family : earlier calibrations of the device at this temperature, oldest first; None
         without a history
@@ -274,7 +274,7 @@ def _angle_checks(
     """Check whether wrong angles would be noticed."""
     given = (circumstances.verification, circumstances.family)
     if about.angles_from:
-        says = f"the angles are certified by {one_line(about.angles_from)}"
+        says = f"the angles are certified by {escape_line(about.angles_from)}"
         return [Check(ANGLES, True, says)]
     unseen = unnoticed_angle_error(calibration, about, limits, *given)
     if not unseen:

@@ -16,7 +16,7 @@ from fieldcal.calibration.limits import GradeLimits, read
 from fieldcal.calibration.names import ParameterName, group_of, sensor_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.gravity import G0
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.session.description import Description
 
 DEG_H = math.radians(1) / 3600
@@ -103,8 +103,8 @@ def _warm_up_check(
     }
     told = {s: text for s, (size, text) in sizes.items() if size and s in measured}
     if told:
-        by = join(list(dict.fromkeys(whose(f"{s}_per_k") for s in told)))
-        both = join(list(told.values()))
+        by = join_words(list(dict.fromkeys(whose(f"{s}_per_k") for s in told)))
+        both = join_words(list(told.values()))
         says = (
             f"this relies on biases that change by 0 ± {both} per K while the device"
             f" warms up, {by}; each ± includes it"
@@ -123,7 +123,7 @@ def _coarser_grade_check(
     off = {}
     for name in shows["beyond"]:
         parameter = ParameterName.of(name)
-        usual = about.sent[parameter.group][parameter.axis]
+        usual = about.nominal_as_sent[parameter.group][parameter.axis]
         off[name] = abs(calibration.value(name) - float(usual))
     if angle := angle_error_explaining(calibration, off):
         says = (

@@ -14,7 +14,7 @@ from __future__ import annotations
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 
 
 def bias_jump_warning(calibration: Calibration, limits: GradeLimits) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.acceptance.check import Check
 from fieldcal.calibration import Calibration
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 from fieldcal.session.description import Description
 
 BLIND = 2

@@ -25,7 +25,7 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
 from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.positions import Position, forces, ladder
+from fieldcal.core.positions import Position, ladder_settings, specific_forces
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.planning.planner import parameter_sigma
@@ -138,7 +138,7 @@ def _hold_longer(
 
     The part of the uncertainty from g-sensitivity and the mean force does not change.
     """
-    force = forces(had, about.gravity).mean(axis=0)
+    force = specific_forces(had, about.gravity).mean(axis=0)
     stays = factory_errors_used(calibration).g_sensitivity * float(
         np.linalg.norm(force)
     )
@@ -176,7 +176,7 @@ def _further_positions(
     chosen: list[Position] = []
     for _ in range(MOST):
         ratios = []
-        candidates = [Position.deg(a, b) for a, b in ladder(about.positions)]
+        candidates = [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
         for one in candidates:
             then = _expected_sigma(names, [*held, *chosen, one], about, known)
             ratios.append(_largest_limit_ratio(names, over, before, then, allowed))
@@ -267,6 +267,8 @@ def _force_slopes(
         Position(p.name, (p.alpha or 0.0) + alpha, (p.beta or 0.0) + beta)
         for p in positions
     ]
-    change = forces(off, about.gravity) - forces(positions, about.gravity)
+    change = specific_forces(off, about.gravity) - specific_forces(
+        positions, about.gravity
+    )
     moved: Array = change @ about.mounting / STEP
     return moved

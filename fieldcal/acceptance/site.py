@@ -10,7 +10,7 @@ between the sea and the highest villages.
 
 from __future__ import annotations
 
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.session.description import Description
 
 ANOMALY = 4e-3
@@ -22,9 +22,9 @@ VILLAGES = 5000.0
 
 def gravity_missing_warning(about: Description) -> str:
     """Sentence with the remedy if gravity is not stated; else empty."""
-    if about.gravity_said:
+    if about.gravity_stated:
         return ""
-    least, most = gravity(0.0), gravity(90.0)
+    least, most = normal_gravity(0.0), normal_gravity(90.0)
     return (
         "the site is not stated, and gravity, to which scale factors refer, is"
         f" {least:.3f} m/s² at the equator and {most:.3f} m/s² at the poles: state it"
@@ -46,12 +46,16 @@ def gravity_contradiction(about: Description) -> str:
     site = about.raw.get("site", {})
     if not site.get("gravity"):
         return ""
-    least, most, where = gravity(0.0, VILLAGES), gravity(90.0), "anywhere on Earth"
+    least, most, where = (
+        normal_gravity(0.0, VILLAGES),
+        normal_gravity(90.0),
+        "anywhere on Earth",
+    )
     if "latitude_deg" in site:
         height = site.get("height_m")
         high, low = (VILLAGES, 0.0) if height is None else (height, height)
-        most = gravity(about.latitude_deg, low)
-        least = gravity(about.latitude_deg, high)
+        most = normal_gravity(about.latitude_deg, low)
+        least = normal_gravity(about.latitude_deg, high)
         where = f"at {about.latitude_deg:g}° latitude"
         where += "" if height is None else f" and {height:g} m"
     if least - ANOMALY <= about.gravity <= most + ANOMALY:

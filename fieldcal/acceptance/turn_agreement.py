@@ -12,7 +12,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 
 
 def turn_disagreement(calibration: Calibration, limits: GradeLimits) -> str:

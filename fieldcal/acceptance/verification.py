@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.chances import chi2_tail
-from fieldcal.core.positions import Position, forces
+from fieldcal.core.positions import Position, specific_forces
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import ACC, Array
 from fieldcal.model.causes.planned import parameters, predict_outputs
 from fieldcal.session.description import Description
@@ -91,14 +91,15 @@ def verify(
     names, x, covariance = _parameters(calibration, about)
     u, j = predict_outputs(names, x, [position], about.gravity, about.mounting)
     residual = average.mean[ACC] - u[0]
-    n = about.mounting.T @ forces([position], 1.0)[0]
+    n = about.mounting.T @ specific_forces([position], 1.0)[0]
     setting = (angle_sigma * about.gravity) ** 2 * (np.eye(3) - np.outer(n, n))
     s = j[0] @ covariance @ j[0].T + average.covariance[ACC, ACC] + setting
     chi2 = float(residual @ np.linalg.solve(s, residual))
     chance = chi2_tail(chi2, 3)
     slope = {name: j[0, :, i] for i, name in enumerate(names)}
     turned = np.column_stack([
-        (forces([moved], about.gravity) - forces([position], about.gravity))[0]
+        (specific_forces([moved], about.gravity)
+         - specific_forces([position], about.gravity))[0]
         @ about.mounting / STEP
         for moved in (_rotated(position, STEP, 0.0), _rotated(position, 0.0, STEP))
     ])  # fmt: skip
@@ -155,8 +156,8 @@ def propose_verification(positions: Sequence[Position]) -> Position:
     neighbour. If there is none, it is half-way between the first and the last position;
     if all have a third angle, it is home.
 
-    >>> from fieldcal.core.positions import FIVE
-    >>> propose_verification(FIVE).name
+    >>> from fieldcal.core.positions import FIVE_POSITIONS
+    >>> propose_verification(FIVE_POSITIONS).name
     'α = 0°, β = 5°'
     """
     known = [p.degrees for p in positions if p.degrees is not None]
@@ -167,10 +168,10 @@ def propose_verification(positions: Sequence[Position]) -> Position:
     if not free:
         a, b = np.mean([known[0], known[-1]], axis=0)
         return Position.deg(float(a), float(b))
-    there = forces(positions, 1.0)
+    there = specific_forces(positions, 1.0)
 
     def nearest(pair: tuple[float, float]) -> float:
-        f = forces([Position.deg(*pair)], 1.0)[0]
+        f = specific_forces([Position.deg(*pair)], 1.0)[0]
         return round(float(np.linalg.norm(there - f, axis=1).min()), 9)
 
     return Position.deg(*max(free, key=nearest))

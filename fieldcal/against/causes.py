@@ -258,8 +258,8 @@ def _mismatches_of_cause(source: DiagnosedRecording, name: str) -> tuple[Mismatc
         return ()
     lost = found_effects.remove_cause(explanation, standing)
     of = mismatches.of_cause if name in catalogue() else mismatches.of_unknown
-    numbered = explanation.prepared.source.about.numbered
+    indices_in_file = explanation.prepared.source.about.indices_in_file
     return tuple(
-        replace(m, positions=tuple(sorted(numbered(m.positions))))
+        replace(m, positions=tuple(sorted(indices_in_file(m.positions))))
         for m in of(explanation, standing, lost)
     )

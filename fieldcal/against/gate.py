@@ -16,9 +16,9 @@ from fieldcal.against.result import Difference, Match, RealAndSimulated
 from fieldcal.against.sensor_model import CALIBRATION
 from fieldcal.against.wording import DIRECTION_WORDS, difference_with_parameters
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import shown
+from fieldcal.core.escaping import escape_invisible
 from fieldcal.effects import catalogue
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 PREDICTION = "chi2_per_dof"
 
@@ -155,5 +155,5 @@ def write_junit(
     suite.set("failures", str(failed))
     for element in suite.iter():
         for key, value in element.items():
-            element.set(key, shown(value))
-    write_whole(path, tostring(suite, encoding="utf-8", xml_declaration=True))
+            element.set(key, escape_invisible(value))
+    write_atomically(path, tostring(suite, encoding="utf-8", xml_declaration=True))

@@ -36,7 +36,7 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.chances import of_odds
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array
 from fieldcal.model.evidence.gram import evidence_gains
 from fieldcal.model.evidence.sizing import LOG_DENSITY
@@ -176,7 +176,7 @@ def probability_of_difference(
         inner, typical * (information @ difference), float(np.diag(inner).max())
     )
     odds = np.log(DIFFERS) - np.log1p(-DIFFERS) + _over_sizes(told.gain)
-    return float(of_odds(odds))
+    return float(probability_of_log_odds(odds))
 
 
 def likeliest_difference(found: Mapping[Relation, float]) -> Relation:

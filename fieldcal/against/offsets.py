@@ -208,7 +208,7 @@ def _mismatch_everywhere(
     return Mismatch(
         channel=channel,
         kind="position",
-        positions=tuple(sorted(about.numbered(held))),
+        positions=tuple(sorted(about.indices_in_file(held))),
         from_s=float(span[0, 0]),
         to_s=float(span[-1, 1]),
         covariate="specific force" if scale else "",

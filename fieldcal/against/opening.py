@@ -121,17 +121,19 @@ def _description_of_simulated(
     if not ours:
         return about
     about = replace(
-        about.in_time(),
+        about.in_time_order(),
         nominal={k: v / abs(v) if k.endswith("scale") else 0 * v
                  for k, v in about.nominal.items()},
     )  # fmt: skip
     later = float(block.t[0] - real.t[0])
     moved = [None if w is None else (w[0] + later, w[1] + later) for w in about.windows]
     if all(w is None or _lies_in_rest(w, rests) for w in moved):
-        gaps = tuple((start + later, end + later) for start, end in about.without)
-        return replace(about, windows=tuple(moved), without=gaps)
+        gaps = tuple(
+            (start + later, end + later) for start, end in about.excluded_spans
+        )
+        return replace(about, windows=tuple(moved), excluded_spans=gaps)
     if len(rests) == len(ours) == len(about.windows):
-        return replace(about, windows=tuple(rests), without=())
+        return replace(about, windows=tuple(rests), excluded_spans=())
     raise InputError(
         f"{path}: the simulated device rests {len(rests)} times and not at the times of"
         f" the recording, which has {len(ours)} positions: let the simulator hold the"

@@ -20,7 +20,7 @@ from fieldcal.against import patches
 from fieldcal.against.result import Match
 from fieldcal.against.sensor_model import SensorModel, patch_model
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import shown
+from fieldcal.core.escaping import escape_invisible
 
 CompareOutput = Callable[[Path], tuple[Match, list[str]]]
 """Compares a simulator's file; returns the match, and notices for the user."""
@@ -145,7 +145,7 @@ def _run_command(words: list[str], command: str) -> None:
         said = [
             line for line in (done.stdout + done.stderr).splitlines() if line.strip()
         ]
-        last = " | ".join(shown(line.strip()) for line in said[-SAID:])
+        last = " | ".join(escape_invisible(line.strip()) for line in said[-SAID:])
         raise InputError(
             f"{command}: failed with exit code {done.returncode}; it said:"
             f" {last or 'nothing'}"

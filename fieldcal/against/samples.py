@@ -97,7 +97,7 @@ def _mismatch_of_channel(
     one: DiagnosedRecording, channel: str, pair: RealAndSimulated
 ) -> Mismatch:
     """The mismatch of a channel in all samples."""
-    positions = one.explanation.prepared.source.about.numbers or (0,)
+    positions = one.explanation.prepared.source.about.position_numbers or (0,)
     off = pair.difference
     size = abs(float(off.value))
     return Mismatch(

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
@@ -91,7 +91,15 @@ def diagnose_side(
     found = make_diagnosis(heard, explanation)
     steps = grids_of(block)
     return DiagnosedRecording(
-        name, block, explanation, found, noise, unsure, steps, rate_of(block), quieted
+        name,
+        block,
+        explanation,
+        found,
+        noise,
+        unsure,
+        steps,
+        sampling_rate(block),
+        quieted,
     )
 
 

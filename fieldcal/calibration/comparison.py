@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fieldcal.core.chances import chi2_tail
 from fieldcal.core.errors import InputError
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from fieldcal.calibration.parameters import COMPONENTS
 from fieldcal.calibration.plausible import UNSEEN
 from fieldcal.core.grade import GRADES, Grade
 from fieldcal.core.samples import Array
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class GradeShown:
                 break
         if grade == stated:
             return cls(grade)
-        return cls(grade, join(list(told.values())), tuple(told))
+        return cls(grade, join_words(list(told.values())), tuple(told))
 
 
 def _beyond(

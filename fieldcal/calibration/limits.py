@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
-from fieldcal.core.factory import WARM_UP_S, FactoryErrors
+from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, FactoryErrors
 
 DEFAULTS = "limits.toml"
 
@@ -59,7 +59,7 @@ class GradeLimits:
     def factory(self) -> FactoryErrors:
         """Sizes of the errors that the factory leaves and that are not estimated."""
         # a device that warms up faster than allowed is waited for: 2 sigma
-        warming_k = self.temperature_rate_k_min / 2 * WARM_UP_S / 60
+        warming_k = self.temperature_rate_k_min / 2 * WARM_UP_TIME_CONSTANT / 60
         return FactoryErrors(
             self.squareness, self.quadratic, self.g_sensitivity,
             self.acc_bias_per_k, self.gyr_bias_per_k, self.acc_hysteresis, warming_k,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from fieldcal.calibration.names import TILTS, ParameterName, group_of, sensor_of
 from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.samples import Array
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 
 LEAST, UNSEEN = 0.1, 5.0
 """A scale factor below this part of nominal, and below so many standard deviations,
@@ -64,10 +64,10 @@ def misdirected_turns(turns: Sequence[tuple[str, str]]) -> list[str]:
     count, more = len(turns), len(turns) - len(named)
     return [
         f"in {count} turn{'s' if count > 1 else ''} the gyroscopes lead to another"
-        f" attitude than the accelerometers or the stated angles (from {join(named)}"
-        f"{f', and {more} more' if more else ''}): an axis, a sign, a unit or an"
-        " angle is another than session.toml says, or the gyroscopes were clipped;"
-        " mend it, or turn more slowly"
+        f" attitude than the accelerometers or the stated angles (from"
+        f" {join_words(named)}{f', and {more} more' if more else ''}): an axis, a sign,"
+        " a unit or an angle is another than session.toml says, or the gyroscopes were"
+        " clipped; mend it, or turn more slowly"
     ]
 
 

@@ -81,9 +81,9 @@ def _write(path: Path, block: Block) -> None:
     from pyarrow import csv, parquet
 
     from fieldcal.core.errors import InputError, disk_says
-    from fieldcal.session.sample_files import to_batch
+    from fieldcal.session.sample_files import to_record_batch
 
-    table = pa.Table.from_batches([to_batch(block)])
+    table = pa.Table.from_batches([to_record_batch(block)])
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         if path.name.endswith(".csv"):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.batch import SessionBatch
@@ -66,13 +66,13 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
     limits = str(args.limits.resolve()) if args.limits else None
     batch = SessionBatch(
         sessions_in(args.folders),
         SessionTask(args.diagnose, limits),
-        Database(args.history or default_place()),
+        Database(args.history or default_location()),
     )
     every = [str(folder) for folder in batch.folders]
     left = batch.unprocessed() if args.resume else every
@@ -126,7 +126,7 @@ def carried_out(batch: SessionBatch, left: list[str], pool: WorkerPool) -> None:
             if speed:
                 bar.update(task, rate=f"{60 * speed:.3g} a minute")
             if one.error:
-                bar.console.print(one_line(one.error), soft_wrap=True)
+                bar.console.print(escape_line(one.error), soft_wrap=True)
 
 
 def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
@@ -143,7 +143,7 @@ def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
         say(f"{len(rows)} sessions, {done} of them done now: {len(solved)} solved")
         say(f", {go} of {judged} GO" if judged else ", none to be judged")
         say(f", {len(bad)} not good, {len(failed)} without a result\n")
-        say(f"written: {args.output}\nstore: {batch.database.shown}\n")
+        say(f"written: {args.output}\nstore: {batch.database.location_text}\n")
     return 1 if bad or failed else 0
 
 

@@ -10,7 +10,7 @@ from typing import IO, Any
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from fieldcal.core.shown import shown
+from fieldcal.core.escaping import escape_invisible
 
 
 class ShownConsole(Console):
@@ -26,12 +26,12 @@ class ShownConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Render, with the text of each segment as `shown`."""
+        """Render, with the text of each segment as `escape_invisible` returns it."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment
             else:
-                yield Segment(shown(segment.text), segment.style)
+                yield Segment(escape_invisible(segment.text), segment.style)
 
     def on_broken_pipe(self) -> None:
         """Go on for nobody: whoever read the first line only has the exit code too."""

@@ -172,12 +172,12 @@ def _replayed(
 ) -> ReplayResult:
     """Replay the session on its twin, and write the twin's device file."""
     from fieldcal.diagnosis.findings.quality import fit_recorded_samples
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
     from fieldcal.sim_device.profile_file import to_toml
     from fieldcal.twin import replay_session
 
     again = replay_session(
         explanation, found, fit_recorded_samples(session.block, explanation)
     )
-    write_whole(path, to_toml(again.profile))
+    write_atomically(path, to_toml(again.profile))
     return again

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.calibration.limits import GradeLimits
@@ -64,10 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.core.errors import InputError
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
 
-    history = History(args.history or default_place())
+    history = History(args.history or default_location())
     if args.serial is None:
         return _devices(args, history)
     if args.accept is not None:
@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
     if not runs:
         known = ", ".join(s for s, _, _ in history.serials()) or "none yet"
         raise InputError(
-            f"{history.database.shown} has no calibration of {args.serial}; it has"
-            f" {known}"
+            f"{history.database.location_text} has no calibration of {args.serial}; it"
+            f" has {known}"
         )
     if args.compare:
         return _compare(args, runs)
@@ -93,12 +93,13 @@ def _devices(args: argparse.Namespace, history: History) -> int:
         return 0
     if not devices:
         sys.stdout.write(
-            f"{history.database.shown}: no calibration yet; fieldcal run --serial keeps"
-            " them\n"
+            f"{history.database.location_text}: no calibration yet; fieldcal run"
+            " --serial keeps them\n"
         )
     for serial, count, last in devices:
         sys.stdout.write(
-            f"{one_line(serial)}: {count} calibrations, the last {one_line(last)}\n"
+            f"{escape_line(serial)}: {count} calibrations,"
+            f" the last {escape_line(last)}\n"
         )
     return 0
 
@@ -128,12 +129,12 @@ def _compare(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
 
 def _trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     from fieldcal.calibration import limits
-    from fieldcal.history.trend import names, trend
+    from fieldcal.history.trend import parameter_names, parameter_trend
 
     grade = runs[-1].calibration.info.get("conditions", {}).get("grade", "tactical")
     bounds = limits.read(str(grade), args.limits)
-    wanted = _wanted(args.parameter, names(runs))
-    trends = {name: trend(runs, name, bounds) for name in wanted}
+    wanted = _wanted(args.parameter, parameter_names(runs))
+    trends = {name: parameter_trend(runs, name, bounds) for name in wanted}
     if args.png:
         from fieldcal.commands.history_plot import plot
 
@@ -189,13 +190,13 @@ def _show(
     bounds: GradeLimits,
 ) -> None:
     say = sys.stdout.write
-    say(f"{one_line(serial)}: {len(runs)} calibrations\n")
+    say(f"{escape_line(serial)}: {len(runs)} calibrations\n")
     for name, points in trends.items():
         unit = points[-1].unit if points else ""
         say(f"\n{name}, {unit}\n")
         for line in lines(points):
             say(line + "\n")
-        odd = [str(p.run.number) for p in points if p.odd]
+        odd = [str(p.run.number) for p in points if p.out_of_family]
         spread = points[-1].spread
         say(f"  spread from run to run ± {spread:.2g} {unit}")
         say(f"; out of family: {', '.join(odd)}\n" if odd else "; all in family\n")
@@ -220,7 +221,7 @@ def lines(points: Sequence[TrendPoint]) -> list[str]:
         cells[first : last + 1] = "-" * (last + 1 - first)
         cells[round((p.value - low) / step)] = "o"
         value, sigma = format_with_sigma(p.value, p.sigma)
-        word = "OUT" if p.odd else "no-go" if p.run.go is False else ""
+        word = "OUT" if p.out_of_family else "no-go" if p.run.go is False else ""
         word = "accepted" if p.run.accepted else word
         out.append(
             f"  {p.run.number:3d} {p.run.taken_at[:10]} {_warm(p.run):>8}"

@@ -33,7 +33,11 @@ def plot(path: Path, serial: str, trends: Mapping[str, Sequence[TrendPoint]]) ->
     for axis, (name, points) in zip(axes, trends.items(), strict=True):
         when = [datetime.fromisoformat(p.run.taken_at) for p in points]
         for odd, colour in ((False, "tab:blue"), (True, "tab:red")):
-            some = [(w, p) for w, p in zip(when, points, strict=True) if p.odd is odd]
+            some = [
+                (w, p)
+                for w, p in zip(when, points, strict=True)
+                if p.out_of_family is odd
+            ]
             if some:
                 axis.errorbar(
                     [w for w, _ in some],

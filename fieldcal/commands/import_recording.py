@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.commands.import_columns import add_columns, said_of_columns
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import InputError
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.escaping import escape_line
+from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.gravity import G0
-from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Array
@@ -39,7 +39,7 @@ RARE = (
         "acc_zero",
     ),
     *("temp_unit", "temp_lsb", "temp_zero", "name", "serial", "grade", "gravity"),
-    *("lot", "station", "operator", *FACTORY),
+    *("lot", "station", "operator", *FACTORY_KEYS),
 )
 
 EXAMPLE = """\
@@ -199,7 +199,7 @@ def _list(opened: list[Recording]) -> int:
     for recording in opened:
         for stream in recording.streams():
             named = (recording.path, stream.name, stream.says)
-            sys.stdout.write("\t".join(one_line(str(part)) for part in named) + "\n")
+            sys.stdout.write("\t".join(escape_line(str(part)) for part in named) + "\n")
     return 0
 
 

@@ -16,7 +16,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.session.folder import Session
 
 if TYPE_CHECKING:
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
 
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
@@ -60,13 +60,13 @@ def check_same(calibration: Calibration, session: Session) -> None:
         Naming the parameter that differs.
 
     """
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
     from fieldcal.install.proposal import installed_in
 
     found, there = calibration.info.get("installed"), installed_in(session)
     if not found or not there:
         return
-    before, now = _effective(Installed.from_table(found)), _effective(there)
+    before, now = _effective(InstalledCalibration.from_table(found)), _effective(there)
     for name in sorted(before.keys() & now.keys()):
         if not np.isclose(before[name], now[name], rtol=1e-6, atol=1e-9):
             raise InputError(
@@ -76,17 +76,17 @@ def check_same(calibration: Calibration, session: Session) -> None:
             )
 
 
-def _effective(known: Installed) -> dict[str, float]:
+def _effective(known: InstalledCalibration) -> dict[str, float]:
     """Parameters as they were in the samples."""
-    from fieldcal.drivers.mavlink_installed import identity, names
+    from fieldcal.drivers.mavlink_installed import identity_parameters, parameter_names
 
-    of_it = sum(names(known.autopilot, known.instance).values(), start=())
+    of_it = sum(parameter_names(known.autopilot, known.instance).values(), start=())
     had = {name: value for name, value in known.values.items() if name in of_it}
-    return {**had, **(identity(known) if known.taken_out else {})}
+    return {**had, **(identity_parameters(known) if known.taken_out else {})}
 
 
 def _next(
-    calibration: Calibration, session: Session, there: Installed
+    calibration: Calibration, session: Session, there: InstalledCalibration
 ) -> dict[str, dict[str, Any]]:
     from fieldcal.calibration import Nominal
     from fieldcal.install.proposal import changes

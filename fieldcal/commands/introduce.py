@@ -72,7 +72,7 @@ def introduce(args: argparse.Namespace) -> None:
 def _the_one() -> DetectedDevice:
     """What answers on the only port where anything does."""
     from fieldcal.commands.ports import plugged_in
-    from fieldcal.drivers.probe import probe
+    from fieldcal.drivers.probe import probe_port
 
     ports = [port["port"] for port in plugged_in()]
     if not ports:
@@ -83,7 +83,7 @@ def _the_one() -> DetectedDevice:
     answers = []
     for port in ports:
         _tell(f"listening to {port} ...")
-        answers.append(probe(port, LISTEN))
+        answers.append(probe_port(port, LISTEN))
     known = [answer for answer in answers if answer.url]
     if len(known) == 1:
         for one in answers:

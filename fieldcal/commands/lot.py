@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldcal.core.escaping import escape_line
 from fieldcal.core.grade import GRADES
-from fieldcal.core.shown import one_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.lot import LotAnalysis
@@ -58,19 +58,19 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.fleet.lot import analyse_lot
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
     if not 0 < args.fdr < 1:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
-    wanted = sessions.parsed(args.query)
-    database = Database(args.history or default_place())
-    some = database.done(lambda db: sessions.found(db, wanted))
+    wanted = sessions.parse_filters(args.query)
+    database = Database(args.history or default_location())
+    some = database.run(lambda db: sessions.find_sessions(db, wanted))
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page
-        from fieldcal.session.folder import write_whole
+        from fieldcal.session.folder import write_atomically
 
-        write_whole(
+        write_atomically(
             args.report, render_lot_page(found, " ".join(args.query) or "everything")
         )
     if args.json:
@@ -114,7 +114,7 @@ def statements(found: LotAnalysis) -> list[str]:
         unit = format_unit(found.parameters[odd.parameter].unit)
         off = " ± ".join(format_with_sigma(odd.deviation, odd.sigma))
         out.append(
-            f"odd: {one_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
+            f"odd: {escape_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
             f" {off} {unit}".rstrip()
         )
     if len(found.odd) > SHOWN:
@@ -123,7 +123,7 @@ def statements(found: LotAnalysis) -> list[str]:
         unit = format_unit(found.parameters[shift.parameter].unit)
         groups = zip(shift.labels, shift.values, shift.sigmas, strict=True)
         told = "; ".join(
-            f"{one_line(label)} {' ± '.join(format_with_sigma(float(v), float(s)))}"
+            f"{escape_line(label)} {' ± '.join(format_with_sigma(float(v), float(s)))}"
             f" {unit}"
             for label, v, s in groups
         )
@@ -132,10 +132,12 @@ def statements(found: LotAnalysis) -> list[str]:
             f" {told}"
         )
     for alarm in found.alarms:
-        since = "" if alarm.since is None else f", since about {one_line(alarm.since)}"
+        since = (
+            "" if alarm.since is None else f", since about {escape_line(alarm.since)}"
+        )
         out.append(
             f"drift: {alarm.parameter} leaves the {alarm.chart} chart at"
-            f" {one_line(alarm.at)}{since}"
+            f" {escape_line(alarm.at)}{since}"
         )
     if found.in_control:
         out.append("in control: no odd unit, no shift, no drift")

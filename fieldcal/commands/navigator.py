@@ -25,12 +25,12 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.table import show
     from fieldcal.navigator.session_runs import calibrate_navigator
     from fieldcal.session import description
-    from fieldcal.session.folder import DESCRIPTION, RESULT, write_whole
+    from fieldcal.session.folder import DESCRIPTION, RESULT, write_atomically
 
-    about = description.read(args.session / DESCRIPTION)
+    about = description.read_description(args.session / DESCRIPTION)
     found = calibrate_navigator(args.session, about)
     text = json.dumps(found.to_json(), allow_nan=False)
-    path = write_whole(args.session / RESULT, text + "\n")
+    path = write_atomically(args.session / RESULT, text + "\n")
     if args.json:
         for warning in found.warnings:
             sys.stderr.write(f"fieldcal navigator: {warning}\n")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fieldcal.core.samples import Block
-    from fieldcal.history.place import Place
+    from fieldcal.history.location import StoreLocation
     from fieldcal.noise import NoiseModel
     from fieldcal.noise.document import NoiseResult
     from fieldcal.noise.recalibration import HistoryStep, Recalibration
@@ -83,9 +83,9 @@ def run(args: argparse.Namespace) -> int:
             sys.stdout.write(f"written: {path}\n")
     if args.report:
         from fieldcal.report.noise_page import render_noise_page
-        from fieldcal.session.folder import write_whole
+        from fieldcal.session.folder import write_atomically
 
-        written = write_whole(args.report, render_noise_page(found))
+        written = write_atomically(args.report, render_noise_page(found))
         (sys.stderr if args.json else sys.stdout).write(f"written: {written}\n")
     return 0
 
@@ -130,7 +130,7 @@ def _opened(path: Path, place: Path) -> Session:
 def result(
     sessions: Sequence[Session],
     limits: Path | None = None,
-    history: Place | None = None,
+    history: StoreLocation | None = None,
 ) -> NoiseResult:
     """Everything that recordings of a device at rest tell of its noise.
 
@@ -200,15 +200,15 @@ def _recalibrate(
     grade: str,
     serial: str,
     limits: Path | None,
-    history: Place | None,
+    history: StoreLocation | None,
 ) -> tuple[Mapping[str, Recalibration], str]:
     """When each bias leaves the limit of the grade, and since when."""
     from fieldcal.calibration import limits as bounds
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.noise.recalibration import recalibration_time
 
-    runs = History(history or default_place()).runs(serial) if serial else ()
+    runs = History(history or default_location()).runs(serial) if serial else ()
     allowed = bounds.read(grade, limits)
     out = {}
     for name, channel in model.channels.items():
@@ -227,11 +227,11 @@ def _recalibrate(
 
 def _steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
     """Changes of a bias between calibrations that count as its family."""
-    from fieldcal.history.store import family
+    from fieldcal.history.store import family_runs
     from fieldcal.noise.recalibration import HistoryStep
 
     values = []
-    for one in family(runs):
+    for one in family_runs(runs):
         found = one.calibration
         if name in found.names and one.taken_at:
             i = found.names.index(name)

@@ -13,7 +13,7 @@ from fieldcal.commands.plan_file import chosen, table, write
 from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed, show_spins
 from fieldcal.commands.site import add_site, site_tables
 from fieldcal.core.errors import PlanError
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 
 if TYPE_CHECKING:
     from fieldcal.core.positions import Position
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 RARE = (
     *("name", "serial", "lot", "station", "operator"),
-    *("grade", "gravity", "mounting", *FACTORY),
+    *("grade", "gravity", "mounting", *FACTORY_KEYS),
 )
 
 EXAMPLE = """\
@@ -96,15 +96,15 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     import numpy as np
 
-    from fieldcal.core.positions import FIVE
+    from fieldcal.core.positions import FIVE_POSITIONS
     from fieldcal.planning import planner
     from fieldcal.planning.aliasing import find_aliases
     from fieldcal.session import description
 
-    tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
     if args.sways is not None:
         tables["site"] = {**tables.get("site", {}), "sways": True}
-    gravity = description.parse(tables).gravity
+    gravity = description.parse_description(tables).gravity
     if args.speed is not None:
         return _spins(args)
     if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     noise = "this device" if device else args.noise
     needed = None if args.sways is None else _needed(args.sways, grade)
     found = planner.expected(places, grade, seconds, gravity)
-    paper = planner.expected(FIVE, grade, seconds, gravity)
+    paper = planner.expected(FIVE_POSITIONS, grade, seconds, gravity)
     further = planner.extra_position(places, ladder, gravity)
     with_it = planner.expected((*places, further), grade, seconds, gravity)
     confused = find_aliases(places, gravity)

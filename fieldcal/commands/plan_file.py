@@ -28,19 +28,23 @@ def chosen(
         If none are best, or those of a file are not known.
 
     """
-    from fieldcal.core.positions import SETS
+    from fieldcal.core.positions import POSITION_SETS
     from fieldcal.planning.planner import best_positions
     from fieldcal.session import description
     from fieldcal.session.folder import DESCRIPTION
 
     if args.of is None:
         many = POSITIONS if args.positions is None else args.positions
-        return SETS[args.set] if args.set else best_positions(many, ladder, gravity)
+        return (
+            POSITION_SETS[args.set]
+            if args.set
+            else best_positions(many, ladder, gravity)
+        )
     if args.set:
         raise PlanError("--of and --set both name positions: leave one of them out")
     path = args.of / DESCRIPTION if args.of.is_dir() else args.of
-    found = description.read(path).positions
-    if not found or not all(p.oriented and not p.turning for p in found):
+    found = description.read_description(path).positions
+    if not found or not all(p.oriented and not p.on_turning_table for p in found):
         raise PlanError(
             f"{path}: give each [[position]] alpha_deg and beta_deg,"
             " rotation_vector_deg or quaternion, and no rate: --speed plans a table"
@@ -61,13 +65,13 @@ def write(
     """
     import tomlkit
 
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     if path.exists():
         raise InputError(f"{path}: is there already; name another file")
     run_table = {"procedure": "positions", "seconds": seconds}
     whole = {**tables, "run": run_table, "position": [table(p) for p in positions]}
-    write_whole(path, tomlkit.dumps(whole))
+    write_atomically(path, tomlkit.dumps(whole))
 
 
 def table(position: Position) -> dict[str, Any]:

@@ -38,11 +38,11 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     ports = _named(args.port) if args.port else plugged_in()
     if args.probe:
-        from fieldcal.drivers.probe import probe
+        from fieldcal.drivers.probe import probe_port
 
         for port in ports:
             sys.stderr.write(f"listening to {port['port']} ...\n")
-            found = probe(port["port"], args.seconds, args.baud)
+            found = probe_port(port["port"], args.seconds, args.baud)
             port["answer"] = found._asdict()
     if args.json:
         sys.stdout.write(json.dumps({"ports": ports}) + "\n")

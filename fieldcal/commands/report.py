@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fieldcal.history.place import Place
+    from fieldcal.history.location import StoreLocation
     from fieldcal.report import EarlierCalibration
 
 EXAMPLE = """\
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
-        from fieldcal.session.folder import write_whole
+        from fieldcal.session.folder import write_atomically
 
         with Browser() as browser:
             browser.open(page)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
             ):
                 if wanted:
                     path = page.with_suffix(ending)
-                    write_whole(path, make())
+                    write_atomically(path, make())
                     sys.stdout.write(f"written: {path}\n")
     return 0
 
@@ -68,7 +68,7 @@ def write(
     session: Path,
     output: Path | None = None,
     earlier: Sequence[Path] = (),
-    history: Place | None = None,
+    history: StoreLocation | None = None,
 ) -> Path:
     """Write the report of a session and return where it is.
 
@@ -88,17 +88,17 @@ def write(
     from fieldcal.report import gather, render
     from fieldcal.report.gather import read_earlier_result
     from fieldcal.report.page import REPORT
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     before = [read_earlier_result(path) for path in earlier] or _before(
         session, history
     )
-    return write_whole(output or session / REPORT, render(gather(session, before)))
+    return write_atomically(output or session / REPORT, render(gather(session, before)))
 
 
-def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:
+def _before(folder: Path, history: StoreLocation | None) -> list[EarlierCalibration]:
     """What the history knows of the device, without this session."""
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
@@ -108,6 +108,6 @@ def _before(folder: Path, history: Place | None) -> list[EarlierCalibration]:
         return []
     return [
         EarlierCalibration(run.taken_at[:10], run.calibration)
-        for run in History(history or default_place()).runs(str(serial))
+        for run in History(history or default_location()).runs(str(serial))
         if Path(run.session).resolve() != folder.resolve()
     ]

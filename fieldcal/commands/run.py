@@ -25,8 +25,8 @@ from fieldcal.commands.run_waits import (
 from fieldcal.commands.several import StoreSeveral
 from fieldcal.commands.site import add_site
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.factory import FACTORY
-from fieldcal.core.plugins import names
+from fieldcal.core.factory import FACTORY_KEYS
+from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -46,7 +46,7 @@ EXAMPLE = """\
 RARE = (
     *("seed", "patience", "sigma", "history", "limits", "junit", "no_report"),
     *("name", "lot", "station", "operator", "grade", "gravity", "angles_from"),
-    *FACTORY,
+    *FACTORY_KEYS,
 )
 
 
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
     # their names alone: what they import is not loaded for a line of help
-    procedures = names([str(Path(__file__).parents[1] / "procedures")])
+    procedures = module_names([str(Path(__file__).parents[1] / "procedures")])
     add(
         "procedure",
         nargs=argparse.OPTIONAL,
@@ -196,12 +196,12 @@ def _shown_on(
         first_result,
         further_results,
     )
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
 
     file = args.limits or task.run.get("limits")
     bounds = limits.read(task.about.grade, Path(file) if file else None)
-    history = History(args.history or default_place())
+    history = History(args.history or default_location())
     try:
         found, truth, others = _record(args, task, folder, bounds, page)
         found = first_result(found, folder, bounds, history)
@@ -237,7 +237,7 @@ def _names_none(args: argparse.Namespace) -> bool:
     from fieldcal import procedures
 
     said = args.device or args.virtual is not None or args.resume
-    return not said and args.procedure in procedures.names()
+    return not said and args.procedure in procedures.procedure_names()
 
 
 def _record(
@@ -297,7 +297,7 @@ def _unsaid(task: PlanTask) -> list[str]:
     from fieldcal.acceptance.site import gravity_missing_warning
 
     unsaid = [unstated_angles_warning(task.about)]
-    if procedures.most(task.about, task.procedure) is None:
+    if procedures.max_positions(task.about, task.procedure) is None:
         unsaid.append(level_warning_before_run(task.about))
     unsaid.append(gravity_missing_warning(task.about))  # what matters most is said last
     return [sentence for sentence in unsaid if sentence]
@@ -311,7 +311,7 @@ def _take_besides(
     taken: dict[int, Any],
 ) -> None:
     """Note the positions that a remedy adds, and those that it takes once more."""
-    from fieldcal.session.marks import ADDED
+    from fieldcal.session.marks import POSITION_ADDED
 
     for number in again:
         recorder.mark("repeated", position=number)
@@ -319,4 +319,4 @@ def _take_besides(
     for number, position in enumerate(task.about.positions[known:], known):
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
-        recorder.mark(ADDED, position=number, name=position.name, **angles)
+        recorder.mark(POSITION_ADDED, position=number, name=position.name, **angles)

@@ -28,7 +28,7 @@ def operator_of(
     """Yield the operator of a run, seen on the page as well if there is one."""
     from fieldcal import procedures
 
-    most = procedures.most(task.about, task.procedure)
+    most = procedures.max_positions(task.about, task.procedure)
     title = f"fieldcal · {task.procedure} · {folder}"
     if args.headless:
         from fieldcal.run.operator.script import ScriptOperator

@@ -58,10 +58,10 @@ def first_result(
     Whatever set its method solves: with the positions of a remedy there are more.
     """
     from fieldcal.session.folder import Session
-    from fieldcal.session.marks import ADDED
+    from fieldcal.session.marks import POSITION_ADDED
 
     session = Session.open(folder)
-    more = any(mark.get("event") == ADDED for mark in session.marks())
+    more = any(mark.get("event") == POSITION_ADDED for mark in session.marks())
     return concluded(session, bounds, history, "auto" if more else found.method)
 
 
@@ -106,13 +106,13 @@ def write_junit(
     from fieldcal.acceptance.verification import planned_verification
     from fieldcal.core.positions import Position
     from fieldcal.run import junit
-    from fieldcal.session.description import with_more
-    from fieldcal.session.marks import ADDED, MARKS, read_marks
+    from fieldcal.session.description import with_added_positions
+    from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 
     marks = list(read_marks(folder / MARKS))
     about = task.about
-    more = [m for m in marks if m.get("event") == ADDED]
-    about = with_more(about, [
+    more = [m for m in marks if m.get("event") == POSITION_ADDED]
+    about = with_added_positions(about, [
         Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
         for m in more if int(m["position"]) >= len(about.positions)
     ])  # fmt: skip
@@ -145,13 +145,13 @@ def _discarded(folder: Path) -> bool:
 
     The next attempt would be refused the folder for the sake of nothing.
     """
-    from fieldcal.session.arrow_stream import whole
+    from fieldcal.session.arrow_stream import end_of_whole_batches
     from fieldcal.session.folder import DESCRIPTION
     from fieldcal.session.marks import MARKS
     from fieldcal.session.recorder import SAMPLES
 
     with contextlib.suppress(OSError):
-        if whole((folder / SAMPLES).read_bytes()):
+        if end_of_whole_batches((folder / SAMPLES).read_bytes()):
             return False
         for name in (SAMPLES, MARKS, DESCRIPTION):
             (folder / name).unlink()

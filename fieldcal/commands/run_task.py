@@ -43,9 +43,10 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
         return _resumed(args)
     if not args.procedure:
         raise InputError(
-            f"name a procedure ({', '.join(procedures.names())}) or a plan file"
+            f"name a procedure ({', '.join(procedures.procedure_names())})"
+            " or a plan file"
         )
-    if args.procedure in procedures.names():
+    if args.procedure in procedures.procedure_names():
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
@@ -89,7 +90,7 @@ def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
     from fieldcal.run import plan_file
     from fieldcal.session import description
 
-    tables = {"format": description.FORMAT, **site_tables(args, "device")}
+    tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
     tables["position"] = plan_file.positions_of(args.procedure)
     tables["run"] = {"procedure": args.procedure, **_given(args)}
     return tables

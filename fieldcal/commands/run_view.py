@@ -12,7 +12,7 @@ from fieldcal.core.errors import FieldcalError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.history.place import Place
+    from fieldcal.history.location import StoreLocation
 
 
 def show_json(
@@ -65,7 +65,7 @@ def is_go(found: Calibration) -> bool:
     return found.good and bool(found.info["decision"]["go"])
 
 
-def write_report(folder: Path, history: Place) -> Path | None:
+def write_report(folder: Path, history: StoreLocation) -> Path | None:
     """Write the report; the calibration stands without it."""
     from fieldcal.commands.report import write
 

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     try:
-        from fieldcal.service.server import Service, tokens_in
+        from fieldcal.service.server import Service, read_tokens
     except ImportError as error:
         raise InputError(
             "the service needs starlette and uvicorn: pip install 'fieldcal[page]'"
@@ -65,32 +65,32 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.commands.run_page import address_of
     from fieldcal.fleet.workers import dask_pool, process_pool
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
-    from fieldcal.service.bounds import MIB, Bounds
-    from fieldcal.service.jobs import Jobs
+    from fieldcal.history.location import default_location
+    from fieldcal.service.bounds import MIB, ServiceBounds
+    from fieldcal.service.jobs import JobStore
     from fieldcal.service.queue import JobQueue
 
     few = ("upload_mib", "jobs", "kept", "minutes")
     if wrong := next((n for n in few if getattr(args, n) < 1), None):
         raise InputError(f"--{wrong.replace('_', '-')}: one at least is wanted")
-    bounds = Bounds(
+    bounds = ServiceBounds(
         upload=args.upload_mib * MIB, unpacked=8 * args.upload_mib * MIB,
         jobs=args.jobs, kept=args.kept, seconds=60 * args.minutes,
     )  # fmt: skip
-    tokens = tokens_in(args.tokens) if args.tokens else []
+    tokens = read_tokens(args.tokens) if args.tokens else []
     host, port = address_of(args.listen, "--listen")
     with ExitStack() as open_:
         if args.scheduler:
             pool = open_.enter_context(dask_pool(args.scheduler))
         else:
             pool = process_pool(1, ["fieldcal.service.work"])
-        jobs = Jobs((args.folder or _folder()).resolve(), bounds)
-        database = Database(args.history or default_place())
+        jobs = JobStore((args.folder or _folder()).resolve(), bounds)
+        database = Database(args.history or default_location())
         queue = JobQueue(jobs, database, pool)
-        service = Service.of(host, port, jobs, queue, tokens, args.known_as)
+        service = Service.listen(host, port, jobs, queue, tokens, args.known_as)
         open_.enter_context(queue)
         sys.stderr.write(f"page: {service.address}\n")
-        sys.stderr.write(f"sessions: {jobs.root}\nstore: {database.shown}\n")
+        sys.stderr.write(f"sessions: {jobs.root}\nstore: {database.location_text}\n")
         sys.stderr.flush()
         service.serve()
     return 0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from fieldcal.fleet.shared import SharedFinding
@@ -66,10 +66,10 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
     folders = sessions_in(args.sessions)
-    database = Database(args.history or default_place())
+    database = Database(args.history or default_location())
     plain, diagnosed = (
         SessionBatch(folders, SessionTask(d), database) for d in (False, True)
     )
@@ -109,7 +109,7 @@ def lines(one: SharedFinding) -> list[str]:
         for column, value, sigma in rows:
             shown = " ± ".join(format_with_sigma(float(value), float(sigma)))
             told.append(f"{column.name} {shown} {format_unit(column.unit)}".rstrip())
-        out.append(f"  {one_line(groups[g])}: {'; '.join(told)}")
+        out.append(f"  {escape_line(groups[g])}: {'; '.join(told)}")
     if len(groups) > GROUPS:
         out.append(f"  and {len(groups) - GROUPS} more, which show less (--json)")
     return out

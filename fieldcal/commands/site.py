@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fieldcal.commands.several import StoreSeveral
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.grade import GRADES
 
 
@@ -67,7 +67,7 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "serial": args.serial,
             "lot": args.lot,
             "grade": args.grade,
-            **{name: getattr(args, name) for name in FACTORY},
+            **{name: getattr(args, name) for name in FACTORY_KEYS},
         },
         "site": {
             "station": args.station,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.site import add_factory
 from fieldcal.core.errors import InputError
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -165,7 +165,7 @@ def _over_time(session: Session) -> dict[str, Any]:
 
 def _left(args: argparse.Namespace) -> dict[str, float]:
     """What the options say that the factory left in the device."""
-    said = {name: getattr(args, name) for name in FACTORY}
+    said = {name: getattr(args, name) for name in FACTORY_KEYS}
     return {name: value for name, value in said.items() if value is not None}
 
 
@@ -174,11 +174,11 @@ def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
     from fieldcal.fleet.lot_prior import estimate_lot_prior
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
 
-    wanted = sessions.parsed(args.lot)
-    database = Database(args.history or default_place())
-    some = database.done(lambda db: sessions.found(db, wanted, documents=True))
+    wanted = sessions.parse_filters(args.lot)
+    database = Database(args.history or default_location())
+    some = database.run(lambda db: sessions.find_sessions(db, wanted, documents=True))
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
     return estimate_lot_prior(" ".join(args.lot), some, serial, folder)
@@ -190,11 +190,11 @@ def _decided(
     """GO or NO-GO, where the session was a recalibration or limits are given."""
     from fieldcal.acceptance.assessment import assess, limits_path, with_faults
     from fieldcal.calibration import limits
-    from fieldcal.history.place import default_place
+    from fieldcal.history.location import default_location
     from fieldcal.history.store import History
 
     bounds = limits.read(session.grade, limits_path(session, args.limits))
     if args.limits is None and "run" not in session.about.raw:
         return with_faults(found, session, still, bounds)
-    history = History(args.history or default_place())
+    history = History(args.history or default_location())
     return assess(found, session, still, bounds, history)

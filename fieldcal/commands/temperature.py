@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
+from fieldcal.core.escaping import escape_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -145,8 +145,8 @@ def disagrees(found: ThermalModel) -> list[str]:
         z = found.curves[worst].held_out[i]
         if abs(z) > DISAGREES:
             said.append(
-                f"{one_line(name)} at {temperature:.1f} °C: {worst} is {abs(z):.1f} of"
-                " its ± from what the other sessions predict: hysteresis, a jump, or"
+                f"{escape_line(name)} at {temperature:.1f} °C: {worst} is {abs(z):.1f}"
+                " of its ± from what the other sessions predict: hysteresis, a jump, or"
                 " another temperature than the thermometer's; take it again"
             )
     return said
@@ -198,7 +198,7 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
     if at is not None:
         told, rest = costs(found.change(at, last.temperature))
         say(
-            f"\nat {at:.1f} °C with the calibration of {one_line(last.name)}"
+            f"\nat {at:.1f} °C with the calibration of {escape_line(last.name)}"
             f" ({last.temperature:.1f} °C), off by:\n"
         )
         say("".join(f"  {line}\n" for line in told))
@@ -235,7 +235,7 @@ def _write(
 
     """
     from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     path: Path = args.output
     if path.exists():
@@ -251,7 +251,7 @@ def _write(
         text = _commented(made.says, [head, *lines])
     else:
         text = json.dumps(document, indent=2, allow_nan=False) + "\n"
-    write_whole(path, text)
+    write_atomically(path, text)
     sys.stderr.write(f"written: {path}\n")
 
 

@@ -22,9 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; 1 if anything is wrong."""
-    from fieldcal.session.integrity import findings
+    from fieldcal.session.integrity import file_faults
 
-    found = list(findings(args.session))
+    found = list(file_faults(args.session))
     if args.json:
         listed = [{"file": f.file, "text": f.text} for f in found]
         sys.stdout.write(json.dumps({"whole": not found, "findings": listed}) + "\n")

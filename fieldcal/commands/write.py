@@ -13,7 +13,7 @@ from fieldcal.core.errors import FieldcalError, InputError
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
     from fieldcal.drivers.mavlink_parameters import ParameterLink
     from fieldcal.install.proposal import Change
     from fieldcal.session.folder import Session
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 def prepared(
     session: Session, found: Calibration
-) -> tuple[tuple[Change, ...], Installed, tuple[str, ...]]:
+) -> tuple[tuple[Change, ...], InstalledCalibration, tuple[str, ...]]:
     """What is to be written, what was installed, and what must be known of it.
 
     Raises
@@ -111,7 +111,7 @@ def prepared(
 def _refuse(
     found: Calibration,
     wanted: Sequence[Change],
-    installed: Installed,
+    installed: InstalledCalibration,
     force: bool,
 ) -> None:
     from fieldcal.install.proposal import problems
@@ -166,7 +166,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
         If it has another ending.
 
     """
-    from fieldcal.session.folder import write_whole
+    from fieldcal.session.folder import write_atomically
 
     if path.suffix in (".param", ".parm"):
         lines = [f"{c.name},{c.new:.9g}" for c in wanted]
@@ -175,7 +175,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
         lines += [f"1\t1\t{c.name}\t{c.new:.9g}\t9" for c in wanted]
     else:
         raise InputError(f"{path}: end it in .param (Mission Planner) or .params (QGC)")
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     sys.stderr.write(f"written: {path}\n")
 
 
@@ -183,7 +183,7 @@ def _to_device(
     args: argparse.Namespace,
     session: Session,
     wanted: Sequence[Change],
-    installed: Installed,
+    installed: InstalledCalibration,
 ) -> None:
     known = {c.name: c.old for c in wanted}
     new = {c.name: c.new for c in wanted}
@@ -211,7 +211,7 @@ def carried_out(
     yes : whether nobody is asked
 
     """
-    from fieldcal.drivers.mavlink_parameters import same
+    from fieldcal.drivers.mavlink_parameters import same_float32
     from fieldcal.install.transaction import (
         WriteRolledBack,
         broken_off,
@@ -230,7 +230,7 @@ def carried_out(
             sys.stderr.write(f"{said}\n")
     else:
         now = old = check_unchanged(link, known, "while it was recorded", new)
-    if all(same(now[name], value) for name, value in new.items()):
+    if all(same_float32(now[name], value) for name, value in new.items()):
         if earlier:
             note_done(earlier[0], done=True)
         sys.stderr.write(f"all {len(new)} parameters are installed already\n")

@@ -1,5 +1,6 @@
-"""Samples, frames, gravity, positions and errors, which all other rooms use.
+"""Samples, frames, gravity, positions and errors, which all other packages use.
 
-Everything above may import it; it imports nothing of fieldcal, does no I/O and knows no
-clock. Values are SI, angles in rad. What only one room needs stays in that room.
+Every other package may import it. It imports no other package of fieldcal, does no I/O
+and reads no clock. Values are SI, angles in rad. What only one package needs stays in
+that package.
 """

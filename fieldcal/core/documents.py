@@ -1,7 +1,7 @@
-"""TOML and JSON that others have written: what cannot be read is one kind of error.
+"""Parse TOML and JSON text; every text that cannot be parsed raises one kind of error.
 
-A parser follows nesting until the stack ends, and numbers until they have more digits
-than Python turns into one. Both are what is wrong with the text, not with us.
+The parsers raise RecursionError for deep nesting, and a plain ValueError for a number
+with more digits than Python converts. Both become errors of the text.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import json
 import tomllib
 from typing import Any
 
-DEEP = "it is nested too deeply"
-LONG = "it has a number of thousands of digits"
+NESTED_TOO_DEEPLY = "it is nested too deeply"
+NUMBER_TOO_LONG = "it has a number of thousands of digits"
 
 
 def load_toml(text: str) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def load_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     tomllib.TOMLDecodeError
-        If it is none.
+        If the text is not TOML.
 
     >>> load_toml("a = " + "[" * 9999)
     Traceback (most recent call last):
@@ -32,9 +32,9 @@ def load_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:
-        raise tomllib.TOMLDecodeError(DEEP) from None
+        raise tomllib.TOMLDecodeError(NESTED_TOO_DEEPLY) from None
     except ValueError:
-        raise tomllib.TOMLDecodeError(LONG) from None
+        raise tomllib.TOMLDecodeError(NUMBER_TOO_LONG) from None
 
 
 def load_json(text: str) -> Any:
@@ -43,7 +43,7 @@ def load_json(text: str) -> Any:
     Raises
     ------
     ValueError
-        If it is none.
+        If the text is not JSON.
 
     """
     try:
@@ -51,6 +51,6 @@ def load_json(text: str) -> Any:
     except json.JSONDecodeError:
         raise
     except RecursionError:
-        raise ValueError(DEEP) from None
+        raise ValueError(NESTED_TOO_DEEPLY) from None
     except ValueError:
-        raise ValueError(LONG) from None
+        raise ValueError(NUMBER_TOO_LONG) from None

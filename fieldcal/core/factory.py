@@ -1,4 +1,4 @@
-"""What a factory leaves of errors that a calibration does not estimate.
+"""Sizes of the sensor errors that a factory leaves and a calibration does not estimate.
 
 Each is an effect of the catalogue by its id, with one standard deviation that all of
 its coefficients share. Few positions cannot show them, so they are part of every
@@ -10,11 +10,12 @@ zero that is as large as K2 at 1 g, and a K3 that is as large as K2 at 10 g,
 
     k+- = K2 g,    K3 = K2 / (10 g)                                                 (1)
 
-A suspension keeps something of how it was bent last: biases of accelerometers have
-hysteresis.
+The suspension of a proof mass does not return exactly to zero after a turn: biases of
+accelerometers have hysteresis.
 
-A device that warms up has biases that change by their temperature coefficients. A
-thermometer shows the course. Otherwise it is that of a package, exp(-t / tau).
+While a device warms up, its biases change with their temperature coefficients. A
+thermometer records the temperature. Without one, the temperature of a package that
+warms up is assumed, exp(-t / tau).
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from dataclasses import dataclass
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 
-FACTORY = ("squareness", "quadratic", "g_sensitivity")
-"""Keys by which session.toml and ``limits.toml`` state them, in the order below."""
+FACTORY_KEYS = ("squareness", "quadratic", "g_sensitivity")
+"""Keys that session.toml and ``limits.toml`` use for these sizes."""
 
-LARGEST = {"cross_coupling": 1.0, "quadratic": 1e-2, "g_sensitivity": 1e-2}
-"""From which on a value is in another unit: an output as large as its input."""
+IMPOSSIBLE_SIZES = {"cross_coupling": 1.0, "quadratic": 1e-2, "g_sensitivity": 1e-2}
+"""Sizes that no device reaches, by attribute: the value must be in another unit."""
 
 
-WARMING = ("temperature_bias", "warm_up")
-"""Effects by which biases change with a thermometer, and without."""
+WARMING_EFFECTS = ("temperature_bias", "warm_up")
+"""Effects that change the biases: with a thermometer, and without one."""
 
-WARM_UP_S = 300.0
-"""Time constant of a package that warms up, s: of 100 to 2000."""
+WARM_UP_TIME_CONSTANT = 300.0
+"""Time constant of a package that warms up, s; between 100 and 2000."""
 
 
 @dataclass(frozen=True, slots=True)
 class FactoryErrors:
-    """One sigma of each coefficient.
+    """Standard deviation of each coefficient.
 
     Attributes
     ----------
@@ -49,8 +50,9 @@ class FactoryErrors:
     quadratic : K2 of the accelerometers, 1/(m/s^2)
     g_sensitivity : of the gyroscopes, (rad/s)/(m/s^2)
     acc_per_k, gyr_per_k : temperature coefficients of biases, m/s^2/K and rad/s/K
-    hysteresis : m/s^2, what the last turn leaves in the bias of an accelerometer
-    warming_k : K that the device may still warm up by, where no thermometer shows it
+    hysteresis : change of the bias of an accelerometer by the last turn, m/s^2
+    warming_k : rise of temperature that is still possible, K; used without a
+        thermometer
 
     Raises
     ------
@@ -68,7 +70,7 @@ class FactoryErrors:
     warming_k: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, largest in LARGEST.items():
+        for name, largest in IMPOSSIBLE_SIZES.items():
             size = getattr(self, name)
             if not 0 <= size < largest:
                 said = "squareness" if name == "cross_coupling" else name
@@ -79,7 +81,7 @@ class FactoryErrors:
 
     @property
     def by_effect(self) -> Mapping[str, float]:
-        """Sizes of what depends on the force, by id of the effect."""
+        """Sizes of the effects of the specific force, by id of the effect."""
         return {
             "cross_coupling": self.cross_coupling,
             "quadratic": self.quadratic,
@@ -88,12 +90,12 @@ class FactoryErrors:
             "g_sensitivity": self.g_sensitivity,
         }
 
-    def warming(self, shown: bool) -> tuple[str, tuple[float, ...]]:
-        """By which effect biases change, and the sizes of its six coefficients.
+    def warming_effect(self, has_thermometer: bool) -> tuple[str, tuple[float, ...]]:
+        """Effect by which biases change, and the sizes of its six coefficients.
 
-        `shown` says whether a thermometer shows the course.
+        `has_thermometer` says whether a thermometer records the change.
         """
         per_k = (self.acc_per_k,) * 3 + (self.gyr_per_k,) * 3
-        if shown:
-            return WARMING[0], per_k
-        return WARMING[1], tuple(size * self.warming_k for size in per_k)
+        if has_thermometer:
+            return WARMING_EFFECTS[0], per_k
+        return WARMING_EFFECTS[1], tuple(size * self.warming_k for size in per_k)

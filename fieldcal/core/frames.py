@@ -1,4 +1,4 @@
-"""Turns, the mounting of the device, and what its sensors experience at rest.
+"""Rotations, mounting of the device, specific force and Earth's rate at rest.
 
 Procedure axes at home (all angles 0): x East, y down, z North, right-handed. The device
 is turned by alpha about z, then by beta about the turned x, and where a third angle is
@@ -26,43 +26,46 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.rotation import logarithm
+from fieldcal.core.rotation import rotation_vectors
 from fieldcal.core.samples import Array
 
 EARTH_RATE = 7.292115e-5
 """Angular rate of the Earth, rad/s (WGS84)."""
 
-UPRIGHT = 1e-9
+GIMBAL_LOCK = 1e-9
 """Cosine of beta below which alpha and gamma turn about the same axis."""
 
 
-def turn(alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike | None = None) -> Array:
+def direction_cosines(
+    alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike | None = None
+) -> Array:
     """Direction cosines from base to procedure axes after the turns, (..., 3, 3).
 
     Parameters
     ----------
     alpha, beta, gamma : rad, broadcast against each other; no third turn if not given
 
-    >>> np.round(turn(0.0, np.pi / 2) @ [0, -1, 0], 12) + 0.0
+    >>> np.round(direction_cosines(0.0, np.pi / 2) @ [0, -1, 0], 12) + 0.0
     array([0., 0., 1.])
     """
     alpha, beta = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(beta, float))
-    columns = [in_turned_axes(alpha, beta, axis, gamma) for axis in np.eye(3)]
+    columns = [in_procedure_axes(alpha, beta, axis, gamma) for axis in np.eye(3)]
     return np.stack(columns, axis=-1)
 
 
-def turns_of(matrix: ArrayLike) -> Array:
+def angles_of_direction_cosines(matrix: ArrayLike) -> Array:
     """Angles alpha, beta, gamma, rad, of direction cosines (..., 3, 3), (..., 3).
 
-    The inverse of `turn`; beta is in [-pi/2, pi/2]. Where it is a right angle alpha and
-    gamma turn about one axis, and gamma is 0.
+    The inverse of `direction_cosines`; beta is in [-pi/2, pi/2]. Where it is a right
+    angle, alpha and gamma turn about one axis, and gamma is 0.
 
-    >>> np.round(turns_of(turn(2.5, -0.4, -1.2)), 9).tolist()
+    >>> matrix = direction_cosines(2.5, -0.4, -1.2)
+    >>> np.round(angles_of_direction_cosines(matrix), 9).tolist()
     [2.5, -0.4, -1.2]
     """
     a = np.asarray(matrix, float)
     down = np.hypot(a[..., 1, 0], a[..., 1, 1])
-    one = down < UPRIGHT  # axis for both
+    one = down < GIMBAL_LOCK  # axis for both
     alpha = np.where(
         one,
         np.arctan2(a[..., 0, 1], a[..., 0, 0]),
@@ -72,26 +75,29 @@ def turns_of(matrix: ArrayLike) -> Array:
     return np.stack([alpha, np.arctan2(a[..., 1, 2], down), gamma], axis=-1)
 
 
-def way(before: Array, alpha: Array, beta: Array) -> Array:
-    """Rotation vectors from turns `before` (..., 3, 3) to others, (..., 3) rad.
+def shortest_rotation(before: Array, alpha: Array, beta: Array) -> Array:
+    """Rotation vectors from attitudes `before` (..., 3, 3) to others, (..., 3) rad.
 
-    In procedure axes; the shortest way.
+    In procedure axes; of the two ways round, the shorter one.
 
-    >>> np.round(way(turn(0.0, 0.0), np.array([0.5]), np.zeros(1)), 12) + 0.0
+    >>> home = direction_cosines(0.0, 0.0)
+    >>> np.round(shortest_rotation(home, np.array([0.5]), np.zeros(1)), 12) + 0.0
     array([[0. , 0. , 0.5]])
     """
-    return logarithm(before @ np.swapaxes(turn(alpha, beta), -1, -2))
+    return rotation_vectors(
+        before @ np.swapaxes(direction_cosines(alpha, beta), -1, -2)
+    )
 
 
-def in_turned_axes(
+def in_procedure_axes(
     alpha: Array, beta: Array, vector: Array, gamma: ArrayLike | None = None
 ) -> Array:
     """A vector (3,) of base axes in procedure axes after the turns, (..., 3).
 
-    As `turn` times the vector, where only that is wanted.
+    Equal to `direction_cosines` times the vector, without making the matrices.
 
     >>> quarter = np.array([np.pi / 2])
-    >>> np.round(in_turned_axes(np.zeros(1), quarter, [0, -1, 0]), 12) + 0.0
+    >>> np.round(in_procedure_axes(np.zeros(1), quarter, [0, -1, 0]), 12) + 0.0
     array([[0., 0., 1.]])
     """
     x, y, z = vector
@@ -100,22 +106,24 @@ def in_turned_axes(
     out[..., 0] = x * ca + y * sa  # (3)
     out[..., 1] = on * cb + z * sb
     out[..., 2] = z * cb - on * sb
-    return out if gamma is None else about_y(out, np.asarray(gamma, float))
+    return (
+        out if gamma is None else in_axes_turned_about_y(out, np.asarray(gamma, float))
+    )
 
 
-def about_y(vector: Array, gamma: Array) -> Array:
+def in_axes_turned_about_y(vector: Array, gamma: Array) -> Array:
     """Vectors (..., 3) in axes that are turned about y by gamma, rad; A3 of (3)."""
     c, s = np.cos(gamma), np.sin(gamma)
     x, y, z = np.moveaxis(vector, -1, 0)
     return np.stack([c * x - s * z, y + 0.0 * c, s * x + c * z], axis=-1)
 
 
-def force_home(gravity: float) -> Array:
+def specific_force_at_home(gravity: float) -> Array:
     """Specific force at rest in base axes, (3,) m/s^2: y points down."""
     return np.array([0.0, -gravity, 0.0])
 
 
-def force(
+def specific_force_at_rest(
     alpha: ArrayLike,
     beta: ArrayLike,
     gravity: float,
@@ -123,18 +131,20 @@ def force(
 ) -> Array:
     """Specific force at rest in procedure axes, (..., 3) m/s^2, (4).
 
-    >>> np.round(force(0.0, 0.0, 9.81), 3) + 0.0
+    >>> np.round(specific_force_at_rest(0.0, 0.0, 9.81), 3) + 0.0
     array([ 0.  , -9.81,  0.  ])
     """
-    at_rest: Array = turn(alpha, beta, gamma) @ force_home(gravity)  # (4)
+    at_rest: Array = direction_cosines(alpha, beta, gamma) @ specific_force_at_home(
+        gravity
+    )  # (4)
     return at_rest
 
 
-def mean_rotation(rates: Array) -> Array:
-    """Projection that averaging over whole turns makes of another rate, (n, 3, 3).
+def axis_projections(rates: Array) -> Array:
+    """Projection matrices on the axis about which the device turns, (n, 3, 3).
 
-    Of a device that turns at `rates` (n, 3), components across the axis average to 0;
-    of a device at rest all components remain.
+    Averaged over whole turns at `rates` (n, 3), only the component of another vector
+    along that axis remains. For a device at rest the matrix is the identity.
     """
     speed = np.linalg.norm(rates, axis=1, keepdims=True)
     axis = np.divide(rates, speed, out=np.zeros_like(rates), where=speed > 0)
@@ -143,18 +153,19 @@ def mean_rotation(rates: Array) -> Array:
     return left
 
 
-def earth_rate_home(latitude: float) -> Array:
+def earth_rate_at_home(latitude: float) -> Array:
     """Earth's rate in base axes, (3,) rad/s; `latitude` in rad, (38)."""
     return EARTH_RATE * np.array([0.0, -np.sin(latitude), np.cos(latitude)])  # (38)
 
 
-def angles_of(direction: ArrayLike) -> tuple[float, float]:
+def angles_of_force_direction(direction: ArrayLike) -> tuple[float, float]:
     """Angles alpha, beta in rad at which the specific force is along `direction`.
 
     `direction` is (3,) in procedure axes, of any length. The inverse of (4), beta in
     (-pi/2, pi/2]: f = g (-sin a, -cos a cos b, cos a sin b).
 
-    >>> [round(float(np.rad2deg(a)), 6) for a in angles_of(force(0.5, 0.1, 9.81))]
+    >>> force = specific_force_at_rest(0.5, 0.1, 9.81)
+    >>> [round(float(np.rad2deg(a)), 6) for a in angles_of_force_direction(force)]
     [28.64789, 5.729578]
     """
     x, y, z = np.asarray(direction, float)

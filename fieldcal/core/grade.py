@@ -1,4 +1,4 @@
-"""Grades of devices, by what a factory leaves; an MPU-6050 is of consumer grade."""
+"""Grades of devices, by the errors left by a factory; an MPU-6050 is consumer grade."""
 
 from __future__ import annotations
 

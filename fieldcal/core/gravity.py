@@ -23,7 +23,7 @@ _F = 1 / 298.257223563
 _M = 0.00344978650684
 
 
-def gravity(latitude_deg: float, height_m: float = 0.0) -> float:
+def normal_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     """Normal gravity in m/s^2.
 
     Raises
@@ -31,7 +31,7 @@ def gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     InputError
         If the place is not on the Earth's surface or in the air above it.
 
-    >>> round(gravity(50.45, 170.0), 5)
+    >>> round(normal_gravity(50.45, 170.0), 5)
     9.81058
     """
     if not -90 <= latitude_deg <= 90 or not -1000 <= height_m <= 100_000:

@@ -1,4 +1,4 @@
-"""Plug-ins of one file each: found by the file's name and their base class."""
+"""Plug-ins, one in each file, found by the name of the file and by their base class."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def names(path: Iterable[str]) -> tuple[str, ...]:
+def module_names(path: Iterable[str]) -> tuple[str, ...]:
     """Names of the modules in a package's ``__path__``, in alphabetical order."""
     return tuple(sorted(module.name for module in iter_modules(path)))
 
 
-def class_in(module: str, base: type[T]) -> type[T]:
+def plugin_class(module: str, base: type[T]) -> type[T]:
     """Public subclass of `base` that a module defines.
 
     Parameters
     ----------
     module : its dotted name
-    base : what the class must be; of several, each from the one before, the last counts
+    base : class that the plug-in derives from; of a chain of subclasses, the last
+        counts
 
     Raises
     ------

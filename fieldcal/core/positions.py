@@ -8,13 +8,13 @@ from itertools import product
 
 import numpy as np
 
-from fieldcal.core.frames import force
+from fieldcal.core.frames import specific_force_at_rest
 from fieldcal.core.samples import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where the device is held; angles in rad, None where they are not known.
+    """Orientation in which the device is held; angles in rad, None where not known.
 
     Attributes
     ----------
@@ -22,9 +22,10 @@ class Position:
     alpha, beta : turns (1), (2) from home, rad
     rate : constant rate about the procedure axes on a rate table, rad/s
     gamma : third turn, rad
-    sigma : how well all this is known, rad about any axis; None if the site says so
-    speed : of a table that turns the device about an axis nobody knows, rad/s
-    speed_sigma : how well that is known, rad/s
+    sigma : standard deviation of the attitude about any axis, rad; None where the site
+        states it for all positions
+    speed : rate of a table that turns the device about an unknown axis, rad/s
+    speed_sigma : standard deviation of `speed`, rad/s
 
     """
 
@@ -50,8 +51,8 @@ class Position:
             gamma=float(np.deg2rad(gamma)),
         )
 
-    def times(self, size: float) -> Position:
-        """The same with angles that are so many times as large."""
+    def scaled(self, size: float) -> Position:
+        """The same position with all angles multiplied by `size`."""
         if self.alpha is None or self.beta is None:
             return self
         alpha, beta, gamma = (size * a for a in (self.alpha, self.beta, self.gamma))
@@ -63,7 +64,7 @@ class Position:
         return self.alpha is not None and self.beta is not None
 
     @property
-    def turning(self) -> bool:
+    def on_turning_table(self) -> bool:
         """Whether a table turns the device."""
         return self.speed > 0 or any(self.rate or ())
 
@@ -78,52 +79,56 @@ class Position:
 
     @property
     def degrees(self) -> tuple[float, float] | None:
-        """Both angles in degrees, if known and all that there is to the position."""
+        """Alpha and beta in degrees; None if unknown or with a third angle."""
         if self.alpha is None or self.beta is None or self.gamma:
             return None
         alpha, beta = np.rad2deg([self.alpha, self.beta]).round(9).tolist()
         return alpha, beta
 
 
-def rates(positions: Sequence[Position]) -> Array:
-    """Known rates of a rate table, (n, 3) rad/s about the procedure axes; else 0."""
+def table_rates(positions: Sequence[Position]) -> Array:
+    """Rates of a rate table about the procedure axes, (n, 3) rad/s; 0 if not stated."""
     return np.array([p.rate or (0.0, 0.0, 0.0) for p in positions]).reshape(-1, 3)
 
 
-def speeds(positions: Sequence[Position]) -> tuple[Array, Array]:
-    """Speeds about axes that nobody knows and their ±, (n,) rad/s each; 0 elsewhere."""
+def unknown_axis_speeds(positions: Sequence[Position]) -> tuple[Array, Array]:
+    """Speeds about unknown axes and their ±, (n,) rad/s each; 0 where not stated."""
     both = [(p.speed, p.speed_sigma) for p in positions]
     table = np.array(both, dtype=float).reshape(-1, 2)
     return table[:, 0], table[:, 1]
 
 
-def angles(positions: Sequence[Position]) -> tuple[Array, Array]:
+def alpha_beta_angles(positions: Sequence[Position]) -> tuple[Array, Array]:
     """Alpha and beta of the positions, (n,) rad each, nan where unknown."""
     both = [(p.alpha, p.beta) for p in positions]
     table = np.array(both, dtype=float).reshape(-1, 2)
     return table[:, 0], table[:, 1]
 
 
-def third_angles(positions: Sequence[Position]) -> Array:
+def gamma_angles(positions: Sequence[Position]) -> Array:
     """Gamma of the positions, (n,) rad."""
     return np.array([p.gamma for p in positions], dtype=float)
 
 
 def attitude_sigmas(positions: Sequence[Position]) -> Array:
-    """How well each position says that it is known, (n,) rad; nan where it does not."""
+    """Standard deviation of each position's attitude, (n,) rad; nan if not stated."""
     return np.array([p.sigma for p in positions], dtype=float)
 
 
-def forces(positions: Sequence[Position], gravity: float) -> Array:
+def specific_forces(positions: Sequence[Position], gravity: float) -> Array:
     """Specific force at rest in procedure axes, (n, 3) m/s^2, nan where unknown."""
-    gamma = third_angles(positions)
-    return force(*angles(positions), gravity, gamma if gamma.any() else None)
+    gamma = gamma_angles(positions)
+    return specific_force_at_rest(
+        *alpha_beta_angles(positions), gravity, gamma if gamma.any() else None
+    )
 
 
-def ladder(positions: Sequence[Position]) -> list[tuple[float, float]]:
-    """Angles that a session's ladder can be set to, deg: each it had, to either side.
+def ladder_settings(positions: Sequence[Position]) -> list[tuple[float, float]]:
+    """Pairs of angles that a session's ladder can be set to, deg.
 
-    >>> ladder([Position.deg(0, 0), Position.deg(45, 5)])[:4]
+    Each angle that a position has, to either side, and 0.
+
+    >>> ladder_settings([Position.deg(0, 0), Position.deg(45, 5)])[:4]
     [(0.0, 0.0), (0.0, -5.0), (0.0, 5.0), (-45.0, 0.0)]
     """
     had = [p.degrees for p in positions if p.degrees]
@@ -138,16 +143,21 @@ def _set(*pairs: tuple[float, float]) -> tuple[Position, ...]:
     return tuple(Position.deg(alpha, beta) for alpha, beta in pairs)
 
 
-TWO = _set((0, 0), (45, 5))
+TWO_POSITIONS = _set((0, 0), (45, 5))
 """The paper's two positions: bias and scale factor on a level base."""
 
-FIVE = _set((0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5))
+FIVE_POSITIONS = _set((0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5))
 """The paper's five positions: the tilt of the base as well."""
 
-WIDE = _set((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5))
+WIDE_POSITIONS = _set((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5))
 """Five positions that use the whole of a small ladder, to both sides."""
 
 SIX_FACES = _set((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 """Each axis up and down; needs more than a ladder."""
 
-SETS = {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}
+POSITION_SETS = {
+    "two": TWO_POSITIONS,
+    "five": FIVE_POSITIONS,
+    "wide": WIDE_POSITIONS,
+    "six_faces": SIX_FACES,
+}

@@ -7,10 +7,10 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 
-def exponential(angle: Array) -> Array:
+def rotation_matrices(angle: Array) -> Array:
     """Rotation matrices exp([angle x]) by Rodrigues' formula, (..., 3) to (..., 3, 3).
 
-    >>> np.round(exponential(np.array([0, 0, np.pi / 2])) @ [1, 0, 0], 12) + 0.0
+    >>> np.round(rotation_matrices(np.array([0, 0, np.pi / 2])) @ [1, 0, 0], 12) + 0.0
     array([0., 1., 0.])
     """
     size = np.linalg.norm(angle, axis=-1)[..., None, None]
@@ -22,14 +22,14 @@ def exponential(angle: Array) -> Array:
     return whole
 
 
-def logarithm(matrix: Array) -> Array:
+def rotation_vectors(matrix: Array) -> Array:
     """Rotation vectors of rotation matrices, (..., 3, 3) to (..., 3) rad.
 
     The shortest turn; of two that are half a turn, one. From 4 q q^T of the quaternion
     q, of which the column with the largest diagonal is divided by no small number.
     Source: Shepperd 1978.
 
-    >>> np.round(logarithm(exponential(np.array([0.1, -3.0, 0.2]))), 12)
+    >>> np.round(rotation_vectors(rotation_matrices(np.array([0.1, -3.0, 0.2]))), 12)
     array([ 0.1, -3. ,  0.2])
     """
     square = np.zeros((*matrix.shape[:-2], 4, 4))

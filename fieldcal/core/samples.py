@@ -20,19 +20,19 @@ ACC, GYR = slice(0, 3), slice(3, 6)
 """Channels of each triad."""
 
 
-UNKNOWN = np.array(np.nan)
+NOT_A_NUMBER = np.array(np.nan)
 
-QUICKEST_HZ = 1e6
-"""No IMU has as many samples a second: such times are in another unit."""
+IMPOSSIBLE_RATE_HZ = 1e6
+"""Sampling rate that no IMU reaches: the times are in another unit than s."""
 
 
-def too_quick(rate_hz: float) -> str:
-    """Sentence about a rate that no device has; empty if one may.
+def impossible_rate_text(rate_hz: float) -> str:
+    """Error text for a sampling rate that no device has; empty for a possible one.
 
-    >>> too_quick(200.0)
+    >>> impossible_rate_text(200.0)
     ''
     """
-    if not rate_hz > QUICKEST_HZ:
+    if not rate_hz > IMPOSSIBLE_RATE_HZ:
         return ""
     return (
         f"its samples come {rate_hz:.2g} times a second, which no IMU does: the times"
@@ -41,7 +41,7 @@ def too_quick(rate_hz: float) -> str:
 
 
 def common_unit(names: Iterable[str]) -> str | None:
-    """Unit that channels share, "" for what is no channel; None if they share none.
+    """Unit of all names; "" for names that are no channels, None if units differ.
 
     >>> common_unit(["ax", "az"]), common_unit(["t"]), common_unit(["ax", "gx"])
     ('m/s^2', '', None)
@@ -82,7 +82,7 @@ class Block:
         seq: Array | None = None,
         t_host: Array | None = None,
     ) -> Block:
-        """Build a block; what is not given is unknown, and not to be written to."""
+        """Build a block; columns that are not given are nan and read-only."""
         n = len(t)
 
         def double(values: Array) -> Array:
@@ -91,7 +91,11 @@ class Block:
                 return np.asarray(values, dtype=float)
 
         def known(values: Array | None, shape: tuple[int, ...]) -> Array:
-            return np.broadcast_to(UNKNOWN, shape) if values is None else double(values)
+            return (
+                np.broadcast_to(NOT_A_NUMBER, shape)
+                if values is None
+                else double(values)
+            )
 
         return cls(
             double(t),
@@ -121,12 +125,12 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Grain:
-    """What a device rounds its outputs to, where it says so.
+    """Step to which a device rounds its outputs, as far as the device states it.
 
     Attributes
     ----------
     acc, gyr : steps of the outputs, m/s^2 and rad/s; 0 where not known
-    cut : whether toward zero, and then put in the middle of what it may have been
+    cut : whether it rounds toward zero; outputs are then corrected by half a step
 
     """
 
@@ -150,8 +154,8 @@ def concat(blocks: Iterable[Block]) -> Block:
     )
 
 
-def pieces(block: Block, seconds: float) -> Iterator[Block]:
-    """Cut a block, so that what is done with it does not depend on how samples come."""
+def split_by_time(block: Block, seconds: float) -> Iterator[Block]:
+    """Parts of a block of `seconds` s of device time each; the last may be shorter."""
     edges = np.arange(block.t[0] + seconds, block.t[-1], seconds)
     rows = [0, *np.searchsorted(block.t, edges).tolist(), len(block)]
     for first, last in pairwise(rows):
@@ -159,10 +163,10 @@ def pieces(block: Block, seconds: float) -> Iterator[Block]:
             yield block[first:last]
 
 
-def runs(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
+def runs_of_true(flags: NDArray[np.bool_]) -> NDArray[np.intp]:
     """First and one past the last of each run of True, (m, 2).
 
-    >>> runs(np.array([False, True, True, False, True])).tolist()
+    >>> runs_of_true(np.array([False, True, True, False, True])).tolist()
     [[1, 3], [4, 5]]
     """
     padded = np.concatenate([[False], flags, [False]]).astype(np.int8)

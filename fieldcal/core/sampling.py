@@ -1,4 +1,4 @@
-"""How often samples come, and whether they come without a pause."""
+"""Sampling rate of a block, and whether samples follow one another without a pause."""
 
 from __future__ import annotations
 
@@ -6,28 +6,30 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 
-STEPS = 100_000
-"""Steps between samples that tell the rate; more would only take time."""
+STEPS_USED = 100_000
+"""Steps between samples from which the rate is estimated, at most."""
 
-SPAN = 50
-"""Samples over which stamps that come in bursts are even."""
+BURST_SPAN = 50
+"""Samples over which the mean step is right also where stamps come in bursts."""
 
-PAUSE = 3.5
-"""Periods without a sample that are a pause: what went on in it nobody knows."""
+PAUSE_PERIODS = 3.5
+"""Time without a sample that counts as a pause, in sampling periods."""
 
 
-def rate_of(block: Block) -> float:
-    """Samples a second, from the times."""
+def sampling_rate(block: Block) -> float:
+    """Sampling rate, Hz, from the times of the samples."""
     if len(block) < 2:
         return 1.0
-    first = np.arange(0, len(block) - 1, max(len(block) // STEPS, 1))
+    first = np.arange(0, len(block) - 1, max(len(block) // STEPS_USED, 1))
     step = float(np.median(block.t[first + 1] - block.t[first]))
-    over = block.t[SPAN::SPAN] - block.t[:-SPAN:SPAN]  # stamps may come in bursts
-    return 1 / max(step, float(np.median(over)) / SPAN if len(over) else 0.0)
+    over = (
+        block.t[BURST_SPAN::BURST_SPAN] - block.t[:-BURST_SPAN:BURST_SPAN]
+    )  # stamps may come in bursts
+    return 1 / max(step, float(np.median(over)) / BURST_SPAN if len(over) else 0.0)
 
 
-def unbroken(t: Array, first: int, last: int, rate: float) -> bool:
-    """Whether samples come without a pause from before one to that behind a last.
+def has_no_pause(t: Array, first: int, last: int, rate: float) -> bool:
+    """Whether there is no pause from the sample before `first` to that after the last.
 
     Parameters
     ----------
@@ -36,8 +38,8 @@ def unbroken(t: Array, first: int, last: int, rate: float) -> bool:
     rate : samples a second
 
     >>> t = np.array([0.0, 0.1, 0.2, 5.2, 5.3, 5.4])
-    >>> unbroken(t, 1, 2, 10.0), unbroken(t, 1, 3, 10.0), unbroken(t, 4, 6, 10.0)
-    (True, False, True)
+    >>> [has_no_pause(t, i, j, 10.0) for i, j in ((1, 2), (1, 3), (4, 6))]
+    [True, False, True]
     """
     steps = np.diff(t[max(first - 1, 0) : last + 1])
-    return not (steps > PAUSE / rate).any()
+    return not (steps > PAUSE_PERIODS / rate).any()

@@ -1,14 +1,14 @@
-"""Words as a sentence lists them."""
+"""Lists of words in a sentence."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 
-def join(words: Sequence[str], last: str = "and") -> str:
-    """Words with commas, the last behind a word.
+def join_words(words: Sequence[str], last: str = "and") -> str:
+    """Words separated by commas, with `last` before the last one.
 
-    >>> join(["a"]), join(["a", "b"]), join(["a", "b", "c"], "or")
+    >>> join_words(["a"]), join_words(["a", "b"]), join_words(["a", "b", "c"], "or")
     ('a', 'a and b', 'a, b or c')
     """
     return f" {last} ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.calibration.names import TILTS
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.samples import Array
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.diagnosis.factory_left import enlarge_to_shown_grade, factory_error_groups
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model import thresholds
@@ -183,7 +183,7 @@ class Explanation:
         samples = (
             rows.length.sum()
             / len(d.window_positions)
-            * rate_of(self.prepared.source.block)
+            * sampling_rate(self.prepared.source.block)
         )
         ratio = EARTH_RATE / (np.nanmax(rows.noise[3:]) / np.sqrt(samples))
         return bool(ratio > thresholds.SEES_EARTH)

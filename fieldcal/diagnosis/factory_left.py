@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.calibration.grade_shown import GradeShown
-from fieldcal.core.factory import WARMING, FactoryErrors
+from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
@@ -33,7 +33,7 @@ def factory_error_groups(
 
     The warm-up is not among them: the search has a cause for it.
     """
-    known = {term.effect.id for term in prepared.known} | {*WARMING}
+    known = {term.effect.id for term in prepared.known} | {*WARMING_EFFECTS}
     turned = not dictionary.x.oriented.any()
     for one in factory_groups(dictionary, factory_errors(about), turned):
         if one.part not in known:
@@ -56,7 +56,7 @@ def enlarge_to_shown_grade(
                 value = nominal[group][c % 3] + state.estimate[at]
                 found.append((float(value), float(sigma[at])))
     values, error = np.array(found).reshape(-1, 2).T
-    shows = GradeShown.of(about.grade, names, values, error, about.sent)
+    shows = GradeShown.of(about.grade, names, values, error, about.nominal_as_sent)
     if not shows.because:
         return
     stated, coarser = (factory_errors(about, grade) for grade in (None, shows.grade))

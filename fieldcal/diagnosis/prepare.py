@@ -30,8 +30,8 @@ from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.state import Term
 from fieldcal.physics.effect import Chain, Line, Scatter
 from fieldcal.physics.recording import Fault
-from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
+from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 
 SHORTEST = 20
 """Fewest samples of a window that is used."""
@@ -75,14 +75,14 @@ def prepare_recording(block: Block, about: Description) -> PreparedRecording:
 
     """
     if about.means_only:
-        return _prepared_means(block, about.in_time())
+        return _prepared_means(block, about.in_time_order())
     _refuse_empty(block, about)
-    refuse_copies(block)
-    about = about.in_time()
+    refuse_duplicate_channels(block)
+    about = about.in_time_order()
     about.refuse_overlap()
     known = known_terms(about.model)
     checked = check_chain(block, about)
-    about = about.with_angles_times(checked.angle_factor)
+    about = about.with_scaled_angles(checked.angle_factor)
     sways = find_base_sway(masked(checked.block, checked.usable), about)
     if sways is not None:
         checked = _without_sway(checked, sways, about)

@@ -82,10 +82,10 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     odd = _impossible_facts(explanation)
     verdict = _verdict(explanation, effects, strange, odd)
     # positions are counted as held up to here, and as listed in session.toml from here
-    numbered = explanation.prepared.source.about.numbered
+    indices_in_file = explanation.prepared.source.about.indices_in_file
 
     def counted(one: Mismatch) -> Mismatch:
-        return replace(one, positions=tuple(sorted(numbered(one.positions))))
+        return replace(one, positions=tuple(sorted(indices_in_file(one.positions))))
 
     mismatch = tuple(
         counted(m) for m in _all_mismatches(block, explanation, lost, strange)
@@ -213,7 +213,7 @@ def _unexplained_turns(explanation: Explanation) -> list[tuple[str, str]]:
     for p, q in explanation.inferred.contradicted_turns:
         leaves, arrives = t[windows[p, 1] - 1], t[windows[q, 0]]
         if not any(f.from_s <= arrives and f.to_s >= leaves for f in wrong):
-            before, behind = source.about.numbered((p, q))
+            before, behind = source.about.indices_in_file((p, q))
             out.append((list_positions([before]), list_positions([behind])))
     return out
 

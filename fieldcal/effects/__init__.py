@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.physics.effect import Effect
 
 
 @cache
 def catalogue() -> Mapping[str, Effect]:
     """Every effect by its id, in alphabetical order."""
-    return {n: class_in(f"{__name__}.{n}", Effect)() for n in names(__path__)}
+    return {
+        n: plugin_class(f"{__name__}.{n}", Effect)() for n in module_names(__path__)
+    }

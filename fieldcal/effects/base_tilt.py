@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.physics.effect import Motion, Param, Values
 from fieldcal.physics.experience import Experience
 
@@ -42,5 +42,5 @@ class BaseTilt(Motion):
     def change(self, x: Experience, values: Values) -> Experience:
         """Turn the base's vectors before the joints do."""
         about_x, about_z = np.deg2rad(values)
-        tilt = turn(about_z, about_x)
+        tilt = direction_cosines(about_z, about_x)
         return x.turned(base_force=tilt @ x.base_force, base_rate=tilt @ x.base_rate)

@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
@@ -156,7 +156,7 @@ def _outliers_in_block(block: Block, most: Array) -> NDArray[np.bool_]:
         usual = np.max([np.median(apart[near, c], axis=1) for near in sides], axis=0)
         others = np.where(_samples_beside_outliers(wild[:, c]), np.nan, apart[:, c])
         tails = [_tail_threshold(others[max(r - AROUND, 0) : r + AROUND]) for r in rows]
-        least = np.maximum(WILD * DEVIATION * usual, tails)
+        least = np.maximum(WILD * MAD_TO_SIGMA * usual, tails)
         wild[rows, c] = apart[rows, c] > least
     return wild
 

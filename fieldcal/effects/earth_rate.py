@@ -15,7 +15,7 @@ array([[ 0.   , -7.292,  0.   ]])
 
 from __future__ import annotations
 
-from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.physics.effect import Motion, Values
 from fieldcal.physics.experience import Experience
 
@@ -34,5 +34,5 @@ class EarthRate(Motion):
 
     def change(self, x: Experience, values: Values) -> Experience:
         """Add the Earth's rate to what turns with the device."""
-        rate = earth_rate_home(x.latitude) + x.transport
+        rate = earth_rate_at_home(x.latitude) + x.transport
         return x.turned(base_rate=rate)  # (39)

@@ -31,7 +31,7 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Index
-from fieldcal.core.sampling import rate_of, unbroken
+from fieldcal.core.sampling import has_no_pause, sampling_rate
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.rate_axes import ObservedTurn, axes_by_turns, signed_axes
@@ -117,12 +117,12 @@ def measured_turns(
     Those that are too small, or of which a part was not recorded, say nothing.
     """
     block, out = recording.block, []
-    often = rate_of(block)
+    often = sampling_rate(block)
     for (p, one), (q, two) in pairwise(zip(held, f, strict=True)):
         gap = slice(recording.windows[p, 1], recording.windows[q, 0])
         if not angle_between(one, two) > LEAST or gap.stop - gap.start < 2:
             continue
-        if not unbroken(block.t, gap.start, gap.stop, often):
+        if not has_no_pause(block.t, gap.start, gap.stop, often):
             continue
         rest = recording.mean(p)[3:]
         rate = (block.gyr[gap] - rest) / recording.scale[3:]

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.samples import CHANNELS, Array, runs
+from fieldcal.core.samples import CHANNELS, Array, runs_of_true
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.recording import CheckedSamples, Fault, grids_of
 from fieldcal.physics.shape import Shape
@@ -45,7 +45,7 @@ FEWEST = 8
 def equal_value_runs(values: Array) -> NDArray[np.intp]:
     """First and one past the last sample of each run of one value, (m, 2)."""
     equal = np.diff(values) == 0
-    found = runs(equal)
+    found = runs_of_true(equal)
     if not len(found):
         return found
     length = found[:, 1] - found[:, 0]

@@ -24,8 +24,8 @@ from fieldcal.evaluation.window_mean import (
 )
 from fieldcal.model.rows.swaying import find_base_sway
 from fieldcal.physics.recording import grids_of
-from fieldcal.session.copies import refuse_copies
 from fieldcal.session.description import Description
+from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
@@ -53,7 +53,7 @@ def build_observations(
         averages,
         about.gravity,
         latitude=about.latitude,
-        under_way=about.under_way,
+        under_way=about.base_motion,
         mounting=about.mounting,
         grade=about.grade,
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),
@@ -111,7 +111,7 @@ class UsableWindows:
         held = [
             i
             for i, row in enumerate(self.position_numbers)
-            if not session.about.positions[row].turning
+            if not session.about.positions[row].on_turning_table
         ]
         return replace(
             self,
@@ -139,7 +139,7 @@ def usable_windows(session: Session) -> UsableWindows:
     session.about.refuse_overlap()
     if session.about.means_only:
         return _windows_of_means(session)
-    refuse_copies(session.block)
+    refuse_duplicate_channels(session.block)
     dead, warnings = dead_sensors(session.block.six), list(session.warnings)
     taken = _average_windows(session, _without_dead_axes(session.block), warnings)
     if not taken:
@@ -174,11 +174,11 @@ def _average_windows(
         said.append(sways.sentence)
     taken: dict[int, Average] = {}
     noise: LearnedNoise | None = None
-    held = about.in_time()
+    held = about.in_time_order()
     # each window provides the noise for the next
-    for i, window in zip(held.numbers, held.windows, strict=True):
+    for i, window in zip(held.position_numbers, held.windows, strict=True):
         try:
-            if about.positions[i].turning:
+            if about.positions[i].on_turning_table:
                 rate = table_rate(block, window, about, i)
                 found, remark = average_turntable_window(block, window, rate, grain)
             else:

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.chances import of_odds
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array, Grain
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.folder import Session
@@ -145,7 +145,7 @@ def cut_probability(shown: list[tuple[int, float]]) -> float:
         variance = UNSTEADY**2 + 2 / beside
         off = float(np.log(max(zero, 0.5) / beside))
         log_odds += (off**2 - (off - np.log(2.0)) ** 2) / (2 * variance)
-    return float(of_odds(log_odds))
+    return float(probability_of_log_odds(log_odds))
 
 
 def zero_crossings(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:

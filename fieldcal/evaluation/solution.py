@@ -89,7 +89,7 @@ class PreparedSession:
             about,
             positions=tuple(about.positions[r] for r in rows),
             windows=tuple((a, float(np.nextafter(b, np.inf))) for a, b in ends),
-            numbers=tuple(rows),
+            position_numbers=tuple(rows),
         )
 
     @cached_property
@@ -286,7 +286,7 @@ def _shown_grade(calibration: Calibration, about: Description) -> GradeShown:
     told = [levelled or sensor_of(group_of(n)) != "acc" for n in calibration.names]
     names = [name for name, tells in zip(calibration.names, told, strict=True) if tells]
     values, sigma = calibration.values[told], calibration.sigma[told]
-    return GradeShown.of(about.grade, names, values, sigma, about.sent)
+    return GradeShown.of(about.grade, names, values, sigma, about.nominal_as_sent)
 
 
 def _require_turns(

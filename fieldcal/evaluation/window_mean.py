@@ -81,7 +81,9 @@ def table_rate(
     If the axis is unknown, the rate is along the mean of the gyroscopes in the window.
     """
     part = (
-        block.between(*_known_span(span)).gyr if about.positions[row].turning else None
+        block.between(*_known_span(span)).gyr
+        if about.positions[row].on_turning_table
+        else None
     )
     if part is None or not len(part):
         return np.zeros(3)

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Protocol, cast
 from fieldcal.calibration import COMPONENTS
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import names
+from fieldcal.core.plugins import module_names
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration, Nominal
     from fieldcal.core.samples import Array
-    from fieldcal.drivers.mavlink_installed import Installed
+    from fieldcal.drivers.mavlink_installed import InstalledCalibration
     from fieldcal.session.folder import Session
 
 
@@ -42,7 +42,7 @@ class ExportSource:
     calibration: Calibration
     nominal: Nominal
     session: Session
-    installed: Installed | None = field(default=None)
+    installed: InstalledCalibration | None = field(default=None)
     instance: int = 0
 
     def linear(self, sensor: str) -> tuple[Array, Array]:
@@ -87,7 +87,7 @@ class Exporter(Protocol):
 
 def formats() -> tuple[str, ...]:
     """Names of the formats there are."""
-    return names(__path__)
+    return module_names(__path__)
 
 
 def exporter(name: str) -> Exporter:

@@ -24,9 +24,14 @@ import numpy as np
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, identity, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    InstalledCalibration,
+    identity_parameters,
+    parameter_names,
+)
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"
@@ -52,7 +57,7 @@ class ArdupilotParameters(NamedTuple):
 def parameters(
     calibration: Calibration,
     nominal: Nominal | None = None,
-    installed: Installed | None = None,
+    installed: InstalledCalibration | None = None,
     instance: int = 0,
 ) -> ArdupilotParameters:
     """Return the parameters that take this calibration out of what the sensor sends.
@@ -88,7 +93,7 @@ def converted(
     autopilot: int,
     calibration: Calibration,
     nominal: Nominal | None,
-    installed: Installed | None,
+    installed: InstalledCalibration | None,
     instance: int,
 ) -> ArdupilotParameters:
     """Return offsets and scales of any autopilot that corrects by (1) and (2)."""
@@ -101,8 +106,8 @@ def converted(
     acc, gyr = (
         reduce_to_diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr")
     )
-    every = device.next(acc.bias, acc.scale, gyr.bias)
-    known = names(autopilot, device.instance)
+    every = device.parameters_after(acc.bias, acc.scale, gyr.bias)
+    known = parameter_names(autopilot, device.instance)
     kept: list[str] = []
     groups = set(calibration.groups)
     if groups & {"acc_bias", "acc_scale"}:
@@ -115,12 +120,12 @@ def converted(
     return ArdupilotParameters({name: every[name] for name in kept}, tuple(says))
 
 
-def _without(autopilot: int, instance: int) -> Installed:
+def _without(autopilot: int, instance: int) -> InstalledCalibration:
     """Return an autopilot that had nothing in use."""
-    nothing = Installed(autopilot, instance, {}, taken_out=True)
-    known = names(autopilot, instance)
+    nothing = InstalledCalibration(autopilot, instance, {}, taken_out=True)
+    known = parameter_names(autopilot, instance)
     nothing.values = {name: 0.0 for some in known.values() for name in some}
-    nothing.values |= identity(nothing)
+    nothing.values |= identity_parameters(nothing)
     return nothing
 
 
@@ -163,5 +168,5 @@ def write(source: ExportSource, path: Path) -> list[str]:
         *(f"# {sentence}" for sentence in found.says),
         *(f"{name},{value:.9g}" for name, value in found.values.items()),
     ]
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     return list(found.says)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "table of the parameters with their sigma and unit"
 ENDING = "_calibration.csv"
@@ -29,7 +29,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
         found.names, found.values, found.sigma, found.units, strict=True
     ):
         table.writerow([name, f"{value:.12g}", f"{sigma:.6g}", unit])
-    write_whole(path, text.getvalue())
+    write_atomically(path, text.getvalue())
     says = "raw = bias + M true, M = diag(scale) + cross-coupling, device axes"
     others = ("nominal", "raw is in")  # none is filled in; raw is as the samples are
     return [*(s for s in source.says if not any(o in s for o in others)), says]

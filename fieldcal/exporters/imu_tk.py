@@ -21,7 +21,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "matrices of imu_tk (T, K, bias)"
 ENDING = "_acc.calib"
@@ -41,7 +41,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
         name = f"{path.stem}_gyro{path.suffix}"
     for sensor, file in (("acc", path), ("gyr", path.with_name(name))):
         parts = matrices(*source.linear(sensor))
-        write_whole(file, "\n\n".join(_text(part) for part in parts) + "\n")
+        write_atomically(file, "\n\n".join(_text(part) for part in parts) + "\n")
     return [
         *source.says,
         f"the gyroscopes are in {path.with_name(name)}",

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "one JSON object, with a JSON Schema"
 ENDING = "_calibration.json"
@@ -65,5 +65,5 @@ def _triad(source: ExportSource, sensor: str) -> dict[str, Any]:
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write the file; what the user must know."""
     text = json.dumps(document(source), indent=2, allow_nan=False)
-    write_whole(path, text + "\n")
+    write_atomically(path, text + "\n")
     return source.says

@@ -28,7 +28,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import Session, write_whole
+from fieldcal.session.folder import Session, write_atomically
 from fieldcal.session.noise_file import read_noise
 
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
@@ -93,7 +93,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
         "  A: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
         f"  bias: {written(gyr_bias)}",
     ]
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     return says
 
 

@@ -18,10 +18,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldcal.calibration import Calibration, Nominal
-from fieldcal.drivers.mavlink_installed import PX4, Installed
+from fieldcal.drivers.mavlink_installed import PX4, InstalledCalibration
 from fieldcal.exporters import ExportSource
 from fieldcal.exporters.ardupilot import ArdupilotParameters, converted
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
 ENDING = ".params"
@@ -33,7 +33,7 @@ FLOAT = 9
 def parameters(
     calibration: Calibration,
     nominal: Nominal | None = None,
-    installed: Installed | None = None,
+    installed: InstalledCalibration | None = None,
     instance: int = 0,
 ) -> ArdupilotParameters:
     """Return the parameters that take this calibration out of what the sensor sends.
@@ -54,5 +54,5 @@ def write(source: ExportSource, path: Path) -> list[str]:
         "# Vehicle-Id Component-Id Name Value Type",
         *(f"1\t1\t{n}\t{value:.9g}\t{FLOAT}" for n, value in found.values.items()),
     ]
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     return list(found.says)

@@ -22,7 +22,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 from fieldcal.session.noise_file import read_noise
 
 WHAT = "yaml of ROS imu_calib (SM, bias)"
@@ -56,5 +56,5 @@ def write(source: ExportSource, path: Path) -> list[str]:
             lines += [f"  - {x:.12f}" for x in values]
     if found := read_noise(source.session.folder):
         lines += _covariances(found["for"]["ros"])
-    write_whole(path, "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(lines) + "\n")
     return source.says

@@ -38,7 +38,7 @@ class SessionBatch:
 
     def unprocessed(self) -> list[str]:
         """Sessions whose row in the store is missing or of other files or options."""
-        known = self.database.done(sessions.fingerprints)
+        known = self.database.run(sessions.fingerprints)
         options = self.task.options
         return [
             str(folder)
@@ -52,7 +52,10 @@ class SessionBatch:
         """Process folders; each result is in the store before it is yielded."""
         for made in run_tasks(folders, self.task, pool):
             one = made.value or StoredSession(made.item, error=made.error)
-            self.database.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
+            self.database.run(
+                lambda db, one=one: sessions.store_session(db, one),  # type: ignore[misc]
+                write=True,
+            )
             yield one
 
     def stored_rows(self) -> Iterator[list[StoredSession]]:
@@ -60,8 +63,8 @@ class SessionBatch:
         names = [str(folder) for folder in self.folders]
         for first in range(0, len(names), CHUNK):
             some = names[first : first + CHUNK]
-            yield self.database.done(
-                lambda db, some=some: sessions.found(
+            yield self.database.run(
+                lambda db, some=some: sessions.find_sessions(
                     db, folders=some, documents=True, reduced=True
                 )  # type: ignore[misc]
             )

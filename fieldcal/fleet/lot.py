@@ -23,7 +23,7 @@ from fieldcal.fleet.capability import LotParameter, lot_parameter
 from fieldcal.fleet.levels import Grouping, groupings
 from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
 from fieldcal.fleet.shifts import Shift, find_shifts
-from fieldcal.history.sessions import LEVELS, StoredSession, values
+from fieldcal.history.sessions import LEVELS, StoredSession, parameter_values
 
 FEWEST = 5
 """Smallest number of units for which a spread is estimated."""
@@ -161,7 +161,7 @@ def analyse_lot(
     names = dict.fromkeys(n for one in useful for n in one.parameters)
     found = {}
     for name in names:
-        x, sigma = values(useful, name)
+        x, sigma = parameter_values(useful, name)
         known = np.isfinite(x) & (sigma > 0)
         if known.sum() >= FEWEST:
             found[name] = (np.flatnonzero(known), x[known], sigma[known])

@@ -35,7 +35,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.fleet.lot import FEWEST, latest_session_per_unit
 from fieldcal.fleet.spread import WIDER, UnitDistribution, estimate_distribution
-from fieldcal.history.sessions import StoredSession, values
+from fieldcal.history.sessions import StoredSession, parameter_values
 
 DRAWS, FIRST = 2000, 200
 """Number of draws that are used, and of draws before them that are dropped."""
@@ -77,7 +77,9 @@ def estimate_lot_prior(
     units = [one for one in latest_session_per_unit(others) if one.good]
     found: dict[str, UnitDistribution] = {}
     for name in dict.fromkeys(n for one in units for n in one.parameters):
-        x, sigma = values([one for one in units if _is_informative(one, name)], name)
+        x, sigma = parameter_values(
+            [one for one in units if _is_informative(one, name)], name
+        )
         known = np.isfinite(x) & (sigma > 0)
         if known.sum() >= FEWEST and group_of(name) in GROUPS:
             found[name] = estimate_distribution(x[known], sigma[known])

@@ -16,7 +16,7 @@ from fieldcal.evaluation.omitted_effects import with_repaired_bytes
 from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
-from fieldcal.history.sessions import StoredSession, of_calibration
+from fieldcal.history.sessions import StoredSession, session_of_calibration
 from fieldcal.session.folder import Session
 
 
@@ -73,7 +73,7 @@ class SessionTask:
         if explanation is not None and self.diagnose:
             diagnosis = make_diagnosis(session.block, explanation).to_json()
         return replace(
-            of_calibration(folder, found, _taken_at(session, found)),
+            session_of_calibration(folder, found, _taken_at(session, found)),
             serial=str(session.about.device.get("serial", "")),
             levels=levels_of(session),
             diagnosis=diagnosis,

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
 
 WIDER = 6.0
@@ -92,7 +92,7 @@ class UnitDistribution:
 
 def estimate_distribution(x: Array, sigma: Array) -> UnitDistribution:
     """Estimate mean and spread of values (n,) with uncertainties (n,); n >= 2."""
-    scale = DEVIATION * float(np.median(np.abs(x - np.median(x))))
+    scale = MAD_TO_SIGMA * float(np.median(np.abs(x - np.median(x))))
     scale = scale or float(np.std(x)) or float(np.median(sigma))
     tried = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, GRID) * scale])
     variance = tried[:, None] ** 2 + sigma**2

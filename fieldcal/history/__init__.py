@@ -1,6 +1,6 @@
-"""The store: sessions of all devices in SQL, and how parameters change in time.
+"""The store: sessions of all devices in SQL, and the change of parameters in time.
 
-History judges whether a result fits the earlier ones of its device; it never enters an
-estimate. Only this room reads and writes the database, through
-`database`, whose transactions are whole or not at all.
+A result is compared with the earlier ones of its device; they do not enter any
+estimate. Only this package reads and writes the database, in transactions of
+`database`.
 """

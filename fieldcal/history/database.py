@@ -1,8 +1,7 @@
-"""Transactions on the store, in SQLite or PostgreSQL, whole or not at all.
+"""Transactions on the store, in SQLite or PostgreSQL.
 
-Tables are made, and those of earlier versions brought up to date, where they are first
-used. A server that goes away in the middle is waited for, and what was not committed is
-done again.
+Tables are created or migrated at first use. If a server becomes unavailable, the
+transaction is repeated until it is available again, or `LONGEST_ABSENCE` has passed.
 """
 
 from __future__ import annotations
@@ -18,64 +17,64 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, SQLAlch
 from sqlalchemy.pool import NullPool
 
 from fieldcal.core.errors import InputError
-from fieldcal.history.place import Place, is_address
+from fieldcal.history.location import StoreLocation, is_address
 
-HEAD = "sessions"
+LAST_MIGRATION = "sessions"
 """The last migration."""
 
-OLDEST, NEWEST = 1, 2
+OLDEST_VERSION, NEWEST_VERSION = 1, 2
 """user_version of a SQLite file before the first migration, and since."""
 
-WAIT = 60.0
-"""How long another program may hold the file, s."""
+LOCK_TIMEOUT = 60.0
+"""Longest wait for a file that another program has locked, s."""
 
-RETURNS = 60.0
-"""How long a server that was there may be away, s."""
+LONGEST_ABSENCE = 60.0
+"""Longest time for which a server may be unavailable, s."""
 
-AGAIN = 0.5
-"""Between two looks whether it is back, s."""
+RETRY_INTERVAL = 0.5
+"""Time between attempts, s."""
 
 ENCODING = {"client_encoding": "utf8"}
-"""Of a server whose tables are in no encoding texts would come as bytes."""
+"""Connection option: from a server without an encoding, texts would be bytes."""
 
 LOCK = 0x1F1E1DCA1
-"""Number of the lock under which a server's tables are made."""
+"""Number of the advisory lock under which a server's tables are created."""
 
 T = TypeVar("T")
-Work = Callable[[Connection], T]
+Transaction = Callable[[Connection], T]
 
 
 class _Outdated(Exception):
-    """Tables must be made or brought up to date before they are read."""
+    """Tables must be created or migrated before they are read."""
 
 
 class Database:
-    """The store, opened when it is asked.
+    """The store; opened for each transaction.
 
     Parameters
     ----------
-    place : file, made when something is first written; or a database's address
+    place : path of a file, created at the first write; or the address of a database
 
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: StoreLocation) -> None:
         self.place = place
         self._known = False
 
     @property
-    def shown(self) -> str:
-        """The place, without a password."""
+    def location_text(self) -> str:
+        """Location of the store, without a password."""
         if not is_address(self.place):
             return str(self.place)
         return make_url(str(self.place)).render_as_string(hide_password=True)
 
-    def done(self, work: Work[T], write: bool = False) -> T:
-        """What some work in one transaction returns.
+    def run(self, work: Transaction[T], write: bool = False) -> T:
+        """Result of `work`, carried out in one transaction.
 
         Raises
         ------
         InputError
-            If the store cannot be used; then nothing of the work is in it.
+            If the store cannot be used; then nothing of `work` is stored.
 
         """
         try:
@@ -89,34 +88,34 @@ class Database:
         except (SQLAlchemyError, OSError) as error:
             said = str(getattr(error, "orig", None) or error).strip()
             raise InputError(
-                f"{self.shown}: the history cannot be used ({said}); mend that, move"
-                " the file away, or name another with --history"
+                f"{self.location_text}: the history cannot be used ({said}); mend that,"
+                " move the file away, or name another with --history"
             ) from error
 
-    def _while_away(self, work: Work[T], write: bool) -> T:
-        """The same, where a server that was there may go and come back."""
-        until = time.monotonic() + RETURNS
+    def _while_away(self, work: Transaction[T], write: bool) -> T:
+        """As `run`, repeated while a server that was available is not."""
+        until = time.monotonic() + LONGEST_ABSENCE
         while True:
             try:
                 found = self._once(work, write)
             except DBAPIError as error:
                 if (
-                    not (_begins(error) or (self._known and _is_away(error)))
+                    not (_is_starting(error) or (self._known and _is_away(error)))
                     or time.monotonic() > until
                 ):
                     raise
-                time.sleep(AGAIN)
+                time.sleep(RETRY_INTERVAL)
                 continue
             self._known = is_address(self.place)
             return found
 
-    def _once(self, work: Work[T], write: bool) -> T:
+    def _once(self, work: Transaction[T], write: bool) -> T:
         try:
             return self._transaction(work, write)
         except _Outdated:
             return self._transaction(work, True)
 
-    def _transaction(self, work: Work[T], write: bool) -> T:
+    def _transaction(self, work: Transaction[T], write: bool) -> T:
         engine = self._engine(write)
         try:
             with engine.connect() as db:
@@ -139,20 +138,24 @@ class Database:
             path.parent.mkdir(parents=True, exist_ok=True)
         there = write or path.exists()
         name = f"sqlite:///{path}" if there else "sqlite://"
-        made = create_engine(name, poolclass=NullPool, connect_args={"timeout": WAIT})
-        event.listen(made, "connect", _plain)
-        event.listen(made, "begin", _begun)
+        made = create_engine(
+            name, poolclass=NullPool, connect_args={"timeout": LOCK_TIMEOUT}
+        )
+        event.listen(made, "connect", _configure_connection)
+        event.listen(made, "begin", _begin)
         return made
 
     def _prepare(self, db: Connection, may_make: bool) -> None:
-        """Make the tables, or bring them up to date."""
+        """Create the tables, or migrate them."""
         lite = db.dialect.name == "sqlite"
         if lite:
             version = db.exec_driver_sql("PRAGMA user_version").scalar_one()
             memory = not db.engine.url.database
-            if version == NEWEST:
+            if version == NEWEST_VERSION:
                 return
-            if version not in (0, OLDEST) or not (version or may_make or memory):
+            if version not in (0, OLDEST_VERSION) or not (
+                version or may_make or memory
+            ):
                 self._refuse(f"version {version}")
             if not may_make and not memory:
                 raise _Outdated
@@ -160,7 +163,7 @@ class Database:
             if may_make:
                 db.execute(text(f"SELECT pg_advisory_xact_lock({LOCK})"))
             version = _revision(db)
-            if version == HEAD:
+            if version == LAST_MIGRATION:
                 return
             if version and version not in _revisions():
                 self._refuse(f"revision {version}")
@@ -168,46 +171,46 @@ class Database:
                 raise _Outdated
         _upgrade(db)
         if lite:
-            db.exec_driver_sql(f"PRAGMA user_version = {NEWEST}")
+            db.exec_driver_sql(f"PRAGMA user_version = {NEWEST_VERSION}")
 
     def _refuse(self, found: str) -> None:
         raise InputError(
-            f"{self.shown}: is no history of this version (found {found}); name"
+            f"{self.location_text}: is no history of this version (found {found}); name"
             " another with --history"
         )
 
 
-def _plain(connection: object, _record: object) -> None:
-    """Let nobody but us begin transactions, those that make tables among them."""
+def _configure_connection(connection: object, _record: object) -> None:
+    """Disable the driver's own transactions; also creating tables belongs to ours."""
     connection.isolation_level = None  # type: ignore[attr-defined]
     connection.execute("PRAGMA foreign_keys = ON")  # type: ignore[attr-defined]
 
 
-def _begun(db: Connection) -> None:
+def _begin(db: Connection) -> None:
     writes = db.get_execution_options().get("writes")
     db.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
 
 def _is_away(error: DBAPIError) -> bool:
-    """Whether a server closed the connection, or takes none at the moment."""
+    """Whether a server closed the connection, or accepts none at the moment."""
     state = str(getattr(error.orig, "sqlstate", None) or "")
     return error.connection_invalidated or state in ("", "57P01")
 
 
-def _begins(error: DBAPIError) -> bool:
-    """Whether a server is there and takes no connection yet, or any more."""
+def _is_starting(error: DBAPIError) -> bool:
+    """Whether a server is starting or shutting down."""
     said = str(error.orig)
     return "database system is" in said and "FATAL" in said
 
 
 def _revision(db: Connection) -> str:
-    """The last migration that was carried out; empty before the first."""
+    """The last migration of the tables; empty before the first."""
     if not inspect(db).has_table("alembic_version"):
         return ""
     return str(db.execute(text("SELECT version_num FROM alembic_version")).scalar())
 
 
-def _config() -> object:
+def _alembic_config() -> object:
     from alembic.config import Config
 
     config = Config()
@@ -218,17 +221,17 @@ def _config() -> object:
 
 
 def _revisions() -> set[str]:
-    """All migrations that there are."""
+    """Names of all migrations."""
     from alembic.script import ScriptDirectory
 
-    scripts = ScriptDirectory.from_config(_config())  # type: ignore[arg-type]
+    scripts = ScriptDirectory.from_config(_alembic_config())  # type: ignore[arg-type]
     return {one.revision for one in scripts.walk_revisions()}
 
 
 def _upgrade(db: Connection) -> None:
-    """Carry out the migrations that are missing, in the transaction that is open."""
+    """Carry out the missing migrations in the open transaction."""
     from alembic import command
 
-    config = _config()
+    config = _alembic_config()
     config.attributes["connection"] = db  # type: ignore[attr-defined]
     command.upgrade(config, "head")  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Whether a value agrees with earlier calibrations of the device.
+"""Distribution of a parameter from run to run, to judge whether a new value agrees.
 
 A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i:
 
@@ -10,8 +10,8 @@ A parameter changes from run to run by b_i ~ N(0, tau^2) and is known to sigma_i
     s^2 = tau^2 + sigma^2 + 1 / sum w                         of a new value        (4)
     z = (x - m) / s ~ t(nu_0 + n - 1)                                               (5)
 
-r is the spread usual for the grade; it counts as nu_0 runs, so that one earlier run is
-enough to compare with, and r loses its weight with many. Units are the parameter's.
+r is the usual spread for the grade. It counts as nu_0 runs, so that one earlier run is
+enough for a comparison. With many runs it has little weight. Units are the parameter's.
 Source: (1) is the moment estimate of a random effect (DerSimonian and Laird 1986,
 unweighted); (2) the mean of a scaled inverse chi-squared prior's posterior.
 """
@@ -24,19 +24,19 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-USUAL = 2.0
+USUAL_RUNS = 2.0
 """nu_0: number of runs that the usual spread of the grade counts as."""
 
 
 @dataclass(frozen=True, slots=True)
 class FamilySpread:
-    """Distribution of the next run, from earlier ones.
+    """Distribution of a parameter in the next run, from earlier runs.
 
     Attributes
     ----------
     mean : m
-    spread : tau, from run to run
-    sigma_mean : of m
+    spread : tau, standard deviation from run to run
+    sigma_mean : standard uncertainty of m
     dof : of the t distribution (5)
     runs : n
 
@@ -49,32 +49,32 @@ class FamilySpread:
     runs: int
 
     def sigma(self, sigma: float) -> float:
-        """Standard deviation of a new value less the mean, (4)."""
+        """Standard deviation of the difference of a new value from the mean, (4)."""
         return float(np.sqrt(self.spread**2 + sigma**2 + self.sigma_mean**2))
 
     def chance(self, value: float, sigma: float) -> float:
-        """Probability of a value as far off as this, or farther, (5)."""
+        """Probability of a difference from the mean at least as large, (5)."""
         from scipy.special import stdtr
 
         z = abs(value - self.mean) / self.sigma(sigma)
         return float(2 * stdtr(self.dof, -z))
 
 
-def expected(values: Array, sigmas: Array, usual: float) -> FamilySpread:
+def next_run_distribution(values: Array, sigmas: Array, usual: float) -> FamilySpread:
     """Distribution of the next value, from runs (n,) and their uncertainties, (1)-(3).
 
-    `usual` is r. There must be one run at least.
+    `usual` is r. At least one run is needed.
     """
     n = len(values)
     measured = 0.0
     if n > 1:
         measured = max(0.0, float(np.var(values, ddof=1) - np.mean(sigmas**2)))  # (1)
-    spread2 = (USUAL * usual**2 + (n - 1) * measured) / (USUAL + n - 1)  # (2)
+    spread2 = (USUAL_RUNS * usual**2 + (n - 1) * measured) / (USUAL_RUNS + n - 1)  # (2)
     w = 1 / (spread2 + sigmas**2)  # (3)
     return FamilySpread(
         float(w @ values / w.sum()),
         float(np.sqrt(spread2)),
         float(1 / np.sqrt(w.sum())),
-        USUAL + n - 1,
+        USUAL_RUNS + n - 1,
         n,
     )

@@ -1,4 +1,4 @@
-"""Sessions as the store keeps them, and how they are put in and found again."""
+"""Sessions in the store: the record of one, and functions that store and find them."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from sqlalchemy import Connection, Row, and_, delete, insert, or_, select, updat
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.history.tables import PARAMETER, REDUCED, SESSION
+from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
 LEVELS = ("model", "lot", "station", "operator")
-"""What sessions of several devices may have in common, as session.toml says it."""
+"""Properties that sessions of several devices may share, from session.toml."""
 
 FILTERS = ("serial", *LEVELS, "since", "until")
-"""By what sessions may be asked for."""
+"""Names of the conditions for finding sessions."""
 
 
 @dataclass(frozen=True, slots=True)
 class StoredSession:
-    """One session.
+    """Record of one session.
 
     Attributes
     ----------
-    folder : where it is recorded
+    folder : path of the session
     serial : of the device, empty where unknown
-    levels : what it has in common with others, by the names in `LEVELS`
-    taken_at : when, ISO 8601 in UTC; None where unknown
-    go : the decision, None where nobody judged
-    good : whether its numbers may be used; None where there are none
+    levels : properties shared with other sessions, by the names in `LEVELS`
+    taken_at : time of the recording, ISO 8601 in UTC; None if unknown
+    go : the decision; None if there is none
+    good : whether its values may be used; None if there are none
     result, diagnosis : documents of those names
     parameters : value, standard uncertainty and unit by full name
-    fingerprint : of the files it was made of
-    error : why there is no result, or none of these files
-    reduced : what it says of effects that it may share with others
+    fingerprint : fingerprint of the session's files
+    error : why there is no result, or none for the present files
+    reduced : reduced rows for effects that it may share with other sessions
 
     """
 
@@ -57,12 +57,13 @@ class StoredSession:
     reduced: bytes | None = None
 
 
-def of_calibration(
+def session_of_calibration(
     folder: Path, found: Calibration, taken_at: str | None
 ) -> StoredSession:
-    """A session with its calibration and nothing else.
+    """Record of a session with its calibration only.
 
-    What it has from its lot is in no parameter: a lot is not to learn from itself.
+    Its parameters exclude information from its lot, so that a lot is not estimated from
+    itself.
     """
     document = found.to_json()
     device = document.get("device", {})
@@ -75,12 +76,12 @@ def of_calibration(
         None if decision is None else bool(decision.get("go", False)),
         found.good,
         document,
-        parameters=_by_itself(found),
+        parameters=_parameters_without_lot(found),
     )
 
 
-def _by_itself(found: Calibration) -> dict[str, tuple[float, float, str]]:
-    """Parameters with their units, without what they have from the unit's lot."""
+def _parameters_without_lot(found: Calibration) -> dict[str, tuple[float, float, str]]:
+    """Parameters with ± and unit, without the information from the device's lot."""
     rows = zip(found.values.tolist(), found.sigma.tolist(), found.units, strict=True)
     out = dict(zip(found.names, rows, strict=True))
     told = found.info.get("borrowed", {})
@@ -94,10 +95,10 @@ def _by_itself(found: Calibration) -> dict[str, tuple[float, float, str]]:
     return out
 
 
-def keep(db: Connection, one: StoredSession) -> None:
-    """Put a session in; of the same folder and device the earlier one is replaced.
+def store_session(db: Connection, one: StoredSession) -> None:
+    """Store a session; an earlier one of the same folder and device is replaced.
 
-    A failure takes no result away: it is noted beside it.
+    An error replaces no result: it is stored in addition.
     """
     here = SESSION.c.folder == one.folder
     same = and_(here, SESSION.c.serial == one.serial)
@@ -114,7 +115,7 @@ def keep(db: Connection, one: StoredSession) -> None:
     else:
         db.execute(update(SESSION).where(same).values(_row(one)))
         db.execute(delete(PARAMETER).where(PARAMETER.c.session == number))
-        db.execute(delete(REDUCED).where(REDUCED.c.session == number))
+        db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == number))
     rows = [
         {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
         for n, (v, s, u) in one.parameters.items()
@@ -122,7 +123,7 @@ def keep(db: Connection, one: StoredSession) -> None:
     if rows:
         db.execute(insert(PARAMETER), rows)
     if one.reduced is not None:
-        db.execute(insert(REDUCED).values(session=number, data=one.reduced))
+        db.execute(insert(REDUCED_ROWS).values(session=number, data=one.reduced))
 
 
 def _row(one: StoredSession) -> dict[str, Any]:
@@ -147,18 +148,18 @@ def _row(one: StoredSession) -> dict[str, Any]:
 
 
 def fingerprints(db: Connection) -> dict[str, str]:
-    """Of what each folder's row was made."""
+    """Fingerprint of each folder's stored session."""
     rows = db.execute(select(SESSION.c.folder, SESSION.c.fingerprint))
     return {folder: mark for folder, mark in rows if mark is not None}
 
 
-def parsed(words: Iterable[str]) -> dict[str, str]:
-    """Conditions from words such as ``lot=7``.
+def parse_filters(words: Iterable[str]) -> dict[str, str]:
+    """Parse conditions such as ``lot=7``.
 
     Raises
     ------
     InputError
-        If a word is none.
+        If a word is no condition.
 
     """
     found = {}
@@ -173,22 +174,22 @@ def parsed(words: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def found(
+def find_sessions(
     db: Connection,
     wanted: Mapping[str, str] | None = None,
     folders: Iterable[str] | None = None,
     documents: bool = False,
     reduced: bool = False,
 ) -> list[StoredSession]:
-    """Sessions that meet conditions, the oldest first.
+    """Stored sessions that meet all conditions, the oldest first.
 
     Parameters
     ----------
     db : the store
-    wanted : by the names in `FILTERS`; `since` and `until` are dates
-    folders : only these
-    documents : whether with result and diagnosis
-    reduced : whether with reduced rows
+    wanted : conditions by the names in `FILTERS`; `since` and `until` are dates
+    folders : only sessions in these folders, if given
+    documents : whether to load result and diagnosis
+    reduced : whether to load reduced rows
 
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
@@ -202,9 +203,9 @@ def found(
     parameters = _parameters(db, some)
     kept: dict[int, bytes] = {}
     if reduced:
-        blobs = select(REDUCED).join(SESSION).where(and_(True, *some))
+        blobs = select(REDUCED_ROWS).join(SESSION).where(and_(True, *some))
         kept = {r.session: r.data for r in db.execute(blobs)}
-    return [_stored(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
+    return [_session_of_row(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
 
 
 def _condition(name: str, value: str) -> Any:
@@ -225,7 +226,7 @@ def _parameters(
     return out
 
 
-def _stored(
+def _session_of_row(
     row: Row[Any],
     parameters: Mapping[str, tuple[float, float, str]],
     reduced: bytes | None,
@@ -251,8 +252,10 @@ def _stored(
     )
 
 
-def values(sessions: Iterable[StoredSession], name: str) -> tuple[Array, Array]:
-    """A parameter and its uncertainty in each session, nan where it has none."""
+def parameter_values(
+    sessions: Iterable[StoredSession], name: str
+) -> tuple[Array, Array]:
+    """Value and ± of a parameter in each session, (n,) each; nan without a value."""
     missing = (np.nan, np.nan, "")
     rows = [one.parameters.get(name, missing)[:2] for one in sessions]
     value, sigma = np.array(rows, dtype=float).reshape(-1, 2).T

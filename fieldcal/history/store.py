@@ -1,8 +1,9 @@
-"""Every calibration of every device, by its serial number: the store's older half.
+"""Calibrations of each device in the store, by serial number.
 
-It is written after a calibration is done and read to judge the next one; nothing in it
-ever enters an estimate. A calibration belongs to the family of its device if it was GO,
-or was accepted by hand; an accepted one begins a new family, as after a repair.
+A calibration is stored when it is complete, and later ones are compared with it. The
+store does not enter any estimate. A calibration belongs to the family of its device if
+it was GO or was accepted by hand. An accepted one begins a new family, as after a
+repair.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
-from fieldcal.history.place import Place
+from fieldcal.history.location import StoreLocation
 
 if TYPE_CHECKING:
     from fieldcal.history.database import Database
@@ -24,19 +25,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class HistoryRun:
-    """One calibration.
+    """One calibration in the store.
 
     Attributes
     ----------
-    number : by which it is named
+    number : its number in the store
     serial : of the device
-    taken_at : when, ISO 8601 in UTC; empty where unknown
-    session : folder it was recorded in
-    go : whether it was GO; None where nobody judged
+    taken_at : time of the recording, ISO 8601 in UTC; empty if unknown
+    session : path of the session folder
+    go : whether it was GO; None without a decision
     accepted : whether it was accepted by hand, and begins a family
-    temperature : mean, deg C; None where unknown
-    latitude_deg, height_m : the place; None where unknown
-    software : what made it
+    temperature : mean, deg C; None if unknown
+    latitude_deg, height_m : the site; None if unknown
+    software : version of fieldcal
     calibration : with its covariance
 
     """
@@ -54,33 +55,33 @@ class HistoryRun:
     calibration: Calibration
 
 
-def family(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
-    """The runs that a next one is compared with, in order."""
+def family_runs(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
+    """Runs with which the next one is compared, in order."""
     begins = max((i for i, run in enumerate(runs) if run.accepted), default=0)
     return tuple(run for run in runs[begins:] if run.go or run.accepted)
 
 
 class History:
-    """The store, opened when it is asked.
+    """The calibrations in the store.
 
     Parameters
     ----------
-    place : file, made at the first calibration; or a database's address
+    place : path of a file, created at the first write; or the address of a database
 
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: StoreLocation) -> None:
         self.place = place
 
     @cached_property
     def database(self) -> Database:
-        """What transactions go to; loaded when it is needed."""
+        """The database; imported at first use, to save time."""
         from fieldcal.history.database import Database
 
         return Database(self.place)
 
     def add(self, taken_at: str, session: Path, found: Calibration) -> None:
-        """Keep a calibration; one of the same session is replaced.
+        """Store a calibration; one of the same session is replaced.
 
         Raises
         ------
@@ -94,11 +95,11 @@ class History:
         serial = str(document.get("device", {}).get("serial", ""))
         if not serial:
             raise InputError("no history without a serial number: give --serial")
-        one = sessions.of_calibration(session, found, taken_at)
-        self.database.done(lambda db: sessions.keep(db, one), write=True)
+        one = sessions.session_of_calibration(session, found, taken_at)
+        self.database.run(lambda db: sessions.store_session(db, one), write=True)
 
     def serials(self) -> list[tuple[str, int, str]]:
-        """Each device, how many calibrations it has, and when the last was."""
+        """Serial number, number of calibrations and time of the last one, by device."""
         from sqlalchemy import func, select
 
         from fieldcal.history.tables import SESSION
@@ -109,7 +110,7 @@ class History:
             .group_by(SESSION.c.serial)
             .order_by(SESSION.c.serial)
         )
-        rows = self.database.done(lambda db: db.execute(query).all())
+        rows = self.database.run(lambda db: db.execute(query).all())
         return [(str(s), int(n), str(last or "")) for s, n, last in rows]
 
     def runs(self, serial: str) -> tuple[HistoryRun, ...]:
@@ -130,11 +131,11 @@ class History:
             .where(SESSION.c.serial == serial, SESSION.c.result.is_not(None))
             .order_by(SESSION.c.taken_at, SESSION.c.id)
         )
-        rows = self.database.done(lambda db: db.execute(query).all())
+        rows = self.database.run(lambda db: db.execute(query).all())
         return tuple(self._run(row) for row in rows)
 
     def accept(self, serial: str, number: int) -> None:
-        """Let a calibration begin a new family.
+        """Mark a calibration as accepted; it begins a new family.
 
         Raises
         ------
@@ -151,7 +152,7 @@ class History:
             .where(SESSION.c.id == number, SESSION.c.serial == serial)
             .values(accepted=True)
         )
-        if not self.database.done(lambda db: db.execute(change).rowcount, write=True):
+        if not self.database.run(lambda db: db.execute(change).rowcount, write=True):
             raise InputError(
                 f"{serial} has no calibration number {number}: see fieldcal"
                 f" history {serial}"
@@ -162,8 +163,8 @@ class History:
             found = Calibration.from_json(load_json(row.result))
         except (ValueError, InputError) as error:
             raise InputError(
-                f"{self.database.shown}: calibration {row.id} cannot be read ({error});"
-                " move the file away, or name another with --history"
+                f"{self.database.location_text}: calibration {row.id} cannot be read"
+                f" ({error}); move the file away, or name another with --history"
             ) from error
         return HistoryRun(
             row.id,

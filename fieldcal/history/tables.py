@@ -1,6 +1,6 @@
 """Tables of the store: sessions with their results, parameters, reduced rows.
 
-`migrations` makes them; a change here is a new file there.
+`migrations` creates them; each change here needs a new file there.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ SESSION = Table(
     UniqueConstraint("serial", "folder", name="session_once"),
     Index("session_folder", "folder"),
 )
-"""One row a recorded session.
+"""One row for each recorded session.
 
-`serial` is empty where nobody knows it; `go` is null where nobody judged; `fingerprint`
-tells whether the folder has changed; `error` says why there is no newer result;
-`result` and `diagnosis` are the documents of those names.
+`serial` is empty if unknown. `go` is null without a decision. `fingerprint` shows
+whether the files in the folder have changed. `error` states why there is no newer
+result. `result` and `diagnosis` are the JSON documents.
 """
 
 PARAMETER = Table(
@@ -66,10 +66,10 @@ PARAMETER = Table(
 )
 """Values of a calibration with their standard uncertainties."""
 
-REDUCED = Table(
+REDUCED_ROWS = Table(
     "reduced",
     METADATA,
     Column("session", ForeignKey("session.id", ondelete="CASCADE"), primary_key=True),
     Column("data", LargeBinary, nullable=False),
 )
-"""What a session says of effects that it may share with others."""
+"""Reduced rows of a session, for effects that it may share with other sessions."""

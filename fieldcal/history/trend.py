@@ -1,7 +1,7 @@
 """One parameter of a device from run to run, and which runs are out of family.
 
-Each run is compared with what the family before it let expect (`family`), as it
-was when it was made; the chance of a false alarm is shared by the parameters.
+Each run is compared with the distribution from the earlier runs of its family
+(`family`). The probability of a false alarm is divided among the parameters.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of
-from fieldcal.history.family import expected
-from fieldcal.history.store import HistoryRun, family
+from fieldcal.history.family import next_run_distribution
+from fieldcal.history.store import HistoryRun, family_runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +24,14 @@ class TrendPoint:
 
     Attributes
     ----------
-    run : which
+    run : the run
     value, sigma : of the parameter
     unit : of both
-    chance : probability of such a value by the runs before; nan for the first
-    odd : whether it is out of family
-    spread : from run to run, as known with this run; nan where no grade says
+    chance : probability of such a value according to the earlier runs; nan for the
+        first
+    out_of_family : whether it is out of family
+    spread : standard deviation from run to run, including this run; nan if the grade
+        has none for the parameter
 
     """
 
@@ -38,11 +40,11 @@ class TrendPoint:
     sigma: float
     unit: str
     chance: float
-    odd: bool
+    out_of_family: bool
     spread: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as an object; null where not known."""
+        """Return a JSON object; null where not known."""
         chance = self.chance if np.isfinite(self.chance) else None
         return {
             "number": self.run.number,
@@ -50,20 +52,20 @@ class TrendPoint:
             "sigma": self.sigma,
             "unit": self.unit,
             "chance": chance,
-            "out_of_family": self.odd,
+            "out_of_family": self.out_of_family,
             "spread": self.spread if np.isfinite(self.spread) else None,
         }
 
 
-def names(runs: Sequence[HistoryRun]) -> tuple[str, ...]:
-    """Parameters that any run has, in order."""
+def parameter_names(runs: Sequence[HistoryRun]) -> tuple[str, ...]:
+    """Names of the parameters of all runs, in order."""
     return tuple(dict.fromkeys(n for run in runs for n in run.calibration.names))
 
 
-def trend(
+def parameter_trend(
     runs: Sequence[HistoryRun], name: str, limits: GradeLimits
 ) -> list[TrendPoint]:
-    """Values of one parameter, oldest first.
+    """Values of one parameter from run to run, oldest first.
 
     Parameters
     ----------
@@ -81,32 +83,32 @@ def trend(
         value, sigma = found.value(name), found.uncertainty(name)
         unit = found.units[found.names.index(name)]
         chance, spread = np.nan, np.nan
-        before = _values(family(runs[:i]), name)
+        before = _values_and_sigmas(family_runs(runs[:i]), name)
         together = max(1, sum(limits.repeat(group_of(n)) is not None
                               for n in found.names))  # fmt: skip
         if usual is not None:
             if len(before):
-                usually = expected(before[:, 0], before[:, 1], usual)
-                apart = _kelvins(run, family(runs[:i]))
+                usually = next_run_distribution(before[:, 0], before[:, 1], usual)
+                apart = _temperature_difference(run, family_runs(runs[:i]))
                 warmth = apart * limits.per_kelvin(group_of(name))
                 chance = usually.chance(value, float(np.hypot(sigma, warmth)))
-            known = _values(family(runs[: i + 1]), name)
+            known = _values_and_sigmas(family_runs(runs[: i + 1]), name)
             shown = known if len(known) else np.array([[value, sigma]])
-            spread = expected(shown[:, 0], shown[:, 1], usual).spread
+            spread = next_run_distribution(shown[:, 0], shown[:, 1], usual).spread
         odd = bool(chance < limits.family_chance / together)
         points.append(TrendPoint(run, value, sigma, unit, chance, odd, spread))
     return points
 
 
-def _kelvins(run: HistoryRun, before: Sequence[HistoryRun]) -> float:
-    """How far the temperature is from that of the runs before; 0 where not known."""
+def _temperature_difference(run: HistoryRun, before: Sequence[HistoryRun]) -> float:
+    """Difference of the temperature from the mean of earlier runs, K; 0 if unknown."""
     known = [r.temperature for r in before if r.temperature is not None]
     if run.temperature is None or not known:
         return 0.0
     return abs(run.temperature - float(np.mean(known)))
 
 
-def _values(runs: Sequence[HistoryRun], name: str) -> np.ndarray[Any, Any]:
+def _values_and_sigmas(runs: Sequence[HistoryRun], name: str) -> np.ndarray[Any, Any]:
     rows = [
         (run.calibration.value(name), run.calibration.uncertainty(name))
         for run in runs

@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.drivers import codec
 from fieldcal.importing.files.gzip_stream import first_bytes
 from fieldcal.importing.recording import ReadOptions, Recording
@@ -32,7 +32,7 @@ MANY = 1 << 16
 @cache
 def formats() -> tuple[str, ...]:
     """Names of the formats there are, those with a mark of their own first."""
-    return (*(n for n in names(__path__) if n not in LAST), *LAST)
+    return (*(n for n in module_names(__path__) if n not in LAST), *LAST)
 
 
 def open_recording(
@@ -53,12 +53,12 @@ def open_recording(
         If it cannot be read, or nothing knows its format.
 
     """
-    if name in codec.formats():
+    if name in codec.wire_formats():
         more = f"&{wanted.options}" if wanted.options else ""
         wanted = replace(wanted, options=f"format={name}{more}")
         name = "wire"
     if name and name not in formats():
-        known = (*formats(), *codec.formats())
+        known = (*formats(), *codec.wire_formats())
         raise InputError(f"no format {name!r}: there are {', '.join(known)}")
     if (path / TIMES).is_file():
         path = path / TIMES
@@ -80,7 +80,7 @@ def open_recording(
             # what a device says while it starts may stand before the first frame
             first = first_bytes(path, MANY)
         if name or module.recognises(first, path):
-            opened = class_in(module.__name__, Recording)  # type: ignore[type-abstract]
+            opened = plugin_class(module.__name__, Recording)  # type: ignore[type-abstract]
             return opened(path, wanted, repair)
     raise InputError(
         f"{path}: is of no format that is known by its content: name one with --format"

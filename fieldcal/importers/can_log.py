@@ -26,8 +26,8 @@ from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.clock_text import ClockText
 
 if TYPE_CHECKING:
-    from fieldcal.drivers.can_buses import Buses
-    from fieldcal.drivers.can_frames import Packed
+    from fieldcal.drivers.can_bus_filter import BusFilter
+    from fieldcal.drivers.can_frames import FrameBuffer
 
 WHAT = "log of a CAN bus"
 
@@ -114,14 +114,14 @@ class CanLog(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples, some frames at a time."""
-        from fieldcal.drivers.can_buses import Buses
-        from fieldcal.drivers.can_groups import CanHealth
-        from fieldcal.drivers.can_stamped import BusTimeAssembler
+        from fieldcal.drivers.can_bus_filter import BusFilter
+        from fieldcal.drivers.can_bus_time import BusTimeAssembler
+        from fieldcal.drivers.can_frame_groups import CanLinkHealth
 
-        options, health = Options("options", self.wanted.options), CanHealth()
+        options, health = Options("options", self.wanted.options), CanLinkHealth()
         parts = self._parts(options)
         wanted = (part.identifier for part in parts)
-        buses = Buses(str(self.path), wanted, options.text("channel"))
+        buses = BusFilter(str(self.path), wanted, options.text("channel"))
         samples = BusTimeAssembler(parts, health, options)
         options.finish()
         for packed in self._packed(buses):
@@ -147,22 +147,22 @@ class CanLog(Recording):
         if found := [f"{what} ({n})" for what, n in counts.items() if n]:
             self.says.append(f"left out: {', '.join(found)}")
 
-    def _packed(self, buses: Buses) -> Iterator[Packed]:
+    def _packed(self, buses: BusFilter) -> Iterator[FrameBuffer]:
         """Frames as rows, many at a time."""
-        from fieldcal.drivers.can_frames import Packed
+        from fieldcal.drivers.can_frames import FrameBuffer
 
         messages, seen, more = self._messages(), 0, True
         while more:
-            packed = Packed(PIECE)
+            packed = FrameBuffer(PIECE)
             try:
                 buses.fill(packed, messages)
             except InputError:
                 raise
             except Exception as error:
                 # the readers of the several formats raise what they like
-                where = f"behind frame {seen + packed.seen}"
+                where = f"behind frame {seen + packed.messages_seen}"
                 self.cut_off(where, f"cannot be read: {error}")
-            seen, more = seen + packed.seen, packed.full
+            seen, more = seen + packed.messages_seen, packed.full
             yield packed
 
     def _messages(self) -> Iterator[Any]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.codec import recognise
+from fieldcal.drivers.codec import recognise_format
 from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
@@ -73,7 +73,7 @@ def recognises(head: bytes, path: Path) -> bool:
     lines = head.split(b"\n")[1:-1]
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
         # of a format of its own, a port's bytes; of others physics tells the units
-        fits = recognise(head, SECONDS)
+        fits = recognise_format(head, SECONDS)
         return is_mostly_text(head) and (fits is None or fits[0] == PLAIN)
     return is_mostly_text(head)
 

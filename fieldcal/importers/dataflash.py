@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.importing.messages.dataflash_messages import (
     AXES,
@@ -75,12 +79,14 @@ class DataflashLog(Recording):
         self._scan()
         message, _, last = stream.rpartition(".")
         number = int(last)
-        wanted = [n for some in names(ARDUPILOT, number).values() for n in some]
+        wanted = [
+            n for some in parameter_names(ARDUPILOT, number).values() for n in some
+        ]
         values = {n: self._params[n] for n in wanted if n in self._params}
         raw = message == BODY and int(self._params.get(OPTION, 0)) & RAW
         if raw:
             values |= {"AHRS_ORIENTATION": 0.0}
-        installed = Installed(ARDUPILOT, number, values, taken_out=bool(raw))
+        installed = InstalledCalibration(ARDUPILOT, number, values, taken_out=bool(raw))
         told: dict[str, Any] = {}
         if message == BODY:
             acc, gyr = self._sampled[number]

@@ -19,8 +19,8 @@ from fieldcal.importing.recording import ROWS
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.times.clock_text import ClockText, is_clock
 from fieldcal.importing.words.heading_words import heading_meaning
-from fieldcal.session.arrow_columns import numbers
-from fieldcal.session.sample_files import READ_AT_ONCE
+from fieldcal.session.arrow_columns import float_values
+from fieldcal.session.sample_files import BYTES_AT_ONCE
 
 WHAT = "Parquet and Arrow"
 
@@ -94,7 +94,7 @@ class ParquetFile(ColumnRecording):
                 if magic.startswith(PARQUET):
                     opened = pyarrow.parquet.ParquetFile(
                         # what it reads ahead it keeps until the end: all of the file
-                        file, pre_buffer=False, buffer_size=READ_AT_ONCE,
+                        file, pre_buffer=False, buffer_size=BYTES_AT_ONCE,
                     )  # fmt: skip
                     schema = opened.schema_arrow
                     one: dict[str, Any] = {"use_threads": False}
@@ -145,10 +145,10 @@ class ParquetFile(ColumnRecording):
 
         kind = column.type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            ticks = numbers(column.cast(pa.int64()).cast(pa.float64(), safe=False))
+            ticks = float_values(column.cast(pa.int64()).cast(pa.float64(), safe=False))
             return ticks * TICKS[kind.unit] / self.wanted.time_scale
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):
-            return numbers(column.cast(pa.float64(), safe=False))
+            return float_values(column.cast(pa.float64(), safe=False))
         if not _is_text(kind) or not len(column) or not is_clock(str(column[0])):
             return None
         read = (clock.seconds(str(text)) for text in column)

@@ -17,15 +17,15 @@ import numpy as np
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Block
-from fieldcal.drivers.mavlink_frames import HEADS, SECOND
-from fieldcal.drivers.mavlink_installed import Installed, names
-from fieldcal.drivers.mavlink_log import STAMP, cut, split
+from fieldcal.drivers.mavlink_frames import HEADER_BYTES, VERSION_2
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
+from fieldcal.drivers.mavlink_log import STAMP_BYTES, split_log, split_whole_packets
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.reader import Chunk
 from fieldcal.importing.recording import ImuStream, Recording
 
 if TYPE_CHECKING:
-    from fieldcal.drivers.mavlink_samples import Decoder
+    from fieldcal.drivers.mavlink_samples import MavlinkDecoder
 
 WHAT = "MAVLink telemetry log, .tlog"
 
@@ -39,13 +39,19 @@ YEARS = (946_684_800e6, 4_102_444_800e6)
 def recognises(head: bytes, path: Path) -> bool:
     """Whether stamps and packets follow one another."""
     at, many = 0, 0
-    while at + STAMP + 3 <= len(head) and many < 8:
-        stamp = int.from_bytes(head[at : at + STAMP], "big")
-        kind = head[at + STAMP]
-        if kind not in HEADS or not YEARS[0] < stamp < YEARS[1]:
+    while at + STAMP_BYTES + 3 <= len(head) and many < 8:
+        stamp = int.from_bytes(head[at : at + STAMP_BYTES], "big")
+        kind = head[at + STAMP_BYTES]
+        if kind not in HEADER_BYTES or not YEARS[0] < stamp < YEARS[1]:
             return False
-        signed = kind == SECOND and head[at + STAMP + 2] & 1
-        at += STAMP + HEADS[kind] + head[at + STAMP + 1] + 2 + 13 * signed
+        signed = kind == VERSION_2 and head[at + STAMP_BYTES + 2] & 1
+        at += (
+            STAMP_BYTES
+            + HEADER_BYTES[kind]
+            + head[at + STAMP_BYTES + 1]
+            + 2
+            + 13 * signed
+        )
         many += 1
     return many > 0
 
@@ -84,10 +90,16 @@ class TelemetryLog(Recording):
             told["thermometer"] = decoder.thermometer
             told["grain"] = asdict(decoder.grain)
         autopilot = self._autopilots.get((system, component), -1)
-        wanted = [n for some in names(autopilot, sensor).values() for n in some]
+        wanted = [
+            n for some in parameter_names(autopilot, sensor).values() for n in some
+        ]
         params = self._params.get((system, component), {})
         values = {n: params[n] for n in wanted if n in params}
-        table = Installed(autopilot, sensor, values).as_table() if values else None
+        table = (
+            InstalledCalibration(autopilot, sensor, values).as_table()
+            if values
+            else None
+        )
         return {**told, "installed": table}
 
     def blocks(self, stream: str) -> Iterator[Block]:
@@ -99,7 +111,7 @@ class TelemetryLog(Recording):
                 block = decoder.feed_all(chunks)
             except DeviceError as error:
                 raise InputError(f"{self.path}: {error}") from error
-            decoder.aside.clear()
+            decoder.other_messages.clear()
             if block is not None:
                 yield block
         health = decoder.health
@@ -116,8 +128,8 @@ class TelemetryLog(Recording):
         if health.repeated:
             self.says.append(f"{health.repeated} repeated samples are left out")
 
-    def _decoder(self, stream: str) -> Decoder:
-        from fieldcal.drivers.mavlink_samples import INSTANCES, Decoder
+    def _decoder(self, stream: str) -> MavlinkDecoder:
+        from fieldcal.drivers.mavlink_samples import INSTANCES, MavlinkDecoder
 
         system, component, message, sensor = self._found[stream]
         fixed = {
@@ -125,8 +137,8 @@ class TelemetryLog(Recording):
         }  # fmt: skip
         if message not in INSTANCES:
             fixed["instance"] = str(sensor)
-        options = Options("options", self.wanted.options).fixed(**fixed)
-        decoder = Decoder(options)
+        options = Options("options", self.wanted.options).with_fixed(**fixed)
+        decoder = MavlinkDecoder(options)
         decoder.autopilots |= self._autopilots
         options.finish()
         return decoder
@@ -136,11 +148,11 @@ class TelemetryLog(Recording):
         rest = b""
         for piece in self.pieces(CUT):
             data = rest + piece
-            chunks, at = cut(data)
+            chunks, at = split_whole_packets(data)
             rest = data[at:]
             yield chunks
         if rest:
-            yield split(rest)
+            yield split_log(rest)
 
     _scanned = False
 
@@ -148,18 +160,22 @@ class TelemetryLog(Recording):
         """Look through the log once: who sends what, and the parameters."""
         if self._scanned:
             return
-        from fieldcal.drivers.mavlink_samples import INSTANCES, KINDS, Decoder
+        from fieldcal.drivers.mavlink_samples import (
+            INSTANCES,
+            MESSAGE_KINDS,
+            MavlinkDecoder,
+        )
 
-        self._decoders: dict[str, Decoder] = {}
+        self._decoders: dict[str, MavlinkDecoder] = {}
         self._autopilots: dict[tuple[int, int], int] = {}
         self._params: dict[tuple[int, int], dict[str, float]] = {}
-        listener = Decoder(Options("options", "acc_unit=m/s^2"))
-        by_number = {kind.identifier: name for name, kind in KINDS.items()}
+        listener = MavlinkDecoder(Options("options", "acc_unit=m/s^2"))
+        by_number = {kind.identifier: name for name, kind in MESSAGE_KINDS.items()}
         found: set[tuple[int, int, str, int]] = set()
         for chunks in self._chunks():
             for chunk in chunks:
                 data = chunk.data
-                second = data[0] == SECOND
+                second = data[0] == VERSION_2
                 number = int.from_bytes(data[7:10], "little") if second else data[5]
                 if number in by_number:
                     name = by_number[number]
@@ -170,9 +186,9 @@ class TelemetryLog(Recording):
                     found.add((*who, name, sensor))
             aside = [c for c in chunks if _number(c.data) in (0, 22)]
             listener.feed_all(aside)
-            for message in listener.aside:
+            for message in listener.other_messages:
                 self._hear(message)
-            listener.aside.clear()
+            listener.other_messages.clear()
         several = len({(s, c) for s, c, *_ in found}) > 1
         self._found = {
             f"{s}.{c}.{name}.{n}" if several else f"{name}.{n}": (s, c, name, n)
@@ -193,14 +209,14 @@ class TelemetryLog(Recording):
 def _number(data: bytes) -> int:
     if len(data) < 10:
         return -1
-    return int.from_bytes(data[7:10], "little") if data[0] == SECOND else data[5]
+    return int.from_bytes(data[7:10], "little") if data[0] == VERSION_2 else data[5]
 
 
 def _sensor(data: bytes, name: str) -> int:
     """Sensor that a message states; trailing zeros are optional."""
-    from fieldcal.drivers.mavlink_samples import KINDS
+    from fieldcal.drivers.mavlink_samples import MESSAGE_KINDS
 
-    head = HEADS[data[0]]
-    fields = KINDS[name].layout.fields
+    head = HEADER_BYTES[data[0]]
+    fields = MESSAGE_KINDS[name].layout.fields
     place = fields["id"][1] if fields else 0
     return data[head + place] if place < data[1] else 0

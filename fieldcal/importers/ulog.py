@@ -24,7 +24,11 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.drivers.mavlink_installed import PX4, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    PX4,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.importing.messages.ulog_messages import Table, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
@@ -108,11 +112,11 @@ class UlogFile(Recording):
         if slot is None:
             return told | {"installed": None}
         params = self._log.parameters
-        wanted = [n for some in names(PX4, slot).values() for n in some]
+        wanted = [n for some in parameter_names(PX4, slot).values() for n in some]
         values = {n: params[n] for n in wanted if n in params}
         if raw:
             values |= {"SENS_BOARD_ROT": 0.0}
-        installed = Installed(PX4, slot, values, taken_out=raw)
+        installed = InstalledCalibration(PX4, slot, values, taken_out=raw)
         return told | {"installed": installed.as_table()}
 
     def _identifier(self, topic: str, number: int) -> int | None:

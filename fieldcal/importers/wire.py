@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.errors import FieldcalError, InputError
 from fieldcal.core.samples import Block
-from fieldcal.drivers.codec import Codec, open_codec, recognise
+from fieldcal.drivers.codec import Codec, open_codec, recognise_format
 from fieldcal.drivers.options import Options
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -35,7 +35,7 @@ SECONDS = 1.0
 
 def recognises(head: bytes, path: Path) -> bool:
     """Whether one of the wire formats fits."""
-    return recognise(head, SECONDS) is not None
+    return recognise_format(head, SECONDS) is not None
 
 
 class WireStream(Recording):
@@ -73,7 +73,7 @@ class WireStream(Recording):
         self._name = options.text("format")
         if not self._name:
             first = next(self.pieces(CUT), b"")
-            fits = recognise(first, SECONDS)
+            fits = recognise_format(first, SECONDS)
             if fits is None:
                 raise InputError(
                     f"{self.path}: say what bytes these are, such as --options "
@@ -83,7 +83,7 @@ class WireStream(Recording):
             query = self.wanted.options or fits[1].query
             options = Options("options", query)
         if self.wanted.rate_hz:
-            options = options.fixed(rate=str(self.wanted.rate_hz))
+            options = options.with_fixed(rate=str(self.wanted.rate_hz))
         codec = open_codec(self._name, options)
         options.finish()
         return codec
@@ -105,7 +105,7 @@ class WireStream(Recording):
                 " the rate with --rate where the device sends none, or check the"
                 " options"
             )
-        lost = health.skipped + codec.waiting
+        lost = health.skipped + codec.waiting_bytes
         if lost or health.bad or health.gaps:
             self.says.append(
                 f"{lost} of {health.received} bytes belong to no whole frame,"

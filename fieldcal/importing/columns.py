@@ -8,12 +8,12 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers
 from fieldcal.importing.units.scales import FEWEST
-from fieldcal.session.text_files import COLUMNS
+from fieldcal.session.text_files import SAMPLE_COLUMNS
 
 SKIP = "_"
 """Name of a column to skip."""
@@ -30,7 +30,7 @@ SOME = 0.05
 WITHOUT_GRAVITY = ("lx", "ly", "lz")
 """Columns of an acceleration without gravity, where ``ax ay az`` are gravity alone."""
 
-KNOWN = (*COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
+KNOWN = (*SAMPLE_COLUMNS, "dt", *FRACTIONS, *WITHOUT_GRAVITY)
 """What columns may be called."""
 
 
@@ -101,8 +101,8 @@ def check_columns(wanted: ReadOptions) -> None:
         raise InputError("name the columns: neither ax ay az nor gx gy gz is there")
     if 0 < len(forces := [c for c in named if c in ("ax", "ay", "az")]) < len("xyz"):
         raise InputError(
-            f"of the accelerometers only {join(forces)} is named: the force is known by"
-            " three axes alone; name all, or none to use the gyroscopes"
+            f"of the accelerometers only {join_words(forces)} is named: the force is"
+            " known by three axes alone; name all, or none to use the gyroscopes"
         )
     if not has_time(named) and not wanted.rate_hz:
         raise InputError("no column is t, the time: give the rate, e.g. --rate 100")

@@ -16,7 +16,11 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import reduce_to_diagonal
-from fieldcal.drivers.mavlink_installed import AT_START, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    GYRO_CAL_AT_START,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.session.folder import Session
 
 WIDEST = {"acc_offset": 3.5, "gyr_offset": 0.5}
@@ -56,7 +60,7 @@ class Change:
         return (self.new - self.old) / self.sigma if self.sigma > 0 else np.nan
 
 
-def installed_in(session: Session) -> Installed | None:
+def installed_in(session: Session) -> InstalledCalibration | None:
     """What an autopilot had installed while a session was recorded; None if nothing.
 
     Raises
@@ -67,11 +71,11 @@ def installed_in(session: Session) -> Installed | None:
     """
     marks = [mark for mark in session.marks() if mark.get("event") == "device"]
     states = [mark["installed"] for mark in marks if mark.get("installed")]
-    return Installed.from_table(states[-1]) if states else None
+    return InstalledCalibration.from_table(states[-1]) if states else None
 
 
 def changes(
-    found: Calibration, nominal: Nominal, installed: Installed
+    found: Calibration, nominal: Nominal, installed: InstalledCalibration
 ) -> tuple[Change, ...]:
     """Every parameter to write, old and new, (1), (2).
 
@@ -82,14 +86,14 @@ def changes(
 
     """
     acc, gyr = (reduce_to_diagonal(found, sensor, nominal) for sensor in ("acc", "gyr"))
-    new = installed.next(acc.bias, acc.scale, gyr.bias)  # (1)
-    k = np.ones(3) if installed.taken_out else installed.of("acc_scale")
+    new = installed.parameters_after(acc.bias, acc.scale, gyr.bias)  # (1)
+    k = np.ones(3) if installed.taken_out else installed.vector("acc_scale")
     sigma = {
         "acc_offset": _sigma(found, "acc_bias") / np.abs(k),  # (2)
         "acc_scale": np.abs(k) * _sigma(found, "acc_scale") / acc.scale**2,
         "gyr_offset": _sigma(found, "gyr_bias"),
     }
-    known = names(installed.autopilot, installed.instance)
+    known = parameter_names(installed.autopilot, installed.instance)
     return tuple(
         Change(name, installed.values[name], new[name], float(s), UNITS[what])
         for what, sigmas in sigma.items()
@@ -111,21 +115,23 @@ def unsupported_parameters(found: Calibration) -> tuple[str, ...]:
     )
 
 
-def replaced_at_start(installed: Installed) -> tuple[str, ...]:
+def replaced_at_start(installed: InstalledCalibration) -> tuple[str, ...]:
     """What of it an autopilot replaces when it starts, a sentence if it does."""
-    if not installed.values.get(AT_START, 0.0):
+    if not installed.values.get(GYRO_CAL_AT_START, 0.0):
         return ()
-    first, *_ = names(installed.autopilot, installed.instance)["gyr_offset"]
+    first, *_ = parameter_names(installed.autopilot, installed.instance)["gyr_offset"]
     return (
-        f"{AT_START} = {installed.values[AT_START]:g}: the autopilot averages its"
-        f" gyroscopes at each start and replaces {first.rstrip('XYZ')}X, Y, Z, whatever"
-        f" is written; set {AT_START} = 0 to keep them",
+        f"{GYRO_CAL_AT_START} = {installed.values[GYRO_CAL_AT_START]:g}: the autopilot"
+        f" averages its gyroscopes at each start and replaces {first.rstrip('XYZ')}X,"
+        f" Y, Z, whatever is written; set {GYRO_CAL_AT_START} = 0 to keep them",
     )
 
 
-def problems(wanted: tuple[Change, ...], installed: Installed) -> tuple[str, ...]:
+def problems(
+    wanted: tuple[Change, ...], installed: InstalledCalibration
+) -> tuple[str, ...]:
     """Implausible values, a sentence each."""
-    known = names(installed.autopilot, installed.instance)
+    known = parameter_names(installed.autopilot, installed.instance)
     said = []
     for change in wanted:
         what = next(w for w, some in known.items() if change.name in some)

@@ -28,7 +28,7 @@ from numpy.polynomial import Polynomial
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, names
+from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, parameter_names
 from fieldcal.thermal import ThermalCurve, ThermalModel
 from fieldcal.thermal.curves import TERMS
 
@@ -89,7 +89,7 @@ def thermal_parameters(
         If the model has biases neither of accelerometers nor of gyroscopes.
 
     """
-    known = names(autopilot, instance)
+    known = parameter_names(autopilot, instance)
     values: dict[str, ThermalParameter] = {}
     for sensor in SENSORS:
         if (bias := model.of(f"{sensor}_bias")) is None:

@@ -15,16 +15,16 @@ from typing import Any
 
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import DeviceError, InputError
+from fieldcal.drivers.mavlink_dialog import parameter_list
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
     PX4,
-    Installed,
-    identity,
-    names,
+    InstalledCalibration,
+    identity_parameters,
+    parameter_names,
 )
-from fieldcal.drivers.mavlink_parameters import ParameterLink, same
-from fieldcal.drivers.mavlink_talk import listed
-from fieldcal.session.folder import DESCRIPTION, Session, write_whole
+from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
+from fieldcal.session.folder import DESCRIPTION, Session, write_atomically
 
 SAVED = "installed-before-"
 """What the name of a file with an old set begins with."""
@@ -34,7 +34,7 @@ GYR_OFFSETS = {
     name
     for autopilot in (ARDUPILOT, PX4)
     for instance in range(3)
-    for name in names(autopilot, instance)["gyr_offset"]
+    for name in parameter_names(autopilot, instance)["gyr_offset"]
 } | {f"INS_GYR{n}_CALTEMP" for n in (1, 2, 3)}
 """Parameters that an autopilot sets by itself."""
 
@@ -71,7 +71,7 @@ def check_unchanged(
     for name, value in known.items():
         if name in GYR_OFFSETS:
             continue
-        if not (same(now[name], value) or same(now[name], other[name])):
+        if not (same_float32(now[name], value) or same_float32(now[name], other[name])):
             raise InputError(
                 f"{name} = {now[name]:.9g} on the autopilot, and was {value:.9g}"
                 f" {since}: somebody has changed it since; record again"
@@ -108,14 +108,14 @@ def install(
         except DeviceError as again:
             raise DeviceError(
                 f"{said}; and it could not be undone ({again}): set by hand"
-                f" {listed(old)}"
+                f" {parameter_list(old)}"
             ) from failed
         raise WriteRolledBack(f"{said}; undone, all {len(old)} are {back}") from failed
 
 
 def whole(now: Mapping[str, float], some: Mapping[str, float]) -> bool:
     """Whether what an autopilot keeps is one set, but for what it sets by itself."""
-    return all(same(now[n], v) for n, v in some.items() if n not in GYR_OFFSETS)
+    return all(same_float32(now[n], v) for n, v in some.items() if n not in GYR_OFFSETS)
 
 
 def broken_off(
@@ -124,7 +124,7 @@ def broken_off(
     """Sentence where it keeps part of each, as after a kill; empty if it does not."""
     if whole(now, old) or whole(now, new):
         return ""
-    done = sum(same(now[n], v) for n, v in new.items())
+    done = sum(same_float32(now[n], v) for n, v in new.items())
     return (
         f"writing was broken off before: {done} of {len(new)} parameters are the new"
         " ones"
@@ -158,13 +158,13 @@ def save(
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S-%f")
     path = folder / f"{SAVED}{stamp}.json"
     document = {"device": device, "old": dict(old), "new": dict(new)}
-    return write_whole(path, json.dumps(document, indent=2) + "\n")
+    return write_atomically(path, json.dumps(document, indent=2) + "\n")
 
 
 def note_done(path: Path, **what: Any) -> None:
     """Note in a saved set what became of it: ``done``, ``undone``."""
     document = load_json(path.read_text("utf-8"))
-    write_whole(path, json.dumps({**document, **what}, indent=2) + "\n")
+    write_atomically(path, json.dumps({**document, **what}, indent=2) + "\n")
 
 
 def save_removed(folder: Path) -> list[Path]:
@@ -178,8 +178,8 @@ def save_removed(folder: Path) -> list[Path]:
         told = mark.get("installed") if mark.get("event") == "device" else None
         if not (told and told.get("taken_out")):
             continue
-        known = Installed.from_table(told)
-        new = identity(known)
+        known = InstalledCalibration.from_table(told)
+        new = identity_parameters(known)
         old = {name: known.values[name] for name in new}
         if old != new:  # else a run before it had taken out what there was
             first = device if isinstance(device, str) else device[0]

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fieldcal.core.frames import turn, turns_of
-from fieldcal.core.rotation import exponential
+from fieldcal.core.frames import angles_of_direction_cosines, direction_cosines
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.physics.effect import NO_SHAPE, Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
@@ -132,8 +132,10 @@ def tilt_positions(x: Experience, attitude: Array) -> Experience:
     first = np.array([int(np.argmax(x.position == p)) for p in moved])
     there = x.position[first] == moved
     first, moved = first[there], moved[there]
-    held = turn(x.alpha[first], x.beta[first], x.gamma[first])
-    angles = turns_of(held @ np.swapaxes(exponential(attitude[moved]), 1, 2))
+    held = direction_cosines(x.alpha[first], x.beta[first], x.gamma[first])
+    angles = angles_of_direction_cosines(
+        held @ np.swapaxes(rotation_matrices(attitude[moved]), 1, 2)
+    )
     table = np.full((len(attitude) + 1, 3), np.nan)
     table[moved] = angles
     new = table[x.position]

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.frames import force_home
+from fieldcal.core.frames import specific_force_at_home
 from fieldcal.core.samples import Array
 from fieldcal.model import priors, thresholds
 from fieldcal.navigator.large_angles import beyond_first_order
@@ -231,7 +231,7 @@ def _linearise_about(
     With a base that leans by a degree, the second order is 1.5 mm/s^2 of gravity.
     """
     c = setup.attitudes[r]
-    force = force_home(setup.gravity)
+    force = specific_force_at_home(setup.gravity)
     f = c.T @ force
     bias, scale, rate, phi = np.split(mean, 4)
     errors = np.concatenate([rate, bias + scale * f, phi + own])

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from fieldcal.core.frames import force_home
+from fieldcal.core.frames import specific_force_at_home
 from fieldcal.core.rotation import cross_matrix
 from fieldcal.core.samples import Array
 
@@ -41,7 +41,7 @@ def error_dynamics(earth: Array, gravity: float) -> Array:
     f = np.zeros((9, 9))
     f[PHI, PHI] = -cross_matrix(earth)
     f[PHI, VELOCITY] = cross_matrix(-DOWN) / EARTH_RADIUS  # (1)
-    f[VELOCITY, PHI] = cross_matrix(force_home(gravity))
+    f[VELOCITY, PHI] = cross_matrix(specific_force_at_home(gravity))
     f[VELOCITY, VELOCITY] = -2 * cross_matrix(earth)
     f[VELOCITY, POSITION] = 2 * gravity / EARTH_RADIUS * np.outer(DOWN, DOWN)  # (2)
     f[POSITION, VELOCITY] = np.eye(3)  # (3)

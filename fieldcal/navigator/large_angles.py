@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
 FINER = 5
@@ -39,9 +39,9 @@ def beyond_first_order(
     """
     (earth, force), (e, a, phi) = inputs, np.split(errors, 3)
     t = np.arange(count * FINER + 1) * (step / FINER)
-    true = exponential(phi) @ c
-    turned = exponential(-t[:, None] * earth) @ c
-    computed = turned @ exponential(t[:, None] * (true.T @ earth + e))  # (1)
+    true = rotation_matrices(phi) @ c
+    turned = rotation_matrices(-t[:, None] * earth) @ c
+    computed = turned @ rotation_matrices(t[:, None] * (true.T @ earth + e))  # (1)
     drift = c @ e
     once, twice = t[:, None], t[:, None] ** 2 / 2
     angle = phi - drift * once - np.cross(earth, phi * once - drift * twice)  # (2)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.frames import force_home
+from fieldcal.core.frames import specific_force_at_home
 from fieldcal.core.samples import Array
 from fieldcal.navigator.growth import PHI, POSITION, error_dynamics, propagate_errors
 from fieldcal.navigator.solution import NavigatorRun
@@ -100,7 +100,7 @@ def run_rows(run: NavigatorRun, setup: RunSetup, r: int) -> RunRows:
     )
     c = setup.attitudes[r]
     rate, force = constant[:, :3] @ c, constant[:, 3:] @ c
-    f = c.T @ force_home(setup.gravity)
+    f = c.T @ specific_force_at_home(setup.gravity)
     began = start[:, POSITION] * (START_POSITION_M if used.max() >= len(f) else 0.0)
     pick = np.ix_(take, take)
     return RunRows(

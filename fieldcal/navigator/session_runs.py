@@ -17,10 +17,10 @@ import numpy as np
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.wording import format_with_sigma
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.core.frames import earth_rate_home, turn
-from fieldcal.core.positions import angles, third_angles
+from fieldcal.core.frames import direction_cosines, earth_rate_at_home
+from fieldcal.core.positions import alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import Array
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.navigator.estimate import DriftEstimate, estimate_from_drift
 from fieldcal.navigator.mistakes import ATTITUDES, AZIMUTH, LEVEL, SCATTER
 from fieldcal.navigator.run_rows import RunSetup
@@ -95,9 +95,11 @@ def run_setup(about: Description, used: list[int]) -> tuple[RunSetup, Array]:
     own = [setting if p.sigma is None else np.rad2deg(p.sigma) for p in about.positions]
     level = UNSTATED_LEVEL_DEG if about.level_deg is None else about.level_deg
     north = float(table.get("azimuth_sd_deg", UNSTATED_AZIMUTH_DEG))
-    turns = turn(*angles(about.positions), third_angles(about.positions))
+    turns = direction_cosines(
+        *alpha_beta_angles(about.positions), gamma_angles(about.positions)
+    )
     known = RunSetup(
-        base @ earth_rate_home(about.latitude),
+        base @ earth_rate_at_home(about.latitude),
         about.gravity,
         np.array([(about.mounting.T @ t).T for t in turns]),
         np.deg2rad([level, north, level]),
@@ -144,8 +146,8 @@ def _contradicted_setup(found: DriftEstimate) -> list[str]:
         )
     if runs := [name for name in found.setup_mistakes if name.startswith("run")]:
         out.append(
-            f"{join(runs)}: the device was not in the attitude that was entered; what"
-            " such a run tells of biases is used, and nothing of its level"
+            f"{join_words(runs)}: the device was not in the attitude that was entered;"
+            " what such a run tells of biases is used, and nothing of its level"
         )
     if ATTITUDES in found.setup_mistakes:
         out.append(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Index
 from fieldcal.noise.likelihood import Flags
 
@@ -92,7 +92,7 @@ def _robust_z(values: Array) -> Array:
 
 def _robust_sigma(values: Array) -> Array:
     """Robust standard deviation of each column about 0; inf where most are alike."""
-    usual = DEVIATION * np.median(np.abs(values), axis=0)
+    usual = MAD_TO_SIGMA * np.median(np.abs(values), axis=0)
     scale: Array = np.where(usual > 0, usual, np.inf)
     return scale
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import (
     TIMED_TERMS,
@@ -239,7 +239,7 @@ def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
 def _without_lines(spectrum: CosineSpectrum, powers: Powers, rich: NoiseFit) -> Powers:
     """Leave bins above 1 Hz with lines out of the fit."""
     excess = _excess(powers, rich)
-    usual = DEVIATION * np.median(np.abs(excess[~powers.free]))
+    usual = MAD_TO_SIGMA * np.median(np.abs(excess[~powers.free]))
     odd = (excess > 6 * max(1.0, usual)) & (spectrum.frequency > FILTERED_HZ)
     return replace(powers, free=powers.free | odd)
 

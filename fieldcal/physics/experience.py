@@ -17,7 +17,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from fieldcal.core.frames import force_home, in_turned_axes, mean_rotation, turn
+from fieldcal.core.frames import (
+    axis_projections,
+    direction_cosines,
+    in_procedure_axes,
+    specific_force_at_home,
+)
 from fieldcal.core.samples import Array
 from fieldcal.physics.joint_turns import JointTurns
 
@@ -132,7 +137,7 @@ class Experience:
             "rate": np.zeros((n, 3)),
             "speed": np.zeros(n),
             "speed_sigma": np.zeros(n),
-            "base_force": force_home(gravity),
+            "base_force": specific_force_at_home(gravity),
             "base_rate": np.zeros(3),
             "mounting": np.eye(3),
             "latitude": np.nan,
@@ -201,7 +206,9 @@ class Experience:
     def to_device(self) -> Array:
         """Direction cosines from base to device axes, (n, 3, 3); nan where unknown."""
         third = self.gamma if self.gamma.any() else None
-        return np.asarray(self.mounting.T @ turn(self.alpha, self.beta, third), float)
+        return np.asarray(
+            self.mounting.T @ direction_cosines(self.alpha, self.beta, third), float
+        )
 
     def turned(self, **changes: Any) -> Self:
         """Make the changes and bring f and w of the oriented rows up to date.
@@ -214,11 +221,11 @@ class Experience:
         )
         gamma = changes.get("gamma", self.gamma)
         third = gamma if gamma.any() else None
-        force = in_turned_axes(alpha, beta, base_force, third) @ self.mounting
-        earth = in_turned_axes(alpha, beta, base_rate, third) @ self.mounting
+        force = in_procedure_axes(alpha, beta, base_force, third) @ self.mounting
+        earth = in_procedure_axes(alpha, beta, base_rate, third) @ self.mounting
         if self.rate.any():
             table = self.rate @ self.mounting
-            earth = table + (mean_rotation(table) @ earth[:, :, None])[:, :, 0]
+            earth = table + (axis_projections(table) @ earth[:, :, None])[:, :, 0]
         known = np.isfinite(alpha + beta)[:, None]
         made = {
             "f": np.where(known, force, changes.get("f", self.f)),

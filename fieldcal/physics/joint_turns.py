@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from fieldcal.core.frames import about_y, in_turned_axes
+from fieldcal.core.frames import in_axes_turned_about_y, in_procedure_axes
 from fieldcal.core.samples import Array, Index
 
 SAME = 1e-8
@@ -67,8 +67,10 @@ class JointTurns:
         first one before that. `mounting` is P, procedure = P device.
         """
         alpha, beta, gamma = self.angles[self._last(t, lead)].T
-        about_alpha = in_turned_axes(alpha, beta, np.array([0.0, 0.0, 1.0]), gamma)
-        about_beta = about_y(np.tile([1.0, 0.0, 0.0], (len(t), 1)), gamma)
+        about_alpha = in_procedure_axes(alpha, beta, np.array([0.0, 0.0, 1.0]), gamma)
+        about_beta = in_axes_turned_about_y(
+            np.tile([1.0, 0.0, 0.0], (len(t), 1)), gamma
+        )
         return np.stack([about_alpha @ mounting, about_beta @ mounting], axis=2)
 
     def _last(self, t: Array, lead: float) -> Index:

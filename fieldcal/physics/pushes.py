@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import DEVIATION
-from fieldcal.core.samples import Array, runs
+from fieldcal.core.probability import MAD_TO_SIGMA
+from fieldcal.core.samples import Array, runs_of_true
 
 LARGEST = 6.5
 """A single sample, in standard deviations."""
@@ -115,10 +115,10 @@ def disturbed_stretches(
             # a byte decoded wrongly is no push: without it, what of the mean is left
             mean = running_means(np.where(alone, 0.0, column / scale[c]), width)
             np.maximum(peak, mean / there.means[width][c], out=peak)
-        for first, last in runs(peak > MEAN):
+        for first, last in runs_of_true(peak > MEAN):
             at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
-    found = _close_gaps(runs(loud), 2 * m)
+    found = _close_gaps(runs_of_true(loud), 2 * m)
     return np.array([_trim(size, a, b) for a, b in found])
 
 
@@ -159,7 +159,7 @@ def usual_spread(z: Array) -> Array:
     array([4.45])
     """
     some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
-    spread: Array = DEVIATION * np.median(some, axis=1)
+    spread: Array = MAD_TO_SIGMA * np.median(some, axis=1)
     return np.maximum(spread, 1.0)
 
 

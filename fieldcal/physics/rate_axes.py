@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
 FEWEST = 3
@@ -97,7 +97,7 @@ def _closure_angles(turn: ObservedTurn, every: Sequence[Array]) -> list[float]:
 
 def _rotation_product(angles: Array) -> Array:
     """Product of all steps, (3, 3), the last at the left."""
-    steps = exponential(-angles)
+    steps = rotation_matrices(-angles)
     while len(steps) > 1:
         if len(steps) % 2:
             steps = np.concatenate([steps, np.eye(3)[None]])

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.positions import Position, angles, third_angles
+from fieldcal.core.positions import Position, alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -53,8 +53,8 @@ def find_aliases(positions: Sequence[Position], gravity: float) -> Aliases:
     gravity : m/s^2
 
     """
-    gamma = third_angles(positions)
-    x = Experience.at_rest(*angles(positions), gravity, gamma=gamma)
+    gamma = gamma_angles(positions)
+    x = Experience.at_rest(*alpha_beta_angles(positions), gravity, gamma=gamma)
     perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
     view = RowView.of(x, np.full((1, len(x)), np.inf), perfect)
     base = _calibration(view)

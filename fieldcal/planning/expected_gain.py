@@ -33,8 +33,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldcal.calibration.names import ParameterName
-from fieldcal.core.frames import turn, way
-from fieldcal.core.positions import Position, angles
+from fieldcal.core.frames import direction_cosines, shortest_rotation
+from fieldcal.core.positions import Position, alpha_beta_angles
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Cause
@@ -263,7 +263,7 @@ class ExpectedGain:
             self.found.state,
             small_rotation=np.zeros_like(self.found.state.small_rotation),
         )
-        alpha, beta = angles(positions)
+        alpha, beta = alpha_beta_angles(positions)
         since = np.repeat(d.since[:, -1:], len(positions), axis=1)
         view = RowView.of(rows_at_session_end(self.rows.x, alpha, beta), since, state)
         used = values != 0
@@ -296,7 +296,10 @@ class ExpectedGain:
     def _turns_to(self, alpha: Array, beta: Array) -> Array:
         """Turn from the last position to each of some, (n, 3) rad in device axes."""
         x = self.rows.x
-        phi: Array = way(turn(x.alpha[-1], x.beta[-1]), alpha, beta) @ x.mounting
+        phi: Array = (
+            shortest_rotation(direction_cosines(x.alpha[-1], x.beta[-1]), alpha, beta)
+            @ x.mounting
+        )
         return phi
 
     def _noise_covariance(

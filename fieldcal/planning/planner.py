@@ -25,7 +25,7 @@ from itertools import permutations, product
 import numpy as np
 
 from fieldcal.core.errors import PlanError
-from fieldcal.core.positions import Position, forces
+from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design_matrix, parameters
 
@@ -220,7 +220,7 @@ def _cost(information: Array, gravity: float) -> Array:
 
 def _shortest_way(positions: list[Position]) -> tuple[Position, ...]:
     """Order the positions so that the operator turns least, the first nearest home."""
-    f = forces([Position.deg(0, 0), *positions], 1.0)
+    f = specific_forces([Position.deg(0, 0), *positions], 1.0)
     steps = np.linalg.norm(f[:, None] - f[None], axis=2)
     n = len(positions)
     if n <= 7:

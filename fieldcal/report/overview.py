@@ -11,7 +11,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import ParameterName
 from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.samples import Block as SampleBlock
 from fieldcal.importing.session.stream_facts import StreamFacts

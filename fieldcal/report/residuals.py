@@ -19,13 +19,13 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.frames import (
     EARTH_RATE,
-    angles_of,
-    earth_rate_home,
-    force_home,
-    mean_rotation,
-    turn,
+    angles_of_force_direction,
+    axis_projections,
+    direction_cosines,
+    earth_rate_at_home,
+    specific_force_at_home,
 )
-from fieldcal.core.positions import rates, speeds, third_angles
+from fieldcal.core.positions import gamma_angles, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array, Block
 from fieldcal.evaluation.observations import build_observations
 from fieldcal.model.causes.planned import state_of
@@ -77,13 +77,14 @@ def predicted_outputs(found: Calibration, seen: Observations) -> Array:
     x = Experience.at_rest(
         *seen.angles,
         seen.gravity,
-        base_force=force_home(seen.gravity) + seen.under_way.force * [1.0, 0.0, 1.0],
+        base_force=specific_force_at_home(seen.gravity)
+        + seen.under_way.force * [1.0, 0.0, 1.0],
         mounting=seen.mounting,
-        rate=rates(seen.positions),
-        gamma=third_angles(seen.positions),
+        rate=table_rates(seen.positions),
+        gamma=gamma_angles(seen.positions),
     )
     if seen.grade == "navigation" and seen.latitude is not None:
-        rate = earth_rate_home(seen.latitude) + seen.under_way.rate
+        rate = earth_rate_at_home(seen.latitude) + seen.under_way.rate
         x = x.turned(base_rate=rate)
     nominal = seen.nominal
     state = state_of(
@@ -93,7 +94,7 @@ def predicted_outputs(found: Calibration, seen: Observations) -> Array:
          np.array([*nominal.acc_scale, *nominal.gyr_scale])),
     )  # fmt: skip
     out = state.output(state.experienced(x), np.full((1, len(x)), np.inf))
-    out[speeds(seen.positions)[0] > 0] = np.nan
+    out[unknown_axis_speeds(seen.positions)[0] > 0] = np.nan
     if seen.grade != "navigation":
         out[:, 3:] += _estimate_earth_rate(seen, seen.mean[:, 3:] - out[:, 3:])
     return out
@@ -105,11 +106,11 @@ def _estimate_earth_rate(seen: Observations, left: Array) -> Array:
     if seen.latitude is None or not known.any():
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
-    turns = (*seen.angles, third_angles(seen.positions))
-    away[known] = mean_rotation(seen.rates[known]) @ (
-        seen.mounting.T @ turn(*(angle[known] for angle in turns))
+    turns = (*seen.angles, gamma_angles(seen.positions))
+    away[known] = axis_projections(seen.rates[known]) @ (
+        seen.mounting.T @ direction_cosines(*(angle[known] for angle in turns))
     )
-    home = earth_rate_home(seen.latitude) + seen.under_way.rate
+    home = earth_rate_at_home(seen.latitude) + seen.under_way.rate
     down = away[..., 1] * home[1]
     level = away[known][..., [0, 2]].reshape(-1, 2)
     # a prior of the size it can have keeps few windows from explaining anything with it
@@ -167,7 +168,7 @@ def measured_angles(material: ReportMaterial) -> MeasuredAngles | None:
         acc = found.apply(block, seen.nominal).acc
         spread = np.hypot(spread, found.uncertainty_of(block, seen.nominal)[:, :3])
     force, spread = acc @ seen.mounting.T, spread @ np.abs(seen.mounting.T)
-    shown = np.rad2deg([angles_of(f) for f in force])
+    shown = np.rad2deg([angles_of_force_direction(f) for f in force])
     asked = np.rad2deg(np.column_stack(seen.angles))
     return MeasuredAngles(
         still.position_numbers, asked, shown, _sigma(force, spread, shown)
@@ -180,6 +181,6 @@ def _sigma(force: Array, spread: Array, shown: Array) -> Array:
     for axis in range(3):
         moved = force.copy()
         moved[:, axis] += spread[:, axis]
-        change = np.rad2deg([angles_of(f) for f in moved]) - shown
+        change = np.rad2deg([angles_of_force_direction(f) for f in moved]) - shown
         variance += ((change + 180) % 360 - 180) ** 2
     return np.sqrt(variance)

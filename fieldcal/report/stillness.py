@@ -110,7 +110,7 @@ def _windows(material: ReportMaterial, still: UsableWindows) -> blocks.Table:
         end = float(np.nextafter(average.end, np.inf))
         window = material.block.between(average.start, end)
         about, span = material.session.about, (average.start, end)
-        if about.positions[row].turning:
+        if about.positions[row].on_turning_table:
             rate = table_rate(material.block, span, about, row)
             window, _ = without_table_rotation(window, rate)
         worst = judge_window(_cells(window), StillnessLimits()).worst

@@ -24,15 +24,15 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import FieldcalError
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.run.link_marks import LinkMarks
 from fieldcal.session.folder import DESCRIPTION
-from fieldcal.session.marks import ADDED
+from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.recorder import Recorder
 
-SHARED_KEYS = ("grade", *FACTORY)
+SHARED_KEYS = ("grade", *FACTORY_KEYS)
 """Keys of the first device's table that are copied to the further ones."""
 
 MOST_BATCHES = 1 << 17
@@ -164,9 +164,9 @@ class LeadRecorder:
                 self.tell(f"{other.folder.name}: {other.failed}")
         return recorded
 
-    def rejoin(self) -> None:
+    def link_reopened(self) -> None:
         """Take note that the link of the first device was opened anew."""
-        self._recorder.rejoin()
+        self._recorder.link_reopened()
 
     def mark(self, event: str, **what: Any) -> None:
         """Append a mark, and a window to all sessions.
@@ -175,7 +175,7 @@ class LeadRecorder:
         whenever the process is killed.
         """
         for other in self.others:
-            if event in ("asked", "insisted", ADDED):
+            if event in ("asked", "insisted", POSITION_ADDED):
                 other.mark(event, **what)
             elif event == "window":
                 host = self._times.host_time

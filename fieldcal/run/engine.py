@@ -35,7 +35,7 @@ from fieldcal.run.waiting import PositionWait, measured_force
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaker
 from fieldcal.session.description import Description
-from fieldcal.session.marks import ADDED
+from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.windows import Average
 
 R = TypeVar("R")
@@ -162,7 +162,9 @@ class Engine:
         number = len(self._about.positions) + len(self._added)
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
-        self._recorder.mark(ADDED, position=number, name=position.name, **angles)
+        self._recorder.mark(
+            POSITION_ADDED, position=number, name=position.name, **angles
+        )
         self._added.append(position)
         return number
 

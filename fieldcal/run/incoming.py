@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.samples import Block, pieces
+from fieldcal.core.samples import Block, split_by_time
 from fieldcal.drivers.driver import Driver
 from fieldcal.run.interruptions import GAP
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
@@ -80,6 +80,6 @@ class IncomingSamples:
             self._until_s = float(block.t[-1])
             self._link.take(block)
             self._heard(block)
-            for piece in pieces(block, PIECE):
+            for piece in split_by_time(block, PIECE):
                 self._seen(piece)
                 yield piece

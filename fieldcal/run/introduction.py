@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.frames import force_home
-from fieldcal.core.samples import Array, Block, pieces
+from fieldcal.core.frames import specific_force_at_home
+from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.mounting_check import fitting_mounting, up_axis
 from fieldcal.run.position_check import NORM
@@ -69,7 +69,7 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     if not abs(size - gravity) <= NORM * gravity:
         says = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, says + zero)
-    mounting = fitting_mounting(f, force_home(gravity), PLAIN_MOUNTING)
+    mounting = fitting_mounting(f, specific_force_at_home(gravity), PLAIN_MOUNTING)
     if mounting is None:
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, "it stands askew" + zero)
     up = up_axis(f)
@@ -101,7 +101,7 @@ def rate_unit_from_turn(
     watch, began = GyroUnitWatch(gravity), np.nan
     for block in blocks:
         began = float(block.t[0]) if np.isnan(began) else began
-        for piece in pieces(block, PIECE):
+        for piece in split_by_time(block, PIECE):
             watch.add(piece)
             if watch.unit:
                 return watch.unit

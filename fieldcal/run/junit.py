@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+from fieldcal.core.escaping import escape_invisible
 from fieldcal.core.positions import Position
-from fieldcal.core.shown import shown
-from fieldcal.session.folder import write_whole
+from fieldcal.session.folder import write_atomically
 
 TROUBLE = ("wrong", "rejected", "kept")
 """Marks of what went wrong in a position."""
@@ -64,10 +64,10 @@ def write(
         suite.set(key, str(len(suite.findall(f"testcase/{kind}"))))
     suite.set("tests", str(len(suite)))
     for element in suite.iter():
-        element.text = element.text and shown(element.text)
+        element.text = element.text and escape_invisible(element.text)
         for key, value in element.items():
-            element.set(key, shown(value))
-    write_whole(path, tostring(suite, encoding="utf-8", xml_declaration=True))
+            element.set(key, escape_invisible(value))
+    write_atomically(path, tostring(suite, encoding="utf-8", xml_declaration=True))
 
 
 def _position(

@@ -20,10 +20,10 @@ from fieldcal import procedures
 from fieldcal.acceptance.verification import planned_verification
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, PlanError
-from fieldcal.core.positions import Position, forces
+from fieldcal.core.positions import Position, specific_forces
 from fieldcal.session import description, schemas
 from fieldcal.session.description import Description
-from fieldcal.session.schemas import refusal, validator_of
+from fieldcal.session.schemas import make_validator, schema_fault
 
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
 """Averaging time, longest wait for a device that warms up, longest turn, s."""
@@ -87,16 +87,16 @@ class PlanTask:
 @cache
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, with the procedures that there are."""
-    found = schemas.schema("plan")
+    found = schemas.load_schema("plan")
     procedure = found["properties"]["run"]["properties"]["procedure"]
-    procedure["enum"] = list(procedures.names())
-    procedure["description"] = f"write one of {', '.join(procedures.names())}"
+    procedure["enum"] = list(procedures.procedure_names())
+    procedure["description"] = f"write one of {', '.join(procedures.procedure_names())}"
     return found
 
 
 def positions_of(procedure: str) -> list[dict[str, Any]]:
     """Default tables ``[[position]]`` of a procedure."""
-    taken = procedures.procedure(procedure).POSITIONS
+    taken = procedures.load_procedure(procedure).POSITIONS
     return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
 
 
@@ -117,7 +117,7 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return load_toml(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        known = ", ".join(procedures.names())
+        known = ", ".join(procedures.procedure_names())
         raise InputError(
             f"{path}: is neither a procedure ({known}) nor a plan file"
         ) from error
@@ -144,7 +144,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
     if "position" not in tables and "procedure" in run:
         tables = {**tables, "position": positions_of(run["procedure"])}
     try:
-        about = description.parse(tables)
+        about = description.parse_description(tables)
     except InputError as error:
         raise PlanError(f"{name}: {error}") from error
     _check_positions(about, name)
@@ -155,7 +155,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
 
 
 def _check_schema(tables: Mapping[str, Any], name: str) -> None:
-    if wrong := refusal({"run": {}, **tables}, validator_of(schema())):
+    if wrong := schema_fault({"run": {}, **tables}, make_validator(schema())):
         raise PlanError(f"{name}: {wrong}")
 
 
@@ -176,7 +176,7 @@ def _check_positions(about: Description, name: str) -> None:
             f"{name}: {len(positions)} positions with known angles are not enough: a"
             " plan needs two or more, each with alpha_deg and beta_deg"
         )
-    f = forces(positions, 1.0)
+    f = specific_forces(positions, 1.0)
     if np.linalg.norm(f - f[0], axis=1).max() < APART:
         raise PlanError(
             f"{name}: all {len(positions)} positions are the same"

@@ -20,8 +20,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from fieldcal.core.frames import about_y, angles_of
-from fieldcal.core.positions import Position, forces
+from fieldcal.core.frames import angles_of_force_direction, in_axes_turned_about_y
+from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array
 
 FIRST = np.deg2rad(8.0)
@@ -82,8 +82,10 @@ def check_position(
 
     """
     norm = float(np.linalg.norm(f))
-    upright = about_y(_without_offset(f, gravity, held), np.array(-wanted.gamma))
-    alpha, beta = np.rad2deg(angles_of(upright))
+    upright = in_axes_turned_about_y(
+        _without_offset(f, gravity, held), np.array(-wanted.gamma)
+    )
+    alpha, beta = np.rad2deg(angles_of_force_direction(upright))
     seen = (float(alpha), float(beta))
     if abs(norm - gravity) > NORM * gravity:
         problem = (
@@ -113,7 +115,7 @@ def round_to_tenth(angle: float) -> float:
 @lru_cache(maxsize=64)
 def _force(position: Position, gravity: float) -> Array:
     """Specific force of a position, (3,) m/s^2; cached, since every block needs it."""
-    f: Array = forces([position], gravity)[0]
+    f: Array = specific_forces([position], gravity)[0]
     f.flags.writeable = False
     return f
 
@@ -187,7 +189,7 @@ def _slips(
         slips = [*own, *slips]
     if before and before.oriented:
         slips.insert(0, (before, "it has not been turned yet"))
-    there = forces([p for p, _ in slips], gravity)
+    there = specific_forces([p for p, _ in slips], gravity)
     there.flags.writeable = False
     return tuple(said for _, said in slips), there
 

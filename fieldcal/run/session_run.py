@@ -41,9 +41,9 @@ from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.warm_up import WarmUpWatch
-from fieldcal.session.description import with_more
+from fieldcal.session.description import with_added_positions
 from fieldcal.session.folder import RESULT, Session
-from fieldcal.session.marks import ADDED, MARKS, read_marks
+from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average, average
 
@@ -154,13 +154,13 @@ class SessionRun:
         return so_far
 
     def _plan(self) -> Plan[Calibration]:
-        task, about = self._task, with_more(self._task.about, self._added)
+        task, about = self._task, with_added_positions(self._task.about, self._added)
         name = task.procedure
-        if self._added and procedures.most(about, name) is None:
+        if self._added and procedures.max_positions(about, name) is None:
             name = "positions"  # whatever set it was, it has more now
-        plan = procedures.procedure(name).plan
+        plan = procedures.load_procedure(name).plan
         found = yield from plan(about, task.seconds, task.sigma)
-        about = with_more(task.about, self._added)
+        about = with_added_positions(task.about, self._added)
         verification = planned_verification(about)
         if verification is not None:
             yield from self._hold_verification(len(about.positions), verification)
@@ -171,7 +171,7 @@ class SessionRun:
     def _hold_verification(self, number: int, position: Position) -> Plan[None]:
         """Hold the verification position, which is not fitted."""
         task = self._task
-        if procedures.most(task.about, task.procedure) is not None:
+        if procedures.max_positions(task.about, task.procedure) is not None:
             yield from note("one more position, which is not fitted but predicted")
         try:
             yield from hold_until_still(number, position, task.seconds, task.sigma)
@@ -211,7 +211,7 @@ class SessionRun:
         while monotonic() < deadline:
             with suppress(DeviceError):
                 driver = self._opened()
-                self._recorder.rejoin()
+                self._recorder.link_reopened()
                 return driver
             if self._operator.wish() == "stop":
                 raise Stopped("stopped by the operator")
@@ -283,7 +283,9 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
             *_remedy_positions(remedy, session),
         ]
         run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
-    fixed = procedures.most(session.about, str(run.get("procedure", ""))) is None
+    fixed = (
+        procedures.max_positions(session.about, str(run.get("procedure", ""))) is None
+    )
     if fixed and len(tables.get("position", ())) > _planned_count(marks, session):
         run["procedure"] = "positions"  # whatever set it was, it has more now
     return session, {**tables, "run": run}, again
@@ -308,7 +310,7 @@ def positions_left_out(session: Session) -> tuple[int, ...]:
 
 def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
     """Number of positions that a session was begun with."""
-    added = sum(bool(mark.get("event") == ADDED) for mark in marks)
+    added = sum(bool(mark.get("event") == POSITION_ADDED) for mark in marks)
     return len(session.about.positions) - added
 
 
@@ -316,7 +318,9 @@ def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
     """Whether no position was asked for since a run had its result."""
     told = [m.get("event") for m in marks]
     ends = [i for i, event in enumerate(told) if event == "finished"]
-    return bool(ends) and not {ADDED, "repeated", "asked"} & set(told[ends[-1] :])
+    return bool(ends) and not {POSITION_ADDED, "repeated", "asked"} & set(
+        told[ends[-1] :]
+    )
 
 
 def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:

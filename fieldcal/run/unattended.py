@@ -47,7 +47,7 @@ def recalibrate(
         "frame": {"mounting": truth["mounting"]},
     }
     whole = {
-        "format": description.FORMAT,
+        "format": description.FORMAT_VERSION,
         **known,
         "position": plan_file.positions_of(procedure),
         "run": {"procedure": procedure, "seconds": seconds},

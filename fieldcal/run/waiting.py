@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.positions import Position, forces
+from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
 from fieldcal.run.gyro_unit import GyroUnitWatch
@@ -91,7 +91,7 @@ class PositionWait:
         self.waited = self.waited_host = 0.0
 
     def _start(self) -> None:
-        self._stillness = Stillness(self._about.sways)
+        self._stillness = Stillness(self._about.base_sways)
         self._resting = _RestSamples()
         self._told = -np.inf
         self._told_of: Array | None = None
@@ -151,7 +151,7 @@ class PositionWait:
     def arrived(self) -> bool:
         """Whether the device rests in the requested position."""
         there = self.arrival is not None and self.arrival.ok
-        swung = not self._about.sways or self._last - self._there >= SWUNG
+        swung = not self._about.base_sways or self._last - self._there >= SWUNG
         return there and swung and self.seconds >= SETTLE
 
     @property
@@ -194,7 +194,7 @@ class PositionWait:
         """Notice for a device that rests on another face; empty if it does not."""
         if self.f is None or not self._hold.position.oriented:
             return ""
-        wanted = forces([self._hold.position], self._about.gravity)[0]
+        wanted = specific_forces([self._hold.position], self._about.gravity)[0]
         device = self._about.mounting.T @ self.f
         said = wrong_mounting_message(device, wanted, self._about.axes)
         problem = self.arrival.problem if self.arrival else ""

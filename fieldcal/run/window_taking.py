@@ -64,7 +64,7 @@ class WindowTaker:
 
     def new_window(self) -> PiecedWindow:
         """An empty window, which is judged with the noise of the one before."""
-        limits = StillnessLimits.swaying() if self._about.sways else None
+        limits = StillnessLimits.swaying() if self._about.base_sways else None
         return PiecedWindow(self._noise, self._driver.grain, limits)
 
     def average(self, hold: Hold, pieces: PiecedWindow) -> Average | None:
@@ -137,7 +137,7 @@ class WindowTaker:
             if moved := pieces.disturbance:
                 raise moved
             self._display.averaging(hold, pieces)
-            early = not self._about.sways and pieces.reason_to_stop(hold.sigma)
+            early = not self._about.base_sways and pieces.reason_to_stop(hold.sigma)
             if full or early:
                 break
         self._confirm(watch)

@@ -1,7 +1,7 @@
-"""Sessions in, results out, over HTTP: `fieldcal serve`.
+"""HTTP service that receives sessions and returns results: `fieldcal serve`.
 
-`upload` takes in what somebody sends and trusts nothing of it, `jobs` keeps what was
-sent and how far it is, `work` makes the documents of one job in a process of its own,
-`queue` does one after the other, `records` writes them for test stations, `openapi`
-says what can be asked, and `api` answers. Who is let in is `run.page.access`'s matter.
+`upload` checks and unpacks what is sent. `jobs` keeps uploads and the state of their
+jobs. `work` makes the documents of one job in a process of its own, and `queue` carries
+out the jobs in order. `records` writes results for test stations. `openapi` describes
+the requests, and `api` answers them. `run.page.access` controls the access.
 """

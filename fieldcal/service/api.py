@@ -1,4 +1,4 @@
-"""Answers of the service: sessions in, documents out."""
+"""Request handlers of the service: receive sessions, return documents."""
 
 from __future__ import annotations
 
@@ -17,143 +17,152 @@ from starlette.routing import Route
 from fieldcal.core.errors import FieldcalError
 from fieldcal.run.page import server as page
 from fieldcal.service import openapi
-from fieldcal.service.jobs import NAME, RESULTS, UPLOAD, Job, Jobs
+from fieldcal.service.jobs import (
+    FILE_NAME,
+    RESULTS_FOLDER,
+    UPLOAD_FOLDER,
+    Job,
+    JobStore,
+)
 from fieldcal.service.queue import JobQueue
-from fieldcal.service.work import OPTIONS, REPORT
+from fieldcal.service.work import IMPORT_OPTIONS, REPORT_FILE
 
 FILES = Path(__file__).parent / "files"
 
-OPTION = 200
-"""Letters of an option's value."""
+LONGEST_OPTION = 200
+"""Largest length of an option's value, characters."""
 
-APART = (
+REPORT_POLICY = (
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline';"
     " style-src 'unsafe-inline'; img-src data:; font-src data:"
 )
-"""A report has all in itself, and nothing of the page that it is opened from."""
+"""Content security policy of a report: it is isolated from the service's page."""
 
 
 class SessionsApi:
-    """What is answered to each request for sessions.
+    """Handlers of the requests for sessions.
 
     Parameters
     ----------
-    jobs : that it takes in and shows
-    queue : what does them
+    jobs : the jobs to add to and to show
+    queue : carries out the jobs
 
     """
 
-    def __init__(self, jobs: Jobs, queue: JobQueue) -> None:
+    def __init__(self, jobs: JobStore, queue: JobQueue) -> None:
         self.jobs, self.queue = jobs, queue
 
-    def shown(self, job: Job) -> dict[str, Any]:
-        """A job as it is told."""
+    def job_document(self, job: Job) -> dict[str, Any]:
+        """JSON object of a job."""
         return {**asdict(job), "documents": self.jobs.documents(job.id)}
 
-    async def every(self, _: Request) -> Response:
-        """All of them."""
+    async def list_jobs(self, _: Request) -> Response:
+        """All jobs."""
         some = await run_in_threadpool(self.jobs.all)
-        return JSONResponse([self.shown(job) for job in some])
+        return JSONResponse([self.job_document(job) for job in some])
 
-    async def sent(self, request: Request) -> Response:
-        """Take one in."""
+    async def receive_upload(self, request: Request) -> Response:
+        """Receive an upload, and add a job for it."""
         said = dict(request.query_params)
         name = said.pop("filename", "")
-        if refusal := _refusal(name, said):
-            return _error(400, refusal)
-        if not await run_in_threadpool(self.jobs.room):
-            return _error(429, "too many recordings wait already: send it again later")
-        part = await run_in_threadpool(self.jobs.begun)
+        if refusal := _request_fault(name, said):
+            return _error_response(400, refusal)
+        if not await run_in_threadpool(self.jobs.has_room):
+            return _error_response(
+                429, "too many recordings wait already: send it again later"
+            )
+        part = await run_in_threadpool(self.jobs.begin_upload)
         try:
-            (part / UPLOAD).mkdir()
-            with (part / UPLOAD / name).open("xb") as file:
+            (part / UPLOAD_FOLDER).mkdir()
+            with (part / UPLOAD_FOLDER / name).open("xb") as file:
                 async for piece in request.stream():
                     await run_in_threadpool(file.write, piece)
             now = datetime.now(UTC).isoformat()
-            job = await run_in_threadpool(self.jobs.added, part, name, now, said)
+            job = await run_in_threadpool(self.jobs.add_job, part, name, now, said)
         except FieldcalError as error:
             shutil.rmtree(part, ignore_errors=True)
-            return _error(429, str(error))
+            return _error_response(429, str(error))
         except OSError as error:
             shutil.rmtree(part, ignore_errors=True)
-            return _error(507, f"it cannot be kept: {error.strerror}")
+            return _error_response(507, f"it cannot be kept: {error.strerror}")
         except ClientDisconnect:
             shutil.rmtree(part, ignore_errors=True)
             return Response(status_code=400)
-        self.queue.come()
-        return JSONResponse(self.shown(job), 202)
+        self.queue.notify()
+        return JSONResponse(self.job_document(job), 202)
 
-    async def one(self, request: Request) -> Response:
-        """How far one is."""
+    async def get_job(self, request: Request) -> Response:
+        """State of a job."""
         job = self.jobs.get(request.path_params["id"])
-        return JSONResponse(self.shown(job)) if job else _missing()
+        return JSONResponse(self.job_document(job)) if job else _not_found()
 
-    async def removed(self, request: Request) -> Response:
-        """Take one away."""
+    async def delete_job(self, request: Request) -> Response:
+        """Delete a job."""
         number = request.path_params["id"]
-        found = await run_in_threadpool(self.jobs.removed, number)
-        return Response(status_code=204) if found else _missing()
+        found = await run_in_threadpool(self.jobs.remove, number)
+        return Response(status_code=204) if found else _not_found()
 
-    async def document(self, request: Request) -> Response:
-        """What was made of one."""
+    async def get_document(self, request: Request) -> Response:
+        """A document of a job."""
         number, name = (request.path_params[k] for k in ("id", "document"))
         if self.jobs.get(number) is None or name not in self.jobs.documents(number):
-            return _missing()
-        more = {"content-security-policy": APART} if name == REPORT else {}
-        path = self.jobs.folder(number) / RESULTS / name
-        return FileResponse(path, media_type=openapi.DOCUMENTS[name], headers=more)
+            return _not_found()
+        more = {"content-security-policy": REPORT_POLICY} if name == REPORT_FILE else {}
+        path = self.jobs.folder(number) / RESULTS_FOLDER / name
+        return FileResponse(path, media_type=openapi.DOCUMENT_TYPES[name], headers=more)
 
 
-async def _described(_: Request) -> Response:
-    return JSONResponse(openapi.document())
+async def _describe(_: Request) -> Response:
+    return JSONResponse(openapi.openapi_document())
 
 
-def _file(path: Path) -> Route:
+def _file_route(path: Path) -> Route:
     async def given(_: Request) -> Response:
         return FileResponse(path)
 
     return Route("/" if path.suffix == ".html" else f"/{path.name}", given)
 
 
-def app(jobs: Jobs, queue: JobQueue) -> Starlette:
+def create_app(jobs: JobStore, queue: JobQueue) -> Starlette:
     """Return the application.
 
     Parameters
     ----------
-    jobs : that it takes in and shows
-    queue : what does them
+    jobs : the jobs to add to and to show
+    queue : carries out the jobs
 
     """
     api = SessionsApi(jobs, queue)
     return Starlette(
         routes=[
-            Route(openapi.SESSIONS, api.every),
-            Route(openapi.SESSIONS, api.sent, methods=["POST"]),
-            Route(openapi.ONE, api.one),
-            Route(openapi.ONE, api.removed, methods=["DELETE"]),
-            Route(openapi.DESCRIPTION, _described),
-            Route(openapi.DOCUMENT, api.document),
-            *(_file(path) for path in sorted(FILES.iterdir())),
-            _file(page.FILES / "page.css"),
+            Route(openapi.SESSIONS_PATH, api.list_jobs),
+            Route(openapi.SESSIONS_PATH, api.receive_upload, methods=["POST"]),
+            Route(openapi.SESSION_PATH, api.get_job),
+            Route(openapi.SESSION_PATH, api.delete_job, methods=["DELETE"]),
+            Route(openapi.DESCRIPTION_PATH, _describe),
+            Route(openapi.DOCUMENT_PATH, api.get_document),
+            *(_file_route(path) for path in sorted(FILES.iterdir())),
+            _file_route(page.FILES / "page.css"),
         ]
     )
 
 
-def _refusal(name: str, said: dict[str, str]) -> str:
-    """Why what is said of a recording is nothing; empty where it is something."""
-    if not NAME.fullmatch(name):
+def _request_fault(name: str, said: dict[str, str]) -> str:
+    """Fault in the file name and options of an upload; empty if there is none."""
+    if not FILE_NAME.fullmatch(name):
         return "filename is wanted: letters, digits, dots and dashes, no folder"
     for key, value in said.items():
-        if key not in OPTIONS:
-            return f"there is no option of this name; there are {', '.join(OPTIONS)}"
-        if not value or len(value) > OPTION or not value.isprintable():
+        if key not in IMPORT_OPTIONS:
+            known = ", ".join(IMPORT_OPTIONS)
+            return f"there is no option of this name; there are {known}"
+        if not value or len(value) > LONGEST_OPTION or not value.isprintable():
             return f"{key}: is empty, too long or no text"
     return ""
 
 
-def _error(status: int, says: str) -> Response:
+def _error_response(status: int, says: str) -> Response:
     return JSONResponse({"error": says}, status)
 
 
-def _missing() -> Response:
-    return _error(404, "there is none of this id")
+def _not_found() -> Response:
+    return _error_response(404, "there is none of this id")

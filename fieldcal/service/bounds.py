@@ -1,4 +1,4 @@
-"""How much somebody may send, and what one job may use."""
+"""Bounds for uploads and jobs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ MIB = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class ServiceBounds:
     """Bounds of a service.
 
     Attributes
     ----------
-    upload : bytes of one recording as it is sent
-    unpacked : bytes of what is in an archive, and of any file that is made of it
-    members : files in an archive
-    jobs : that wait, at most
-    kept : jobs that are kept; the oldest that are over go first
-    seconds : of processor time for one job
+    upload : size of one upload, bytes
+    unpacked : size of an unpacked archive, and of each file made from it, bytes
+    members : number of files in an archive
+    jobs : number of unfinished jobs
+    kept : number of finished jobs that are kept; the oldest are deleted first
+    seconds : processor time of one job, s
 
     """
 

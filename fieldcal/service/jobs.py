@@ -1,7 +1,7 @@
-"""Jobs: what was sent, how far it is, and what was made of it; each a folder.
+"""Jobs: an upload, its state and its results, each job in a folder of its own.
 
-A job is there when it is whole: it is made under a name with a dot and then gets its
-own. So are its session and its results.
+A job becomes visible when it is complete: its folder is created under a name with a
+leading dot, and then renamed. The same holds for its session and its results.
 """
 
 from __future__ import annotations
@@ -17,17 +17,22 @@ from pathlib import Path
 from typing import Any, Literal
 
 from fieldcal.core.errors import InputError
-from fieldcal.service.bounds import Bounds
-from fieldcal.session.folder import write_whole
+from fieldcal.service.bounds import ServiceBounds
+from fieldcal.session.folder import write_atomically
 
-State = Literal["waiting", "working", "done", "failed"]
+JobState = Literal["waiting", "working", "done", "failed"]
 
-JOB, UPLOAD, SESSION, RESULTS = "job.json", "upload", "session", "results"
+JOB_FILE, UPLOAD_FOLDER, SESSION_FOLDER, RESULTS_FOLDER = (
+    "job.json",
+    "upload",
+    "session",
+    "results",
+)
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-"""Of what is sent: no path, nothing hidden."""
+FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+"""Permitted names of uploaded files: no path, no leading dot."""
 
-NUMBER = re.compile(r"[0-9a-f]{16}")
+JOB_ID = re.compile(r"[0-9a-f]{16}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,22 +41,22 @@ class Job:
 
     Attributes
     ----------
-    id : by which it is asked for
-    name : of what was sent
+    id : identifier of the job
+    name : name of the uploaded file
     received_at : ISO 8601, UTC
-    state : how far it is
-    options : what was said of the recording
-    error : why there is no result, in a sentence
-    go, good : of the result; None where nobody judged, or there is none
+    state : state of the job
+    options : options of the import
+    error : why there is no result, one sentence
+    go, good : of the result; None without a decision, or without a result
     verdict : of the diagnosis
-    log : what import said
+    log : output of the import
 
     """
 
     id: str
     name: str
     received_at: str
-    state: State = "waiting"
+    state: JobState = "waiting"
     options: Mapping[str, str] = field(default_factory=dict)
     error: str | None = None
     go: bool | None = None
@@ -60,17 +65,17 @@ class Job:
     log: str = ""
 
 
-class Jobs:
+class JobStore:
     """All jobs of a service.
 
     Parameters
     ----------
-    root : folder of all of them
-    bounds : how many
+    root : folder of all jobs
+    bounds : number of jobs
 
     """
 
-    def __init__(self, root: Path, bounds: Bounds) -> None:
+    def __init__(self, root: Path, bounds: ServiceBounds) -> None:
         self.root, self.bounds = root, bounds
         self._lock = threading.Lock()
         root.mkdir(parents=True, exist_ok=True)
@@ -78,7 +83,7 @@ class Jobs:
             shutil.rmtree(part, ignore_errors=True)
 
     def folder(self, number: str) -> Path:
-        """Where a job is."""
+        """Folder of a job."""
         return self.root / number
 
     def all(self) -> list[Job]:
@@ -88,43 +93,45 @@ class Jobs:
         return sorted(found, key=lambda j: (j.received_at, j.id), reverse=True)
 
     def get(self, number: str) -> Job | None:
-        """A job; None where there is none."""
-        if not NUMBER.fullmatch(number):
+        """A job; None if there is none with this id."""
+        if not JOB_ID.fullmatch(number):
             return None
         try:
-            return Job(**json.loads((self.folder(number) / JOB).read_text("utf-8")))
-        except (OSError, ValueError, TypeError):  # taken away, or somebody else's
+            return Job(
+                **json.loads((self.folder(number) / JOB_FILE).read_text("utf-8"))
+            )
+        except (OSError, ValueError, TypeError):  # deleted, or not a job
             return None
 
-    def waiting(self) -> list[Job]:
-        """Jobs that are not over, the earliest first."""
+    def unfinished(self) -> list[Job]:
+        """Jobs that wait or are being processed, the earliest first."""
         return [j for j in reversed(self.all()) if j.state in ("waiting", "working")]
 
-    def room(self) -> bool:
-        """Whether one more may wait."""
-        return len(self.waiting()) < self.bounds.jobs
+    def has_room(self) -> bool:
+        """Whether one more job may be added."""
+        return len(self.unfinished()) < self.bounds.jobs
 
-    def begun(self) -> Path:
-        """A folder for a job that is being sent."""
+    def begin_upload(self) -> Path:
+        """Create a folder for an upload."""
         part = self.root / f".{secrets.token_hex(8)}.part"
         part.mkdir()
         return part
 
-    def added(
+    def add_job(
         self, part: Path, name: str, received_at: str, options: Mapping[str, str]
     ) -> Job:
-        """A job of what was sent into a folder.
+        """Add a job for an upload in a folder of `begin_upload`.
 
         Raises
         ------
         InputError
-            If as many wait as may.
+            If too many jobs wait already.
 
         """
         job = Job(part.name[1:-5], name, received_at, options=dict(options))
-        write_whole(part / JOB, json.dumps(asdict(job)))
+        write_atomically(part / JOB_FILE, json.dumps(asdict(job)))
         with self._lock:
-            if not self.room():
+            if not self.has_room():
                 raise InputError(
                     f"{self.bounds.jobs} recordings wait already: send it again later"
                 )
@@ -132,16 +139,18 @@ class Jobs:
         self._make_room()
         return job
 
-    def changed(self, job: Job, **what: Any) -> Job:
-        """Write down how far a job is; nothing where it was taken away meanwhile."""
+    def update(self, job: Job, **what: Any) -> Job:
+        """Store changed fields of a job, unless it was deleted meanwhile."""
         job = replace(job, **what)
         with self._lock:
             if self.folder(job.id).is_dir():
-                write_whole(self.folder(job.id) / JOB, json.dumps(asdict(job)))
+                write_atomically(
+                    self.folder(job.id) / JOB_FILE, json.dumps(asdict(job))
+                )
         return job
 
-    def removed(self, number: str) -> bool:
-        """Take a job away with all that is its; whether there was one."""
+    def remove(self, number: str) -> bool:
+        """Delete a job with all its files; returns whether there was one."""
         if self.get(number) is None:
             return False
         gone = self.root / f".{number}.part"
@@ -151,11 +160,11 @@ class Jobs:
         return True
 
     def documents(self, number: str) -> list[str]:
-        """Names of what was made."""
-        folder = self.folder(number) / RESULTS
+        """Names of the documents of a job."""
+        folder = self.folder(number) / RESULTS_FOLDER
         return sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
 
     def _make_room(self) -> None:
         over = [j for j in self.all() if j.state in ("done", "failed")]
         for job in over[self.bounds.kept :]:
-            self.removed(job.id)
+            self.remove(job.id)

@@ -1,30 +1,30 @@
-"""What can be asked of the service, as OpenAPI 3.1 has it."""
+"""OpenAPI 3.1 description of the service."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from fieldcal.core.version import __version__
-from fieldcal.service.work import JUNIT, OPTIONS, RECORD, REPORT
+from fieldcal.service.work import IMPORT_OPTIONS, JUNIT_FILE, RECORD_FILE, REPORT_FILE
 from fieldcal.session.folder import RESULT
 from fieldcal.session.integrity import DIAGNOSIS
 
-SESSIONS, ONE = "/api/sessions", "/api/sessions/{id}"
-DOCUMENT, DESCRIPTION = "/api/sessions/{id}/{document}", "/api/openapi.json"
+SESSIONS_PATH, SESSION_PATH = "/api/sessions", "/api/sessions/{id}"
+DOCUMENT_PATH, DESCRIPTION_PATH = "/api/sessions/{id}/{document}", "/api/openapi.json"
 
-DOCUMENTS = {
+DOCUMENT_TYPES = {
     RESULT: "application/json",
     DIAGNOSIS: "application/json",
-    REPORT: "text/html",
-    JUNIT: "application/xml",
-    RECORD: "application/json",
+    REPORT_FILE: "text/html",
+    JUNIT_FILE: "application/xml",
+    RECORD_FILE: "application/json",
 }
-"""What is made of a session, with its type."""
+"""Documents of a session, with their media types."""
 
-TEXT = {"type": ["string", "null"]}
-TRUTH = {"type": ["boolean", "null"]}
+TEXT_SCHEMA = {"type": ["string", "null"]}
+BOOLEAN_SCHEMA = {"type": ["boolean", "null"]}
 
-JOB = {
+JOB_SCHEMA = {
     "type": "object",
     "required": ["id", "name", "received_at", "state", "documents"],
     "properties": {
@@ -33,12 +33,12 @@ JOB = {
         "received_at": {"type": "string", "format": "date-time"},
         "state": {"enum": ["waiting", "working", "done", "failed"]},
         "options": {"type": "object", "additionalProperties": {"type": "string"}},
-        "error": TEXT,
-        "go": TRUTH,
-        "good": TRUTH,
-        "verdict": TEXT,
+        "error": TEXT_SCHEMA,
+        "go": BOOLEAN_SCHEMA,
+        "good": BOOLEAN_SCHEMA,
+        "verdict": TEXT_SCHEMA,
         "log": {"type": "string"},
-        "documents": {"type": "array", "items": {"enum": list(DOCUMENTS)}},
+        "documents": {"type": "array", "items": {"enum": list(DOCUMENT_TYPES)}},
     },
 }
 
@@ -50,14 +50,14 @@ def _answer(what: str, schema: dict[str, Any] | None = None) -> dict[str, Any]:
     return out
 
 
-def _sending(job: dict[str, Any]) -> dict[str, Any]:
-    """What may be sent, and what is answered."""
+def _upload_operation(job: dict[str, Any]) -> dict[str, Any]:
+    """OpenAPI operation for an upload."""
     said = [
         {
             "name": name, "in": "query", "schema": {"type": "string"},
             "description": f"{option} of fieldcal import; of recordings only",
         }
-        for name, option in OPTIONS.items()
+        for name, option in IMPORT_OPTIONS.items()
     ]  # fmt: skip
     named = {
         "name": "filename", "in": "query", "required": True,
@@ -80,15 +80,15 @@ def _sending(job: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def document() -> dict[str, Any]:
+def openapi_document() -> dict[str, Any]:
     """Return the OpenAPI document."""
     job = {"$ref": "#/components/schemas/Session"}
     missing = {"404": _answer("There is none of this id.")}
     one = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
-    kinds: dict[str, Any] = {kind: {"schema": {}} for kind in DOCUMENTS.values()}
+    kinds: dict[str, Any] = {kind: {"schema": {}} for kind in DOCUMENT_TYPES.values()}
     wanted = {
         "name": "document", "in": "path", "required": True,
-        "schema": {"enum": list(DOCUMENTS)},
+        "schema": {"enum": list(DOCUMENT_TYPES)},
     }  # fmt: skip
     found = {"200": {"description": "The document.", "content": kinds}, **missing}
     every = {"type": "array", "items": job}
@@ -97,29 +97,29 @@ def document() -> dict[str, Any]:
         "info": {"title": "fieldcal", "version": __version__},
         "security": [{"token": []}],
         "paths": {
-            SESSIONS: {
+            SESSIONS_PATH: {
                 "get": {"summary": "All sessions, the latest first.",
                         "responses": {"200": _answer("The sessions.", every)}},
-                "post": _sending(job),
+                "post": _upload_operation(job),
             },
-            ONE: {
+            SESSION_PATH: {
                 "parameters": [one],
                 "get": {"summary": "How far a session is.",
                         "responses": {"200": _answer("The session.", job), **missing}},
                 "delete": {"summary": "Take a session away with all that is its.",
                            "responses": {"204": _answer("It is gone."), **missing}},
             },
-            DOCUMENT: {
+            DOCUMENT_PATH: {
                 "parameters": [one, wanted],
                 "get": {"summary": "What was made of a session.", "responses": found},
             },
-            DESCRIPTION: {
+            DESCRIPTION_PATH: {
                 "get": {"summary": "This document.",
                         "responses": {"200": _answer("OpenAPI 3.1.", {})}},
             },
         },
         "components": {
-            "schemas": {"Session": JOB},
+            "schemas": {"Session": JOB_SCHEMA},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         },
     }  # fmt: skip

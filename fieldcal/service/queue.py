@@ -1,4 +1,4 @@
-"""One job after the other, each in a process of its own or on an engine."""
+"""Carries out jobs in order, each in a process of its own or on an engine."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
-from fieldcal.service.jobs import Job, Jobs
+from fieldcal.service.jobs import Job, JobStore
 from fieldcal.service.work import JobTask
 
-AGAIN = 10.0
-"""Time after which a job is tried again that could not be written down, s."""
+RETRY_INTERVAL = 10.0
+"""Time after which a job is repeated whose result could not be stored, s."""
 
 
 class JobQueue:
-    """Carries out jobs in the order in which they came; a context manager.
+    """Carries out jobs in the order of their arrival; a context manager.
 
     Parameters
     ----------
-    jobs : to be done
-    database : where results go
-    pool : what does them
-    task : with each
+    jobs : the jobs to carry out
+    database : stores the results
+    pool : worker processes
+    task : function that processes the folder of a job
 
     """
 
     def __init__(
-        self, jobs: Jobs, database: Database, pool: WorkerPool,
+        self, jobs: JobStore, database: Database, pool: WorkerPool,
         task: Callable[[str], StoredSession] | None = None,
     ) -> None:  # fmt: skip
         self.jobs, self.database, self.pool = jobs, database, pool
@@ -47,40 +47,45 @@ class JobQueue:
     def __exit__(self, *exc: object) -> None:
         self._over = True
         self._come.set()
-        # what is under way is done again at the next start
+        # an unfinished job is repeated at the next start
         self._thread.join(timeout=1.0)
 
-    def come(self) -> None:
-        """Say that there is a job."""
+    def notify(self) -> None:
+        """Tell the queue that there is a job."""
         self._come.set()
 
     def _work(self) -> None:
         while not self._over:
             self._come.clear()
-            waiting = self.jobs.waiting()
+            waiting = self.jobs.unfinished()
             if not waiting:
                 self._come.wait()
                 continue
             try:
-                self._done(waiting[0])
+                self._process(waiting[0])
             except (FieldcalError, OSError):
-                self._come.wait(AGAIN)  # for room on the disk, or a store
+                self._come.wait(
+                    RETRY_INTERVAL
+                )  # until the disk or the store can be written
 
-    def _done(self, job: Job) -> None:
-        job = self.jobs.changed(job, state="working")
+    def _process(self, job: Job) -> None:
+        job = self.jobs.update(job, state="working")
         folder = self.jobs.folder(job.id)
         for made in run_tasks([str(folder)], self.task, self.pool):
             one = made.value or StoredSession(made.item, error=made.error)
             said = one.error
             if said is None:
                 try:
-                    self.database.done(lambda db, one=one: sessions.keep(db, one), True)  # type: ignore[misc]
+                    self.database.run(
+                        lambda db, one=one: sessions.store_session(db, one),  # type: ignore[misc]
+                        True,
+                    )
                 except FieldcalError as error:
                     said = str(error)
             log = Path(folder / "import.log")
             with suppress(OSError):
-                job = self.jobs.changed(job, log=log.read_text("utf-8"))
-            self.jobs.changed(
+                job = self.jobs.update(job, log=log.read_text("utf-8"))
+            self.jobs.update(
                 job,
                 state="done" if said is None else "failed",
                 error=said and said.replace(f"{folder}: ", ""),

@@ -16,7 +16,7 @@ from fieldcal.history.sessions import StoredSession
 OUTCOMES = {True: "PASS", False: "FAIL", None: "UNSET"}
 
 
-def record(one: StoredSession) -> dict[str, Any]:
+def station_record(one: StoredSession) -> dict[str, Any]:
     """The record of a session; values in the parameters' units."""
     result: Mapping[str, Any] = one.result or {}
     decision = result.get("decision", {})

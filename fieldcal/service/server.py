@@ -1,4 +1,4 @@
-"""The service at a socket: who is let in, and how it ends."""
+"""The service at a network socket, with access control."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fieldcal.core.errors import InputError
 from fieldcal.run.page.access import Access, Gate
 from fieldcal.run.page.server import listening_socket
 from fieldcal.service import api, openapi
-from fieldcal.service.jobs import Jobs
+from fieldcal.service.jobs import JobStore
 from fieldcal.service.queue import JobQueue
 
-SHORTEST = 16
-"""Letters that a token has at least."""
+SHORTEST_TOKEN = 16
+"""Least length of a token, characters."""
 
 
 @dataclass
 class Service:
-    """A service that listens; `serve` answers until somebody ends it.
+    """A service that listens; `serve` answers requests until it is stopped.
 
     Attributes
     ----------
-    socket : where it listens
-    access : who is let in
-    server : what answers
+    socket : the listening socket
+    access : access control
+    server : the HTTP server
 
     """
 
@@ -38,23 +38,23 @@ class Service:
     server: uvicorn.Server
 
     @classmethod
-    def of(
-        cls, host: str, port: int, jobs: Jobs, queue: JobQueue,
+    def listen(
+        cls, host: str, port: int, jobs: JobStore, queue: JobQueue,
         tokens: Sequence[str] = (), names: Sequence[str] = (),
     ) -> Service:  # fmt: skip
-        """Listen.
+        """Open the socket and create the service.
 
         Parameters
         ----------
-        host, port : where; port 0 is any that is free
-        jobs, queue : what is served
-        tokens : of programs
-        names : host:port by which it is reached besides, behind a proxy
+        host, port : address to listen at; port 0 is any free one
+        jobs, queue : the jobs to serve
+        tokens : access tokens of programs
+        names : further host:port under which it is reached, behind a proxy
 
         Raises
         ------
         InputError
-            If nothing can listen there.
+            If the address cannot be used.
 
         """
         there = listening_socket(host, port)
@@ -65,28 +65,28 @@ class Service:
         access = Access(
             (*hosts, *names),
             bearers=tuple(tokens),
-            uploads={openapi.SESSIONS: jobs.bounds.upload},
+            uploads={openapi.SESSIONS_PATH: jobs.bounds.upload},
         )
         config = uvicorn.Config(
-            Gate(api.app(jobs, queue), access), log_config=None, access_log=False,
-            lifespan="off", timeout_graceful_shutdown=2, server_header=False,
-            limit_concurrency=64,
+            Gate(api.create_app(jobs, queue), access), log_config=None,
+            access_log=False, lifespan="off", timeout_graceful_shutdown=2,
+            server_header=False, limit_concurrency=64,
         )  # fmt: skip
         return cls(there, access, uvicorn.Server(config))
 
     @property
     def address(self) -> str:
-        """What to open in a browser, with the token of the page."""
+        """Address for a browser, with the token of the page."""
         return f"http://{self.access.hosts[0]}/?token={self.access.token}"
 
     def serve(self) -> None:
-        """Answer until it is ended."""
+        """Answer requests until stopped."""
         with self.socket:
             self.server.run([self.socket])
 
 
-def tokens_in(path: Path) -> list[str]:
-    """Tokens of a file, one a line; those behind # are remarks.
+def read_tokens(path: Path) -> list[str]:
+    """Tokens from a file, one in each line; text after # is ignored.
 
     Raises
     ------
@@ -102,9 +102,9 @@ def tokens_in(path: Path) -> list[str]:
     if os.name == "posix" and mode & 0o077:
         raise InputError(f"{path}: others may read the tokens: chmod 600 {path}")
     found = [one for line in lines if (one := line.split("#")[0].strip())]
-    if not found or min(map(len, found)) < SHORTEST:
+    if not found or min(map(len, found)) < SHORTEST_TOKEN:
         raise InputError(
-            f"{path}: a token a line is wanted, of {SHORTEST} letters or more, as"
+            f"{path}: a token a line is wanted, of {SHORTEST_TOKEN} letters or more, as"
             " from openssl rand -hex 24"
         )
     return found

@@ -1,7 +1,7 @@
-"""An archive that somebody sent becomes a session folder, or is refused.
+"""Unpacks an uploaded archive into a session folder, or refuses it.
 
-Nothing in it is trusted: names go nowhere but into the folder, sizes are counted while
-they come out, and whatever is no plain file is refused.
+Nothing in it is trusted: files are written to the folder only, sizes are counted while
+unpacking, and anything but a plain file is refused.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.shown import one_line
-from fieldcal.service.bounds import MIB, Bounds
+from fieldcal.core.escaping import escape_line
+from fieldcal.service.bounds import MIB, ServiceBounds
 from fieldcal.session import description
 from fieldcal.session.folder import DESCRIPTION
 
-PIECE = MIB
+BYTES_AT_ONCE = MIB
 
 
-def members(path: Path, bounds: Bounds) -> list[zipfile.ZipInfo]:
-    """Files of an archive; empty where it is none.
+def archive_members(path: Path, bounds: ServiceBounds) -> list[zipfile.ZipInfo]:
+    """Files in an archive; empty if the file is no archive.
 
     Raises
     ------
     InputError
-        If it has too many, they are too large, or one is no plain file.
+        If it has too many files, they are too large, or one is no plain file.
 
     """
     if not zipfile.is_zipfile(path):
@@ -54,8 +54,8 @@ def members(path: Path, bounds: Bounds) -> list[zipfile.ZipInfo]:
         kind = stat.S_IFMT(one.external_attr >> 16)
         if kind not in (0, stat.S_IFREG) or one.flag_bits & 1:
             raise InputError(
-                f"{one_line(one.filename)}: is a link, encrypted or no file: pack the"
-                " plain files of a session"
+                f"{escape_line(one.filename)}: is a link, encrypted or no file: pack"
+                " the plain files of a session"
             )
     return found
 
@@ -63,14 +63,14 @@ def members(path: Path, bounds: Bounds) -> list[zipfile.ZipInfo]:
 def session_members(
     found: list[zipfile.ZipInfo],
 ) -> Mapping[str, zipfile.ZipInfo] | None:
-    """Files of a session by their names; None where the archive is none.
+    """Files of a session by name; None if the archive has no session.
 
-    All of them lie in one folder, at the top or below.
+    All files must be in one folder, at the top or below.
 
     Raises
     ------
     InputError
-        If a name leads anywhere else.
+        If a file is in another folder.
 
     """
     named = [one for one in found if PurePosixPath(one.filename).name == DESCRIPTION]
@@ -85,26 +85,30 @@ def session_members(
         plain = path.name and not {"\\", ":"} & {*one.filename}
         if path.parent != top or path.is_absolute() or ".." in path.parts or not plain:
             raise InputError(
-                f"{one_line(one.filename)}: does not lie beside {DESCRIPTION}: pack the"
-                " files of the session's folder and nothing else"
+                f"{escape_line(one.filename)}: does not lie beside {DESCRIPTION}: pack"
+                " the files of the session's folder and nothing else"
             )
         if path.name.startswith("."):
-            continue  # of the system it was packed on
+            continue  # files of the operating system
         if path.name in out:
-            raise InputError(f"{one_line(path.name)}: is in the archive twice")
+            raise InputError(f"{escape_line(path.name)}: is in the archive twice")
         out[path.name] = one
     return out
 
 
 def unpack(
-    path: Path, files: Mapping[str, zipfile.ZipInfo], folder: Path, bounds: Bounds
+    path: Path,
+    files: Mapping[str, zipfile.ZipInfo],
+    folder: Path,
+    bounds: ServiceBounds,
 ) -> None:
-    """Write the files of a session into a folder that is new.
+    """Write the files of a session to a new folder.
 
     Raises
     ------
     InputError
-        If they are larger than they say, damaged, or want other files of this computer.
+        If they are larger than stated, damaged, or refer to other files of this
+        computer.
 
     """
     folder.mkdir()
@@ -113,16 +117,16 @@ def unpack(
         with zipfile.ZipFile(path) as archive:
             for name, one in files.items():
                 with archive.open(one) as source, (folder / name).open("xb") as out:
-                    while piece := source.read(PIECE):
+                    while piece := source.read(BYTES_AT_ONCE):
                         left -= len(piece)
                         if left < 0:
                             raise InputError(
-                                f"{one_line(name)}: is larger than the archive says"
+                                f"{escape_line(name)}: is larger than the archive says"
                             )
                         out.write(piece)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
         raise InputError(f"the archive is damaged: {error}; send it again") from error
-    about = description.read(folder / DESCRIPTION)
+    about = description.read_description(folder / DESCRIPTION)
     run = about.raw.get("run")
     if isinstance(run, Mapping) and "limits" in run:
         raise InputError(

@@ -1,4 +1,4 @@
-"""One job: what was sent becomes a session, and the session its documents."""
+"""One job: makes a session from an upload, and documents from the session."""
 
 from __future__ import annotations
 
@@ -12,19 +12,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fieldcal.core.errors import FieldcalError, InputError
-from fieldcal.core.shown import shown
+from fieldcal.core.escaping import escape_invisible
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.history.sessions import StoredSession
 from fieldcal.report import gather, render
 from fieldcal.run import junit
-from fieldcal.service.bounds import Bounds
-from fieldcal.service.jobs import JOB, RESULTS, SESSION, UPLOAD
-from fieldcal.service.records import record
-from fieldcal.service.upload import members, session_members, unpack
-from fieldcal.session.folder import RESULT, Session, write_whole
+from fieldcal.service.bounds import ServiceBounds
+from fieldcal.service.jobs import (
+    JOB_FILE,
+    RESULTS_FOLDER,
+    SESSION_FOLDER,
+    UPLOAD_FOLDER,
+)
+from fieldcal.service.records import station_record
+from fieldcal.service.upload import archive_members, session_members, unpack
+from fieldcal.session.folder import RESULT, Session, write_atomically
 from fieldcal.session.integrity import DIAGNOSIS
 
-OPTIONS = {
+IMPORT_OPTIONS = {
     name: f"--{name.replace('_', '-')}"
     for name in (
         *("serial", "name", "lot", "station", "operator", "latitude", "height"),
@@ -32,42 +37,42 @@ OPTIONS = {
         *("time_unit", "still", "instance", "grade"),
     )
 }
-"""What may be said of a recording, as options of `fieldcal import`."""
+"""Options of an upload, with the options of `fieldcal import` that they set."""
 
-REPORT, JUNIT, RECORD = "report.html", "junit.xml", "record.json"
+REPORT_FILE, JUNIT_FILE, RECORD_FILE = "report.html", "junit.xml", "record.json"
 
-LOG = 20_000
-"""Letters that are kept of what import said."""
+LONGEST_LOG = 20_000
+"""Largest length of the kept output of the import, characters."""
 
 
 @dataclass(frozen=True, slots=True)
 class JobTask:
-    """What is done with the folder of a job.
+    """Processes the folder of a job.
 
     Attributes
     ----------
-    bounds : what it may use
+    bounds : of processor time and file sizes
 
     """
 
-    bounds: Bounds
+    bounds: ServiceBounds
 
     def __call__(self, folder: str) -> StoredSession:
-        """Carry it out; what is wrong with it is in the error."""
+        """Process a job; a failure is stated in ``error`` of the result."""
         place = Path(folder)
         try:
             self._limit()
             session = self._session(place)
         except FieldcalError as error:
-            return StoredSession(folder, error=_within(place, str(error)))
+            return StoredSession(folder, error=_without_paths(place, str(error)))
         one = SessionTask(diagnose=True)(str(session))
         if one.error is not None:
-            return replace(one, error=_within(place, one.error))
+            return replace(one, error=_without_paths(place, one.error))
         self._write(place, session, one)
         return one
 
     def _limit(self) -> None:
-        """Bound what this process may use; it does one job and is over."""
+        """Set resource limits of this process, which carries out one job only."""
         used = resource.getrusage(resource.RUSAGE_SELF)
         spent = int(used.ru_utime + used.ru_stime)
         for what, most in (
@@ -80,21 +85,21 @@ class JobTask:
             resource.setrlimit(what, (least, hard))
 
     def _session(self, place: Path) -> Path:
-        """The session of a job, made where it is not there yet.
+        """Folder of the job's session; made unless it exists.
 
         Raises
         ------
         InputError
-            If nothing can be made of what was sent.
+            If the upload is neither a session nor a recording.
 
         """
-        there, part = place / SESSION, place / f".{SESSION}.part"
+        there, part = place / SESSION_FOLDER, place / f".{SESSION_FOLDER}.part"
         if there.is_dir():
             return there
         shutil.rmtree(part, ignore_errors=True)
-        job = json.loads((place / JOB).read_text("utf-8"))
-        sent = place / UPLOAD / job["name"]
-        found = members(sent, self.bounds)
+        job = json.loads((place / JOB_FILE).read_text("utf-8"))
+        sent = place / UPLOAD_FOLDER / job["name"]
+        found = archive_members(sent, self.bounds)
         files = session_members(found)
         if files is None:
             self._imported(sent, part, job["options"])
@@ -106,15 +111,15 @@ class JobTask:
         return there
 
     def _imported(self, sent: Path, part: Path, options: dict[str, str]) -> None:
-        """Make a session of a recording, by `fieldcal import`."""
-        said = [f"{OPTIONS[name]}={value}" for name, value in options.items()]
+        """Make a session from a recording, by `fieldcal import`."""
+        said = [f"{IMPORT_OPTIONS[name]}={value}" for name, value in options.items()]
         call = [sys.executable, "-m", "fieldcal", "import", str(sent), "-o", str(part)]
         done = subprocess.run(
             [*call, *said], capture_output=True, check=False, cwd=sent.parent,
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
-        text = shown(done.stderr.decode("utf-8", "replace"))[-LOG:]
-        write_whole(sent.parent.parent / "import.log", text)
+        text = escape_invisible(done.stderr.decode("utf-8", "replace"))[-LONGEST_LOG:]
+        write_atomically(sent.parent.parent / "import.log", text)
         if done.returncode:
             shutil.rmtree(part, ignore_errors=True)
             last = text.strip().splitlines()[-1:] or ["import was killed"]
@@ -125,8 +130,8 @@ class JobTask:
             )
 
     def _write(self, place: Path, session: Path, one: StoredSession) -> None:
-        """Write the documents, all of them or none."""
-        there, part = place / RESULTS, place / f".{RESULTS}.part"
+        """Write all documents, atomically."""
+        there, part = place / RESULTS_FOLDER, place / f".{RESULTS_FOLDER}.part"
         for old in (part, there):
             shutil.rmtree(old, ignore_errors=True)
         part.mkdir()
@@ -134,15 +139,21 @@ class JobTask:
         for name, content in ((RESULT, one.result), (DIAGNOSIS, one.diagnosis)):
             if content is not None:
                 shutil.copy(opened.write_json(name, content), part / name)
-        write_whole(part / REPORT, render(gather(session)))
+        write_atomically(part / REPORT_FILE, render(gather(session)))
         run = "run" in opened.about.raw
         held = opened.positions if run else ()
-        junit.write(part / JUNIT, "session", held, list(opened.marks()), one.result)
-        write_whole(part / RECORD, json.dumps(record(one), indent=2) + "\n")
+        junit.write(
+            part / JUNIT_FILE, "session", held, list(opened.marks()), one.result
+        )
+        write_atomically(
+            part / RECORD_FILE, json.dumps(station_record(one), indent=2) + "\n"
+        )
         part.rename(there)
 
 
-def _within(place: Path, text: str) -> str:
-    """A sentence without where on this computer things are."""
-    inside = rf"{re.escape(str(place))}/?(\.?{SESSION}(\.part)?/?|{UPLOAD}/)?"
+def _without_paths(place: Path, text: str) -> str:
+    """Text without the paths of this computer."""
+    inside = (
+        rf"{re.escape(str(place))}/?(\.?{SESSION_FOLDER}(\.part)?/?|{UPLOAD_FOLDER}/)?"
+    )
     return re.sub(inside, "", text).removeprefix(": ")

@@ -1,4 +1,4 @@
-"""Columns of Arrow as arrays of numbers."""
+"""Arrow columns as numpy arrays."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-def numbers(column: pa.Array | pa.ChunkedArray) -> Array:
-    """Values of a column of float64; nan where there is none.
+def float_values(column: pa.Array | pa.ChunkedArray) -> Array:
+    """Values of a column of float64; nan where null.
 
-    Arrow's own way would load all of pandas, where it is installed, to see whether what
-    it is asked for is one of pandas' kinds.
+    Arrow's own conversion imports pandas where it is installed, which takes long.
     """
     chunks = getattr(column, "chunks", [column])
     parts = [_numbers(chunk) for chunk in chunks if len(chunk)]

@@ -1,7 +1,7 @@
 """Writes samples as an Arrow IPC stream in which each batch carries its own checksum.
 
-Any Arrow reader opens the file; the checksum stands in the batch's own metadata:
-``crc32`` of its columns, one after the other, and its ``number`` and first ``row``.
+Any Arrow reader opens the file. The metadata of each batch hold ``crc32`` of its
+columns, one after the other, its ``number`` and its first ``row``.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fieldcal.session.arrow_columns import numbers
+from fieldcal.session.arrow_columns import float_values
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 
 class ArrowEncoder:
-    """Makes the bytes of a stream, a batch at a time.
+    """Encodes a stream, one batch at a time.
 
     Parameters
     ----------
     schema : columns of every batch
-    number, row : batches and rows that are there already, in a stream that goes on
+    number, row : batches and rows that exist already, where a stream is continued
 
     """
 
@@ -36,10 +36,10 @@ class ArrowEncoder:
         self._number, self._row = number, row
         self._there = schema.serialize().to_pybytes() if number else b""
 
-    def batch(self, batch: pa.RecordBatch) -> bytes:
-        """Bytes of the next batch, with those of the stream's head before the first."""
+    def encode(self, batch: pa.RecordBatch) -> bytes:
+        """Bytes of the next batch; the first ones include the stream's header."""
         said = {
-            "crc32": f"{checksum(batch, self._number, self._row):08x}",
+            "crc32": f"{batch_checksum(batch, self._number, self._row):08x}",
             "number": str(self._number),
             "row": str(self._row),
         }
@@ -61,12 +61,14 @@ class ArrowEncoder:
         return data
 
 
-def checksum(batch: pa.RecordBatch, number: int, row: int) -> int:
-    """Checksum of a batch's numbers and of its place."""
+def batch_checksum(batch: pa.RecordBatch, number: int, row: int) -> int:
+    """Checksum of a batch's values, its number and its first row."""
     crc = zlib.crc32(b"%d %d" % (number, row))
     for name, column in zip(batch.schema.names, batch.columns, strict=True):
         known = column.type == "double"
-        values = numbers(column) if known else column.to_numpy(zero_copy_only=False)
+        values = (
+            float_values(column) if known else column.to_numpy(zero_copy_only=False)
+        )
         values = np.ascontiguousarray(values)
         crc = zlib.crc32(values.data, zlib.crc32(name.encode(), crc))
     return crc

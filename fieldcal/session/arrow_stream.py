@@ -1,8 +1,8 @@
-"""Samples as an Arrow IPC stream in which every batch carries its own checksum.
+"""Reads samples from an Arrow IPC stream in which every batch has its own checksum.
 
-`arrow_encoder` writes it. Reading takes what is whole and says what is not: a batch
-that was cut off, changed, lost or doubled. Behind a damaged place it goes on at the
-next batch that is whole.
+`arrow_encoder` writes it. Intact batches are read. A batch that was cut off, changed,
+lost or doubled is reported. After a damaged place, reading continues with the next
+intact batch.
 """
 
 from __future__ import annotations
@@ -10,43 +10,43 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from fieldcal.session.arrow_encoder import checksum
+from fieldcal.session.arrow_encoder import batch_checksum
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 MARKER = b"\xff\xff\xff\xff"
-"""What every message of a stream begins with; messages begin at multiples of 8."""
+"""First bytes of every message of a stream; messages begin at multiples of 8 bytes."""
 
-OURS = {"crc32", "number", "row"}
-"""What a batch says of itself; a stream of another program says none of it."""
+BATCH_KEYS = {"crc32", "number", "row"}
+"""Metadata of each batch; a stream of another program has none of these."""
 
 END = MARKER + b"\0\0\0\0"
-"""What a stream that was closed in order ends with."""
+"""Last bytes of a stream that was closed."""
 
 
 class StreamContent(NamedTuple):
-    """What a stream holds.
+    """Content of a stream.
 
     Attributes
     ----------
-    schema : its columns; None if not even these are there
-    batches : those that are whole, in order
-    says : what is not whole, one sentence without the file's name each
+    schema : its columns; None if these cannot be read
+    batches : intact batches, in order
+    faults : one sentence for each fault, without the file's name
     checked : whether every batch had a checksum
-    number, row : of the batch that would follow
+    number, row : number and first row of the batch that would follow
 
     """
 
     schema: pa.Schema | None
     batches: list[pa.RecordBatch]
-    says: list[str]
+    faults: list[str]
     checked: bool
     number: int
     row: int
 
 
-def in_order(source: Any) -> Generator[pa.RecordBatch, None, bool]:
+def batches_before_damage(source: Any) -> Generator[pa.RecordBatch, None, bool]:
     """Batches of a stream, one at a time, up to the first that is damaged.
 
     Parameters
@@ -55,7 +55,7 @@ def in_order(source: Any) -> Generator[pa.RecordBatch, None, bool]:
 
     Returns
     -------
-    Whether that was all; what is behind a damaged place, `decode` finds.
+    True if the whole stream was read. Use `decode_stream` to read on after damage.
 
     """
     import pyarrow as pa
@@ -64,10 +64,10 @@ def in_order(source: Any) -> Generator[pa.RecordBatch, None, bool]:
     try:
         stream = pa.ipc.open_stream(source)
         while True:
-            batch, said = _batch(stream)
-            if OURS & said.keys():
+            batch, said = _next_batch(stream)
+            if BATCH_KEYS & said.keys():
                 stated = int(said["number"]), int(said["row"]), int(said["crc32"], 16)
-                if stated != (number, row, checksum(batch, number, row)):
+                if stated != (number, row, batch_checksum(batch, number, row)):
                     return False
             yield batch
             number, row = number + 1, row + batch.num_rows
@@ -77,10 +77,10 @@ def in_order(source: Any) -> Generator[pa.RecordBatch, None, bool]:
         return False
 
 
-def whole(data: bytes) -> int:
-    """Bytes up to the end of the last whole batch; 0 where there is none.
+def end_of_whole_batches(data: bytes) -> int:
+    """Number of bytes up to the end of the last whole batch; 0 if there is none.
 
-    A stream that was closed in order ends behind that, with a marker.
+    A closed stream has a marker after that.
     """
     import pyarrow as pa
 
@@ -93,13 +93,13 @@ def whole(data: bytes) -> int:
         return end if batches else 0
 
 
-def decode(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
-    """Read what is whole of a stream.
+def decode_stream(data: bytes, usual: pa.Schema | None = None) -> StreamContent:
+    """Read the intact batches of a stream.
 
     Parameters
     ----------
     data : the file
-    usual : columns to go by where the head of the stream is damaged
+    usual : columns to assume where the header of the stream is damaged
 
     """
     return _Decoder(data, usual).run()
@@ -113,7 +113,7 @@ class _Decoder:
 
         self._data = pa.py_buffer(data)
         self._raw = data
-        self._faults = (pa.ArrowException, OSError, EOFError, ValueError, KeyError,
+        self._read_errors = (pa.ArrowException, OSError, EOFError, ValueError, KeyError,
                         StopIteration)  # fmt: skip
         self._usual = usual
         self._head = b""
@@ -122,7 +122,7 @@ class _Decoder:
         self._stream: Any = None
         self._next = -1
         self._batches: list[Any] = []
-        self._says: list[str] = []
+        self._faults_found: list[str] = []
         self._expected, self._row, self._checked = 0, 0, True
 
     def run(self) -> StreamContent:
@@ -135,7 +135,7 @@ class _Decoder:
         return StreamContent(
             self._schema,
             self._batches,
-            self._says,
+            self._faults_found,
             self._checked,
             self._expected,
             self._row,
@@ -151,7 +151,7 @@ class _Decoder:
             self._next = end = int(self._source.tell())
             self._head = self._raw[:end]
             return end
-        except self._faults:
+        except self._read_errors:
             if self._usual is None or not self._raw:
                 return 0
         with pa.BufferOutputStream() as sink, pa.ipc.new_stream(sink, self._usual):
@@ -160,7 +160,7 @@ class _Decoder:
         first = next(self._candidates(8), None)
         if first is None:
             return 0
-        self._says.append("its head is damaged; the usual columns are taken")
+        self._faults_found.append("its head is damaged; the usual columns are taken")
         self._schema, self._head = self._usual, head
         return first
 
@@ -170,7 +170,9 @@ class _Decoder:
             if self._raw[at : at + len(END)] == END:
                 at += len(END)
                 if at < size:
-                    self._says.append(f"{size - at} bytes behind its end are left out")
+                    self._faults_found.append(
+                        f"{size - at} bytes behind its end are left out"
+                    )
                 return
             end = self._message(at)
             if end is None:
@@ -179,14 +181,16 @@ class _Decoder:
                 )
                 if behind is None:
                     break
-                self._says.append(f"bytes {at} to {behind} are damaged and left out")
+                self._faults_found.append(
+                    f"bytes {at} to {behind} are damaged and left out"
+                )
                 end = behind
             at = end
         rows = sum(batch.num_rows for batch in self._batches)
-        self._says.append(f"was cut off; its {rows} whole rows are used")
+        self._faults_found.append(f"was cut off; its {rows} whole rows are used")
 
     def _whole(self, at: int) -> bool:
-        """Whether a message begins here that can be read."""
+        """Whether a message that can be read begins at byte `at`."""
         return self._read(at) is not None
 
     def _candidates(self, at: int) -> Iterator[int]:
@@ -197,15 +201,15 @@ class _Decoder:
             at = self._raw.find(MARKER, at + 1)
 
     def _read(self, at: int) -> tuple[int, Any, dict[str, str]] | None:
-        """End of a message, its batch and what it says of itself; None if not whole."""
+        """End of a message, its batch and metadata; None if it cannot be read."""
         import pyarrow as pa
 
         try:
-            if at == self._next:  # behind the last: no copy of its bytes is needed
-                found = _batch(self._stream)
+            if at == self._next:  # after the previous message: its bytes need no copy
+                found = _next_batch(self._stream)
                 self._next = int(self._source.tell())
                 return self._next, *found
-        except self._faults:
+        except self._read_errors:
             self._next = -1
         source = pa.BufferReader(self._data.slice(at))
         try:
@@ -213,12 +217,12 @@ class _Decoder:
             end = at + int(source.tell())
             if message.type != "record batch":
                 return end, None, {}
-            return end, *_batch(pa.ipc.open_stream(self._head + self._raw[at:end]))
-        except self._faults:
+            return end, *_next_batch(pa.ipc.open_stream(self._head + self._raw[at:end]))
+        except self._read_errors:
             return None
 
     def _message(self, at: int) -> int | None:
-        """Take the message that begins here; where it ends, None if it is not whole."""
+        """Take the message at byte `at`; returns its end, None if it cannot be read."""
         found = self._read(at)
         if found is None:
             return None
@@ -228,27 +232,29 @@ class _Decoder:
         return end
 
     def _take(self, batch: Any, said: dict[str, str]) -> None:
-        if not OURS & said.keys() and not self._expected:
+        if not BATCH_KEYS & said.keys() and not self._expected:
             self._checked = False
             self._batches.append(batch)
             return
         try:
             number, row = int(said["number"]), int(said["row"])
-            good = int(said["crc32"], 16) == checksum(batch, number, row)
+            good = int(said["crc32"], 16) == batch_checksum(batch, number, row)
         except (KeyError, ValueError):
             good, number, row = False, self._expected, self._row
         if not good:
-            self._says.append(
+            self._faults_found.append(
                 f"batch {self._expected + 1}, {batch.num_rows} rows from row "
                 f"{self._row + 1} on, is damaged and left out"
             )
             self._expected, self._row = self._expected + 1, self._row + batch.num_rows
             return
         if number and number < self._expected:
-            self._says.append(f"batch {number + 1} is there twice; once is used")
+            self._faults_found.append(
+                f"batch {number + 1} is there twice; once is used"
+            )
             return
         if number > self._expected:
-            self._says.append(
+            self._faults_found.append(
                 f"batches {self._expected + 1} to {number} are missing, rows "
                 f"{self._row + 1} to {row}"
             )
@@ -256,8 +262,8 @@ class _Decoder:
         self._batches.append(batch)
 
 
-def _batch(stream: Any) -> tuple[Any, dict[str, str]]:
-    """Next batch of a stream, and what it says of itself."""
+def _next_batch(stream: Any) -> tuple[Any, dict[str, str]]:
+    """Next batch of a stream, and its metadata."""
     batch, said = stream.read_next_batch_with_custom_metadata()
     batch.validate(full=True)
     # Arrow takes metadata that are no text

@@ -1,11 +1,11 @@
-"""How a session says where the device was held: angles, a rotation, or nothing.
+"""Attitude of a [[position]] in session.toml: angles, a rotation, or nothing.
 
     alpha_deg, beta_deg, gamma_deg    turns about z, the turned x, the turned y
     rotation_vector_deg               one turn from home, about x, y, z of the base
     quaternion                        the same turn, w x y z
 
-The last two take the procedure axes from home to the position, in base axes (x East,
-y down, z North). All are put into the three angles, which are what positions have.
+The last two rotate the procedure axes from home to the position, in base axes (x East,
+y down, z North). All are converted to the three angles of `Position`.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.frames import turns_of
+from fieldcal.core.frames import angles_of_direction_cosines
 from fieldcal.core.positions import Position
 
-FORMS = ("alpha_deg", "rotation_vector_deg", "quaternion")
+ATTITUDE_KEYS = ("alpha_deg", "rotation_vector_deg", "quaternion")
 
-ROUNDED = 0.01
-"""How far the length of a quaternion may be off 1: more is another thing."""
+LENGTH_TOLERANCE = 0.01
+"""Difference of a quaternion's length from 1 that is taken for rounding."""
 
 
-def held(number: int, table: Mapping[str, Any], name: str) -> Position:
-    """Where a [[position]] says that the device was held.
+def parse_attitude(number: int, table: Mapping[str, Any], name: str) -> Position:
+    """Position that a [[position]] table states.
 
     Parameters
     ----------
     number : of the position, from 1
     table : of session.toml
-    name : that it is shown by, or empty
+    name : shown to the operator; may be empty
 
     Raises
     ------
     InputError
-        If it says so twice, or what it says is no rotation.
+        If it states two attitudes, or something that is no rotation.
 
     """
-    given = [form for form in FORMS if form in table]
+    given = [form for form in ATTITUDE_KEYS if form in table]
     if len(given) > 1:
         raise InputError(
             f"[[position]] number {number} has {given[0]} and {given[1]}: give one of"
@@ -55,7 +55,7 @@ def held(number: int, table: Mapping[str, Any], name: str) -> Position:
         position = Position.deg(alpha, beta, name, gamma=third)
     else:
         turned = _rotation(number, given[0], np.array(table[given[0]], dtype=float))
-        degrees = np.rad2deg(turns_of(turned.T)).round(9) + 0.0
+        degrees = np.rad2deg(angles_of_direction_cosines(turned.T)).round(9) + 0.0
         alpha, beta, gamma = degrees.tolist()
         position = Position.deg(alpha, beta, name, gamma=gamma)
     sigma = table.get("attitude_sigma_deg")
@@ -77,7 +77,7 @@ def _rotation(number: int, form: str, values: np.ndarray) -> np.ndarray:
         matrix: np.ndarray = Rotation.from_rotvec(values, degrees=True).as_matrix()
         return matrix
     length = float(np.linalg.norm(values))
-    if not abs(length - 1) <= ROUNDED:
+    if not abs(length - 1) <= LENGTH_TOLERANCE:
         raise InputError(
             f"[[position]] number {number} quaternion has length {length:.4g}: give w x"
             " y z of a turn, whose length is 1"

@@ -1,7 +1,6 @@
-"""Samples that a program wrote as zeros where none came.
+"""Rows of zeros that a program wrote in place of missing samples.
 
-Nothing on the ground feels no force at all in all three axes, and turns about none:
-such a row is none of the device's.
+A device on the ground never has zero in all six channels.
 """
 
 from __future__ import annotations
@@ -11,20 +10,21 @@ import numpy as np
 from fieldcal.core.samples import Block
 
 FEWEST, MOST = 2, 0.5
-"""Rows of zeros, and the part of the samples from which on they are all that the device
-puts out: one alone may be where a counter or a test begins, and does no harm."""
+"""Least number of rows of zeros, and the fraction of the samples from which on they are
+kept, since the device puts out nothing else. A single row may be the start of a counter
+or a test, and does no harm."""
 
 
-def without_blanks(block: Block) -> tuple[Block, int]:
-    """The samples that came, and how many rows of zeros there were beside.
+def remove_blank_samples(block: Block) -> tuple[Block, int]:
+    """Samples without rows of zeros, and the number of these rows.
 
     >>> force = np.repeat([[9.8], [0.0], [9.8]], [2, 2, 3], axis=0) * [0, 1, 0]
-    >>> kept, count = without_blanks(Block.of(np.arange(7.0), force, 0 * force))
+    >>> kept, count = remove_blank_samples(Block.of(np.arange(7.0), force, 0 * force))
     >>> kept.t.tolist(), count
     ([0.0, 1.0, 4.0, 5.0, 6.0], 2)
     """
     some = np.flatnonzero(block.acc[:, 0] == 0)
-    turns = np.nan_to_num(block.gyr[some])  # there may be no gyroscopes
+    turns = np.nan_to_num(block.gyr[some])  # nan without gyroscopes
     blank = some[(block.acc[some] == 0).all(axis=1) & (turns == 0).all(axis=1)]
     if not FEWEST <= len(blank) < MOST * len(block):
         return block, 0

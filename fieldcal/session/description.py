@@ -1,8 +1,8 @@
 """session.toml: description of a recording: device, site, frame, positions.
 
-`schemas/session.schema.json` says what each key may be: a key of another kind is an
-error that names file, key and remedy. Keys that it does not have are left alone, so
-that others may add theirs.
+`schemas/session.schema.json` states the type and range of each key: another value is an
+error that names file, key and remedy. Unknown keys are ignored, so that other programs
+may add their own.
 """
 
 from __future__ import annotations
@@ -17,21 +17,25 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Gauge
+from fieldcal.core.base_motion import BaseMotion
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError, SessionError
-from fieldcal.core.factory import FACTORY
-from fieldcal.core.frames import earth_rate_home, force_home, mounting_matrix
+from fieldcal.core.factory import FACTORY_KEYS
+from fieldcal.core.frames import (
+    earth_rate_at_home,
+    mounting_matrix,
+    specific_force_at_home,
+)
 from fieldcal.core.grade import Grade
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.core.under_way import UnderWay
-from fieldcal.session.position_tables import left_out, positions_of
-from fieldcal.session.schemas import refusal, validator
-from fieldcal.session.units import UNITS, full_scales, gauge_of, nominal_of
+from fieldcal.session.position_tables import excluded_spans, parse_positions
+from fieldcal.session.schemas import schema_fault, validator
+from fieldcal.session.units import UNITS, full_scales, output_gauge, parse_nominal
 
-FORMAT = 1
-"""The format of session.toml."""
+FORMAT_VERSION = 1
+"""Version of the format of session.toml."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,31 +44,34 @@ class Description:
 
     Attributes
     ----------
-    device : name, serial and whatever else [device] holds
-    grade : "consumer", "tactical", or "navigation" when the gyroscopes see the Earth
-        rate
+    device : table [device]: name, serial, …
+    grade : "consumer", "tactical", or "navigation" if the gyroscopes measure the
+        Earth's rate
     rate_hz : nominal sampling rate, None where unknown
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
-    latitude_deg, height_m, gravity : the site; gravity in m/s^2, less what makes a base
-        under way lighter
-    under_way : what the motion of the base adds; of tactical grade, whose z points
-        anywhere, about and along the vertical only
-    level_deg : how level the base was made, one sigma about each level axis; None where
-        not stated
-    angle_setting_deg : how well each position's angles are set, likewise
-    squareness : one sigma of each coefficient of the accelerometers' cross-coupling
-        that is left in the device, likewise
-    quadratic, g_sensitivity : the same of `FactoryErrors`, SI units
-    axes : the mounting, procedure axis x, y, z is device axis ...
-    nominal : (3,) for each key of `units.NOMINAL`: what a simulation starts from
-    sent : the same as it is in samples that the device corrects before it sends them
-    gauge : volts or counts in one m/s^2 and rad/s, by which outputs are divided
+    latitude_deg, height_m, gravity : the site; gravity in m/s^2, less the vertical
+        force due to the motion of the base
+    base_motion : rate and force due to the motion of the base; without navigation grade
+        the heading is unknown, and only the parts about and along the vertical are kept
+    level_deg : standard deviation of the level of the base about each level axis; None
+        if not stated
+    angle_setting_deg : standard deviation of each position's angles; None if not stated
+    squareness : standard deviation of each coefficient of the accelerometers'
+        cross-coupling that the factory left; None if not stated
+    quadratic, g_sensitivity : as in `FactoryErrors`, SI units; None if not stated
+    axes : the mounting: names of the device axes along procedure axes x, y, z
+    nominal : calibration that a simulation starts from, (3,) for each key of
+        `units.NOMINAL`
+    nominal_as_sent : the same in the samples of a device that corrects
+        them before it sends them
+    gauge : volts or counts per m/s^2 and per rad/s, by which outputs are divided
     model : parameters of the effects that the simulation includes, by id
     positions : as session.toml lists them
-    windows : (start, end) of each position, s of device time; None where not yet known
-    numbers : what session.toml counts each position as, from 0
-    without : (start, end) of what is no part of the windows it lies in, s, in order
+    windows : (start, end) of each position, s of device time; None if not yet known
+    position_numbers : index of each position in session.toml, from 0
+    excluded_spans : (start, end) of samples that are excluded from the windows that
+        contain them, s, in order
 
     """
 
@@ -76,7 +83,7 @@ class Description:
     latitude_deg: float
     height_m: float
     gravity: float
-    under_way: UnderWay
+    base_motion: BaseMotion
     level_deg: float | None
     angle_setting_deg: float | None
     squareness: float | None
@@ -84,13 +91,13 @@ class Description:
     g_sensitivity: float | None
     axes: tuple[str, ...]
     nominal: Mapping[str, Array]
-    sent: Mapping[str, Array]
+    nominal_as_sent: Mapping[str, Array]
     gauge: Gauge
     model: Mapping[str, Mapping[str, Any]]
     positions: tuple[Position, ...]
     windows: tuple[tuple[float, float] | None, ...]
-    numbers: tuple[int, ...]
-    without: tuple[tuple[float, float], ...]
+    position_numbers: tuple[int, ...]
+    excluded_spans: tuple[tuple[float, float], ...]
     raw: Mapping[str, Any] = field(repr=False)
 
     @property
@@ -105,55 +112,59 @@ class Description:
 
     @property
     def velocity(self) -> tuple[float, float]:
-        """Of the base towards north and East, m/s."""
+        """Velocity of the base towards north and east, m/s."""
         return _velocity(self.raw.get("site", {}))
 
     @property
     def base_force(self) -> Array:
         """Specific force of a device at rest on the base, base axes, (3,) m/s^2."""
-        return force_home(self.gravity) + self.under_way.force * [1.0, 0.0, 1.0]
+        return specific_force_at_home(self.gravity) + self.base_motion.force * [
+            1.0,
+            0.0,
+            1.0,
+        ]
 
     @property
     def base_rate(self) -> Array:
-        """Rate of the base as navigation grade sees it, (3,) rad/s; 0 for tactical."""
-        rate: Array = earth_rate_home(self.latitude) + self.under_way.rate
+        """Rate of the base in base axes, (3,) rad/s; 0 unless of navigation grade."""
+        rate: Array = earth_rate_at_home(self.latitude) + self.base_motion.rate
         return rate * (self.grade == "navigation")
 
     @property
-    def gravity_said(self) -> bool:
-        """Whether somebody said how strong gravity is, or where that is."""
+    def gravity_stated(self) -> bool:
+        """Whether gravity or a latitude is stated."""
         return bool({"latitude_deg", "gravity"} & set(self.raw.get("site", {})))
 
     @property
-    def sways(self) -> bool:
-        """Whether somebody said that the base sways."""
+    def base_sways(self) -> bool:
+        """Whether the session states that the base sways."""
         return bool(self.raw.get("site", {}).get("sways", False))
 
     @property
     def angles_from(self) -> str:
-        """Who vouches for the angles; empty where nobody does."""
+        """Source of the stated angles; empty if not stated."""
         return str(self.raw.get("site", {}).get("angles_from", ""))
 
     @property
     def means_only(self) -> bool:
-        """Whether samples are means, one for each position."""
+        """Whether each sample is the mean of one position."""
         return "means" in self.raw
 
     @property
-    def timed(self) -> bool:
-        """Whether anybody wrote down when means were taken; true of samples."""
+    def means_timed(self) -> bool:
+        """Whether the times of means are known; true for samples."""
         return bool(self.raw.get("means", {}).get("timed", True))
 
     @property
     def mean_sigma(self) -> Array:
         """Standard deviation of each position's means, (p, 6) SI; nan where unknown."""
         tables = self.raw.get("position", ())
-        given = [tables[i].get("sigma", ()) for i in self.numbers]
+        given = [tables[i].get("sigma", ()) for i in self.position_numbers]
         rows = [[*row, *[np.nan] * (6 - len(row))] for row in given]
         return np.array(rows, dtype=float).reshape(-1, 6)
 
-    def in_time(self) -> Description:
-        """The same with the positions in the order in which they were held."""
+    def in_time_order(self) -> Description:
+        """The description with positions in the order in which they were held."""
         begins = [w[0] for w in self.windows if w is not None]
         if begins == sorted(begins):
             return self
@@ -163,13 +174,13 @@ class Description:
             self,
             positions=tuple(self.positions[i] for i in order),
             windows=tuple(self.windows[i] for i in order),
-            numbers=tuple(self.numbers[i] for i in order),
+            position_numbers=tuple(self.position_numbers[i] for i in order),
         )
 
     def refuse_overlap(self) -> None:
         """Refuse windows that do not follow each other.
 
-        Samples in two windows would count twice, and turns lie between windows.
+        Samples in two windows would count twice, and a turn needs time between windows.
 
         Raises
         ------
@@ -177,8 +188,8 @@ class Description:
             Naming both positions.
 
         """
-        ordered = self.in_time()
-        rows = zip(ordered.windows, ordered.numbers, strict=True)
+        ordered = self.in_time_order()
+        rows = zip(ordered.windows, ordered.position_numbers, strict=True)
         held = [(window, number) for window, number in rows if window]
         for (window, number), (then, following) in pairwise(held):
             if then[0] < window[1]:
@@ -188,19 +199,19 @@ class Description:
                     " device cannot be in both; mend start_s and end_s"
                 )
 
-    def with_angles_times(self, size: float) -> Description:
-        """The same with all angles of positions so many times as large."""
+    def with_scaled_angles(self, size: float) -> Description:
+        """The description with all angles of its positions multiplied by `size`."""
         if size == 1.0:
             return self
-        return replace(self, positions=tuple(p.times(size) for p in self.positions))
+        return replace(self, positions=tuple(p.scaled(size) for p in self.positions))
 
-    def numbered(self, positions: Iterable[int]) -> tuple[int, ...]:
-        """Return what session.toml counts them as; a recording without any is 0."""
-        numbers = self.numbers or (0,)
+    def indices_in_file(self, positions: Iterable[int]) -> tuple[int, ...]:
+        """Return the index of positions in session.toml; 0 if the session has none."""
+        numbers = self.position_numbers or (0,)
         return tuple(numbers[p] for p in positions)
 
 
-def read(path: Path) -> Description:
+def read_description(path: Path) -> Description:
     """Read a session.toml.
 
     Raises
@@ -221,12 +232,12 @@ def read(path: Path) -> Description:
     except tomllib.TOMLDecodeError as error:
         raise SessionError(f"{path}: is not TOML: {error}") from error
     try:
-        return parse(raw)
+        return parse_description(raw)
     except InputError as error:
         raise SessionError(f"{path}: {error}") from error
 
 
-def parse(raw: Mapping[str, Any]) -> Description:
+def parse_description(raw: Mapping[str, Any]) -> Description:
     """Check the tables of a session.toml.
 
     Raises
@@ -235,68 +246,74 @@ def parse(raw: Mapping[str, Any]) -> Description:
         Naming the key and the remedy.
 
     """
-    if wrong := refusal(raw, validator("session")):
+    if wrong := schema_fault(raw, validator("session")):
         raise InputError(wrong)
     device, site = raw.get("device", {}), raw.get("site", {})
     given = raw.get("units", {})
     units = {k: given.get(k, next(iter(known))) for k, known in UNITS.items()}
     latitude = float(site.get("latitude_deg", 45.0))
     height = float(site.get("height_m", 0.0))
-    positions, windows = positions_of(raw.get("position", ()))
+    positions, windows = parse_positions(raw.get("position", ()))
     axes = raw.get("frame", {}).get("mounting", ("+x", "+y", "+z"))
     mounting_matrix(axes)
-    usual = nominal_of(raw.get("nominal", {}))
-    gauge = gauge_of(units, usual)
+    usual = parse_nominal(raw.get("nominal", {}))
+    gauge = output_gauge(units, usual)
     nominal = {n: v / gauge.size[n.startswith("gyr")] for n, v in usual.items()}
     grade: Grade = device.get("grade", "tactical")
-    moving = UnderWay.at(*_velocity(site), float(np.deg2rad(latitude)), height)
-    level = _known(site.get("level_deg"))
+    moving = BaseMotion.from_velocity(
+        *_velocity(site), float(np.deg2rad(latitude)), height
+    )
+    level = _optional_float(site.get("level_deg"))
     if grade != "navigation" and level is not None:
-        level = float(np.hypot(level, np.rad2deg(moving.lean)))
+        level = float(np.hypot(level, np.rad2deg(moving.force_tilt)))
     return Description(
         device=device,
         grade=grade,
-        rate_hz=_known(raw.get("sampling", {}).get("rate_hz")),
+        rate_hz=_optional_float(raw.get("sampling", {}).get("rate_hz")),
         units=units,
         limits=full_scales(raw.get("range", {}), units, gauge),
         latitude_deg=latitude,
         height_m=height,
-        gravity=float(site.get("gravity") or gravity(latitude, height))
+        gravity=float(site.get("gravity") or normal_gravity(latitude, height))
         - float(moving.force[1]),
-        under_way=moving if grade == "navigation" else moving.level,
+        base_motion=moving if grade == "navigation" else moving.vertical_part,
         level_deg=level,
-        angle_setting_deg=_known(site.get("angle_setting_deg")),
-        **{name: _known(device.get(name)) for name in FACTORY},
+        angle_setting_deg=_optional_float(site.get("angle_setting_deg")),
+        **{name: _optional_float(device.get(name)) for name in FACTORY_KEYS},
         axes=tuple(axes),
         nominal=nominal,
-        sent=nominal,
+        nominal_as_sent=nominal,
         gauge=gauge,
         model=_model(raw.get("model", {})),
         positions=positions,
         windows=windows,
-        numbers=tuple(range(len(positions))),
-        without=left_out(raw.get("position", ())),
+        position_numbers=tuple(range(len(positions))),
+        excluded_spans=excluded_spans(raw.get("position", ())),
         raw=raw,
     )
 
 
-def with_more(about: Description, positions: Iterable[Position]) -> Description:
-    """The same with positions of known angles behind those that it has."""
+def with_added_positions(
+    about: Description, positions: Iterable[Position]
+) -> Description:
+    """The description with more positions of known angles appended."""
     more = []
     for position in positions:
         alpha, beta = position.degrees or (0.0, 0.0)
         more.append({"name": position.name, "alpha_deg": alpha, "beta_deg": beta})
     if not more:
         return about
-    return parse({**about.raw, "position": [*about.raw.get("position", ()), *more]})
+    return parse_description(
+        {**about.raw, "position": [*about.raw.get("position", ()), *more]}
+    )
 
 
 def _velocity(site: Mapping[str, Any]) -> tuple[float, float]:
-    """Towards north and East, m/s."""
+    """Velocity towards north and east, m/s."""
     return float(site.get("north_m_s", 0.0)), float(site.get("east_m_s", 0.0))
 
 
-def _known(value: float | None) -> float | None:
+def _optional_float(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 

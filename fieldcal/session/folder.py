@@ -1,12 +1,12 @@
-"""The session folder: one format for live sessions, imports and offline work.
+"""The session folder, of live sessions and of imported recordings.
 
-    session.toml    what was known and planned          (`description`)
+    session.toml    device, site and planned positions  (`description`)
     samples.<ext>   the raw samples                     (`sample_files`, `recorder`)
-    marks.jsonl     what happened, as it happened       (`marks`)
+    marks.jsonl     events of the run                   (`marks`)
     result.json     calibration, by solve
 
-session.toml is never rewritten: windows of a live session stand in marks.jsonl, and
-whatever is derived goes into its own file.
+session.toml is never rewritten. The windows of a live session are in marks.jsonl, and
+results are written to files of their own.
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.positions import Position
-from fieldcal.core.samples import Array, Block, too_quick
+from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.session import description, sample_files
-from fieldcal.session.blank_samples import without_blanks
-from fieldcal.session.clock import SteadyClock, steadied
+from fieldcal.session.blank_samples import remove_blank_samples
+from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.description import Description
-from fieldcal.session.installed import as_sent, in_one_calibration, stretches
-from fieldcal.session.marks import ADDED, MARKS, read_marks
+from fieldcal.session.installed_calibration import (
+    installed_stretches,
+    nominal_as_sent,
+    under_last_calibration,
+)
+from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 DESCRIPTION = "session.toml"
@@ -44,9 +48,9 @@ class Session:
 
     Attributes
     ----------
-    folder : where
-    about : what session.toml says, with the windows that marks.jsonl adds
-    warnings : what was cut off or passed over while reading
+    folder : path of the folder
+    about : content of session.toml, with positions and windows from marks.jsonl
+    warnings : sentences about what was cut off or left out while reading
 
     """
 
@@ -61,20 +65,20 @@ class Session:
         Raises
         ------
         SessionError
-            If it is none, or its session.toml or marks.jsonl cannot be used.
+            If it is no session folder, or session.toml or marks.jsonl cannot be used.
 
         """
         folder = Path(folder)
-        about = description.read(folder / DESCRIPTION)
+        about = description.read_description(folder / DESCRIPTION)
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))
-        says += _unconfirmed(about.raw)
-        about = _with_windows(_with_added(about, marks), marks)
-        about = replace(about, sent=as_sent(about.nominal, marks))
+        says += _guess_warnings(about.raw)
+        about = _with_windows(_with_added_positions(about, marks), marks)
+        about = replace(about, nominal_as_sent=nominal_as_sent(about.nominal, marks))
         return cls(folder, about, tuple(says))
 
     def with_windows(self, windows: tuple[tuple[float, float] | None, ...]) -> Session:
-        """The same recording with other windows of the positions."""
+        """The same recording with other windows."""
         out = Session(self.folder, replace(self.about, windows=windows), self.warnings)
         out.block = self.block
         return out
@@ -106,7 +110,7 @@ class Session:
 
     @property
     def grade(self) -> str:
-        """Grade: tactical, or navigation when the gyroscopes see the Earth rate."""
+        """Grade: consumer, tactical, or navigation."""
         return self.about.grade
 
     @property
@@ -116,7 +120,7 @@ class Session:
 
     @property
     def rate_hz(self) -> float:
-        """Nominal rate, or what the times say where none is given."""
+        """Stated sampling rate, or that of the times if none is stated, Hz."""
         t = self.block.t
         if self.about.rate_hz is not None or len(t) < 2:
             return self.about.rate_hz or np.nan
@@ -126,13 +130,13 @@ class Session:
     def block(self) -> Block:
         """All samples, in SI units; volts and counts by the nominal scale factors.
 
-        Where the device changed its own calibration meanwhile, as under the last one.
-        Where its clock was set meanwhile, times and windows go on as if it had not
-        been, and `warnings` says so. It is nan
-        in the disturbances that windows were taken around.
+        If the device changed its own calibration during the recording, all samples are
+        converted to the last one. If its clock was set during the recording, times and
+        windows are corrected for that, and `warnings` says so. Samples in disturbances
+        that are excluded from windows are nan.
         """
-        raw, cut = sample_files.read(sample_files.find(self.folder))
-        raw, blank = without_blanks(raw)
+        raw, cut = sample_files.read_samples(sample_files.find_samples(self.folder))
+        raw, blank = remove_blank_samples(raw)
         if blank:
             cut += (
                 f"{blank} samples are zero in all outputs, which no device on the"
@@ -140,7 +144,9 @@ class Session:
             )
         self.warnings += cut
         steps = np.diff(raw.t)
-        if len(steps) and (said := too_quick(1 / max(float(np.median(steps)), 1e-300))):
+        if len(steps) and (
+            said := impossible_rate_text(1 / max(float(np.median(steps)), 1e-300))
+        ):
             raise SessionError(f"{self.folder}: {said}")
         units, gauge = self.about.units, self.about.gauge.size
         for triad, unit in (
@@ -149,42 +155,44 @@ class Session:
         ):
             if unit != 1.0:
                 np.multiply(triad, unit, out=triad)
-        whole, changed = in_one_calibration(raw, self.marks())
+        whole, changed = under_last_calibration(raw, self.marks())
         self.warnings += changed
-        return self._steadied(_left_out(whole, self.about.without))
+        return self._steadied(_blank_gaps(whole, self.about.excluded_spans))
 
     def blocks(self) -> Iterator[Block]:
-        """Samples as `block` has them, part by part, however long the recording is.
+        """Samples as in `block`, part by part, with bounded memory.
 
-        Where the device changed its own calibration meanwhile, all at once.
+        If the device changed its own calibration, the whole recording is one part.
         """
-        if len(stretches(self.marks())) > 1:
+        if len(installed_stretches(self.marks())) > 1:
             yield self.block
             return
-        clock = SteadyClock()
+        clock = ClockStepRemover()
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
-        for whole in sample_files.blocks(sample_files.find(self.folder)):
-            raw, _ = without_blanks(whole)
+        for whole in sample_files.iterate_samples(
+            sample_files.find_samples(self.folder)
+        ):
+            raw, _ = remove_blank_samples(whole)
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
-            yield clock.add(_left_out(part, self.about.without))
-        yield clock.rest()
+            yield clock.add(_blank_gaps(part, self.about.excluded_spans))
+        yield clock.flush()
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""
-        steady = steadied(raw)
+        steady = remove_clock_steps(raw)
         if steady is None:
             return raw
         self.warnings += tuple(step.sentence() for step in steady.steps)
 
         def moved(span: tuple[float, float]) -> tuple[float, float]:
-            return steady.moved(span[0]), steady.moved(span[1])
+            return steady.corrected(span[0]), steady.corrected(span[1])
 
         self.about = replace(
             self.about,
             windows=tuple(w and moved(w) for w in self.about.windows),
-            without=tuple(map(moved, self.about.without)),
+            excluded_spans=tuple(map(moved, self.about.excluded_spans)),
         )
         return steady.block
 
@@ -193,14 +201,14 @@ class Session:
         return read_marks(self.folder / MARKS)
 
     def write_json(self, name: str, content: Mapping[str, Any]) -> Path:
-        """Write a derived file whole, or not at all."""
-        return write_whole(
+        """Write a JSON file to the folder atomically."""
+        return write_atomically(
             self.folder / name, json.dumps(content, indent=2, allow_nan=False) + "\n"
         )
 
 
-def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
-    """What an import guessed, until the user takes it out of [guessed]."""
+def _guess_warnings(raw: Mapping[str, Any]) -> list[str]:
+    """Warnings about values that an import guessed and the user has not confirmed."""
     return [
         f"{what.replace('_', ' ')} was taken as {why}: confirm it by deleting {what}"
         f" under [guessed] in {DESCRIPTION}, or import again and say what it is"
@@ -208,8 +216,8 @@ def _unconfirmed(raw: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _left_out(block: Block, gaps: Iterable[tuple[float, float]]) -> Block:
-    """A block with nan in what is no part of the windows."""
+def _blank_gaps(block: Block, gaps: Iterable[tuple[float, float]]) -> Block:
+    """A block with nan in the samples that are excluded from windows."""
     cut = [slice(*np.searchsorted(block.t, gap).tolist()) for gap in gaps]
     if not cut:
         return block
@@ -219,10 +227,12 @@ def _left_out(block: Block, gaps: Iterable[tuple[float, float]]) -> Block:
     return replace(block, acc=acc, gyr=gyr)
 
 
-def _with_added(about: Description, marks: list[dict[str, Any]]) -> Description:
-    """With the positions that were added while it was recorded, behind the planned."""
-    added = [mark for mark in marks if mark.get("event") == ADDED]
-    return description.with_more(
+def _with_added_positions(
+    about: Description, marks: list[dict[str, Any]]
+) -> Description:
+    """The description with the positions that were added during the run appended."""
+    added = [mark for mark in marks if mark.get("event") == POSITION_ADDED]
+    return description.with_added_positions(
         about,
         [Position.deg(m["alpha_deg"], m["beta_deg"], m.get("name", "")) for m in added],
     )
@@ -242,11 +252,11 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
         if mark.get("event") == "window"
         for start, end in mark.get("without_s", ())
     ]
-    without = tuple(sorted((*about.without, *gaps)))
-    return replace(about, windows=tuple(windows), without=without)
+    without = tuple(sorted((*about.excluded_spans, *gaps)))
+    return replace(about, windows=tuple(windows), excluded_spans=without)
 
 
-def write_whole(path: Path, content: str | bytes) -> Path:
+def write_atomically(path: Path, content: str | bytes) -> Path:
     """Replace a file atomically: a reader finds the old content or the new one.
 
     Raises

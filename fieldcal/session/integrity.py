@@ -1,7 +1,7 @@
 """Integrity of a session folder: each file against its checksums and its schema.
 
 The JSON Schemas are in ``schemas/``, one for each kind of file, for other programs too;
-session.toml is judged as TOML reads it, marks.jsonl line by line.
+session.toml is checked after parsing, marks.jsonl line by line.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from fieldcal.session.schemas import validator
 DIAGNOSIS = "diagnosis.json"
 
 SCHEMAS = {MARKS: "mark", RESULT: "result", DIAGNOSIS: "diagnosis"}
-"""Which schema a file is held to; `description` reads session.toml by its own."""
+"""Schema of each file; that of session.toml is checked by `description`."""
 
 
 class FileFault(NamedTuple):
-    """What is wrong with a file.
+    """A fault of a file.
 
     Attributes
     ----------
@@ -38,13 +38,13 @@ class FileFault(NamedTuple):
     text: str
 
 
-def findings(folder: Path) -> Iterator[FileFault]:
+def file_faults(folder: Path) -> Iterator[FileFault]:
     """Faults of a session, file by file; none if it is intact.
 
     Raises
     ------
     SessionError
-        If there is no session.toml: it is no session.
+        If there is no session.toml.
 
     """
     yield from _description(folder)
@@ -52,7 +52,7 @@ def findings(folder: Path) -> Iterator[FileFault]:
     yield from _marks(folder / MARKS)
     for name in (RESULT, DIAGNOSIS):
         if (folder / name).exists():
-            yield from _derived(folder / name)
+            yield from _derived_file(folder / name)
     for path in sorted(folder.glob(".*.*")):
         if path.is_file():
             text = "was left by a program that was killed while it wrote; delete it"
@@ -62,7 +62,7 @@ def findings(folder: Path) -> Iterator[FileFault]:
 def _description(folder: Path) -> Iterator[FileFault]:
     path = folder / DESCRIPTION
     try:
-        description.read(path)
+        description.read_description(path)
     except SessionError as error:
         if not path.exists():
             raise
@@ -71,12 +71,12 @@ def _description(folder: Path) -> Iterator[FileFault]:
 
 def _samples(folder: Path) -> Iterator[FileFault]:
     try:
-        path = sample_files.find(folder)
+        path = sample_files.find_samples(folder)
     except SessionError as error:
         yield FileFault("samples", _without(folder, str(error)))
         return
     try:
-        _, says = sample_files.read(path)
+        _, says = sample_files.read_samples(path)
     except SessionError as error:
         yield FileFault(path.name, _without(path, str(error)))
         return
@@ -88,16 +88,16 @@ def _marks(path: Path) -> Iterator[FileFault]:
     marks = list(read_marks(path, says))
     yield from (FileFault(MARKS, _without(Path(MARKS), text)) for text in says)
     for number, mark in enumerate(marks, start=1):
-        yield from _against(MARKS, mark, f"mark {number}, ")
+        yield from _schema_faults(MARKS, mark, f"mark {number}, ")
 
 
-def _derived(path: Path) -> Iterator[FileFault]:
+def _derived_file(path: Path) -> Iterator[FileFault]:
     try:
         document = load_json(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         yield FileFault(path.name, f"is not JSON: {error}; make it again")
         return
-    wrong = list(_against(path.name, document, ""))
+    wrong = list(_schema_faults(path.name, document, ""))
     yield from wrong
     if path.name == RESULT and not wrong:
         try:
@@ -106,7 +106,7 @@ def _derived(path: Path) -> Iterator[FileFault]:
             yield FileFault(path.name, f"{error}; make it again")
 
 
-def _against(name: str, document: Any, place: str) -> Iterator[FileFault]:
+def _schema_faults(name: str, document: Any, place: str) -> Iterator[FileFault]:
     for error in validator(SCHEMAS[name]).iter_errors(document):
         text = f"{place}{_path(error.absolute_path)}: {_short(error.message)}"
         yield FileFault(name, text)
@@ -121,5 +121,5 @@ def _short(text: str) -> str:
 
 
 def _without(path: Path, text: str) -> str:
-    """Leave out the name of the file where a sentence begins with it."""
+    """Remove the name of the file from the beginning of a sentence."""
     return text.removeprefix(f"{path}: ").removeprefix(f"{path} ")

@@ -1,7 +1,7 @@
 """One writer per session: the recorder holds a lock of the folder until the end.
 
-The lock is the operating system's, so that it ends with the process, however that ends.
-Who holds it, and since when, stands beside it for whoever comes second.
+The lock is one of the operating system, so that it ends with the process in any case. A
+file beside it states which process holds the lock, and since when.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class SessionLock:
 
     Parameters
     ----------
-    folder : exists
+    folder : an existing folder
 
     Raises
     ------
     SessionError
-        If another process holds it; says which, and since when.
+        If another process holds it; the text states which, and since when.
     OSError
         If the folder cannot be written.
 
@@ -49,7 +49,7 @@ class SessionLock:
                 " or name another folder"
             ) from error
         except NotImplementedError:
-            # a disk that knows no locks: the files' own O_EXCL is what there is
+            # a file system without locks: O_EXCL of the files remains
             return
         who = {"pid": os.getpid(), "host": node(), "user": _user(), "host_s": time()}
         try:
@@ -76,7 +76,7 @@ def _user() -> str:
 
 
 def _holder(owner: Path) -> str:
-    """Who holds a lock, if it is known."""
+    """Holder of a lock, as far as it is known."""
     try:
         held = json.loads(owner.read_text("utf-8"))
         minutes = max(0.0, time() - float(held["host_s"])) / 60

@@ -1,7 +1,7 @@
-"""marks.jsonl: what happened while a session was recorded, a line each.
+"""marks.jsonl: events of a run, one in each line.
 
-Every line carries the checksum of its own text: one that was cut off or changed is left
-out and reported, and the lines around it count.
+Every line has the checksum of its own text. A line that was cut off or changed is left
+out and reported; the other lines are used.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fieldcal.core.errors import SessionError
 
 MARKS = "marks.jsonl"
 
-ADDED = "added"
+POSITION_ADDED = "added"
 """Mark of a position that was added to the planned ones, with its angles."""
 
 
@@ -29,14 +29,14 @@ def mark_line(mark: Mapping[str, Any]) -> str:
     >>> mark_line({"event": "told"})
     '{"event": "told", "crc32": "1a049d94"}\n'
 
-    Numbers that are none are null, so that each line is JSON.
+    nan and infinity become null, so that each line is JSON.
     """
     text = json.dumps(_valid(mark), allow_nan=False)
     return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
 
 
 def _valid(value: Any) -> Any:
-    """Content that JSON has: a number that is none is null."""
+    """Value that JSON can represent: nan and infinity become null."""
     if isinstance(value, Mapping):
         return {key: _valid(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -47,14 +47,14 @@ def _valid(value: Any) -> Any:
 
 
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:
-    """Marks of a file with a correct checksum; none without a file.
+    """Marks with a correct checksum; none if there is no file.
 
-    A line that was changed is left out, and so is a last one that was cut off.
+    Lines that were changed or cut off are left out.
 
     Parameters
     ----------
     path : marks.jsonl
-    says : where what was left out is said, one sentence each
+    says : list to which a sentence is added for each line that was left out
 
     Raises
     ------
@@ -80,7 +80,7 @@ def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, 
 
 
 def _mark(line: str) -> dict[str, Any] | None:
-    """Return a mark of a line; None if it is none, or not as it was written."""
+    """Return the mark in a line; None if it is not one, or was changed."""
     try:
         mark = load_json(line)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""noise.json of a session: what `fieldcal noise` found, for whoever goes by it."""
+"""noise.json of a session: the result of `fieldcal noise`."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Any
 
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import SessionError
-from fieldcal.session.schemas import refusal, validator
+from fieldcal.session.schemas import schema_fault, validator
 
 NOISE = "noise.json"
 
 
 def read_noise(path: Path) -> Mapping[str, Any] | None:
-    """Content of a noise.json, or of that of a session folder; None without one.
+    """Content of a noise.json, by its path or its session folder; None without one.
 
     Raises
     ------
     SessionError
-        If it cannot be read, or does not hold to its schema.
+        If it cannot be read, or does not conform to its schema.
 
     """
     file = path / NOISE if path.is_dir() else path
@@ -33,6 +33,6 @@ def read_noise(path: Path) -> Mapping[str, Any] | None:
         ) from error
     if not isinstance(content, dict):
         raise SessionError(f"{file}: holds no JSON object; run fieldcal noise again")
-    if wrong := refusal(content, validator("noise")):
+    if wrong := schema_fault(content, validator("noise")):
         raise SessionError(f"{file}: {wrong}; run fieldcal noise again")
     return content

@@ -1,4 +1,4 @@
-"""The tables [[position]] of session.toml: how the device was held, and when."""
+"""Parses the [[position]] tables of session.toml: attitudes, rates and windows."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.escaping import escape_line
 from fieldcal.core.positions import Position
-from fieldcal.core.shown import one_line
-from fieldcal.session.attitude import held
+from fieldcal.session.attitude import parse_attitude
 
 
-def positions_of(
+def parse_positions(
     tables: Iterable[Mapping[str, Any]],
 ) -> tuple[tuple[Position, ...], tuple[tuple[float, float] | None, ...]]:
-    """Each position, and its window where it has one, in s of device time.
+    """Positions and their windows, s of device time; None without a window.
 
     Raises
     ------
@@ -30,10 +30,10 @@ def positions_of(
 
 
 def _position(number: int, table: Mapping[str, Any]) -> Position:
-    label = one_line(str(table.get("name", "")))
-    position = held(number, table, label)
+    label = escape_line(str(table.get("name", "")))
+    position = parse_attitude(number, table, label)
     if "speed_deg_s" in table:
-        return _turning(number, table, position)
+        return _on_turning_table(number, table, position)
     rate = table.get("rate_deg_s")
     if rate is None:
         return position
@@ -43,8 +43,10 @@ def _position(number: int, table: Mapping[str, Any]) -> Position:
     return replace(position, rate=tuple(np.deg2rad(rate)))
 
 
-def _turning(number: int, table: Mapping[str, Any], position: Position) -> Position:
-    """A position in which a table turns about an axis that nobody knows."""
+def _on_turning_table(
+    number: int, table: Mapping[str, Any], position: Position
+) -> Position:
+    """A position in which a table turns the device about an unknown axis."""
     if "rate_deg_s" in table or position.oriented:
         other = "rate_deg_s" if "rate_deg_s" in table else "an attitude"
         raise InputError(
@@ -55,14 +57,16 @@ def _turning(number: int, table: Mapping[str, Any], position: Position) -> Posit
     label = table.get("name") or f"position {number}, {speed:g} °/s about any axis"
     return replace(
         position,
-        name=one_line(str(label)),
+        name=escape_line(str(label)),
         speed=float(np.deg2rad(speed)),
         speed_sigma=float(np.deg2rad(sigma)),
     )
 
 
-def left_out(tables: Iterable[Mapping[str, Any]]) -> tuple[tuple[float, float], ...]:
-    """What is no part of the windows that it lies in, s of device time, in order.
+def excluded_spans(
+    tables: Iterable[Mapping[str, Any]],
+) -> tuple[tuple[float, float], ...]:
+    """Spans of time that are excluded from the windows around them, s, in order.
 
     Raises
     ------

@@ -1,12 +1,12 @@
 """Records a session; a killed process loses less than a second of samples.
 
 Samples go into an Arrow IPC stream, each batch complete in itself, with its checksum,
-and handed to the operating system at least every `FLUSH` seconds, also while the device
-is silent; every `SYNC` seconds they are on the disk. Marks are appended a line at a
-time, each with its checksum. Both files only ever grow by whole pieces: a piece that
-the disk takes half is taken back. So after a kill everything up to the last fifth of a
-second is there and can be read, and a recording that broke off can be gone on with:
-what stands after its last whole batch is cut off, and the next batch follows.
+and handed to the operating system at least every `FLUSH_INTERVAL` seconds, also while
+the device is silent. Every `SYNC_INTERVAL` seconds they are written to the disk. Marks
+are appended one line at a time, each with its checksum. Both files grow by whole pieces
+only: a piece that is written in part is removed. So after a kill everything up to the
+last fifth of a second can be read, and an interrupted recording can be continued: what
+follows its last whole batch is cut off, and the next batch is appended.
 """
 
 from __future__ import annotations
@@ -24,31 +24,31 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
 from fieldcal.core.samples import Block, concat
-from fieldcal.session.folder import DESCRIPTION, write_whole
+from fieldcal.session.folder import DESCRIPTION, write_atomically
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
-from fieldcal.session.sample_files import read, schema, to_batch
+from fieldcal.session.sample_files import read_samples, samples_schema, to_record_batch
 
-FLUSH = 0.2
-"""Longest time that samples wait in memory, s of the host's clock."""
+FLUSH_INTERVAL = 0.2
+"""Longest time that samples are kept in memory only, s of the host's clock."""
 
-SYNC = 1.0
-"""Time after which samples are on the disk, s: what a power cut may cost."""
+SYNC_INTERVAL = 1.0
+"""Longest time after which samples are on the disk, s; a power cut loses no more."""
 
 SAMPLES = "samples.arrows"
 
 
-BREAK = 1.0
-"""Least time that a break of the recording takes, s of device time."""
+LEAST_BREAK = 1.0
+"""Least gap in the times after a lost link, s of device time."""
 
 
-class _Growing:
-    """A file that grows by whole pieces.
+class _AppendOnlyFile:
+    """A file to which whole pieces are appended.
 
     Parameters
     ----------
-    path : where
-    size : bytes of it that are kept; None makes it new, or raises FileExistsError
+    path : of the file
+    size : bytes of it to keep; None creates it, or raises FileExistsError
 
     """
 
@@ -82,14 +82,14 @@ class Recorder:
 
     Parameters
     ----------
-    folder : where
-    about : tables of session.toml; None goes on with a session that broke off
+    folder : path of the folder
+    about : tables of session.toml; None continues an interrupted session
 
     Raises
     ------
     SessionError
         If the folder holds a session already: nothing is ever overwritten. If another
-        process records into it. Or, from any method, if the disk refuses.
+        process records into it. From any method, if the disk cannot be written.
 
     """
 
@@ -117,7 +117,7 @@ class Recorder:
         self._watch.start()
 
     def _open(self, about: Mapping[str, Any] | None) -> None:
-        """Hold the folder and open its files, or leave it as it was found."""
+        """Lock the folder and open its files; if that fails, leave it as it was."""
         new = not self.folder.exists()
         if about is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -145,56 +145,56 @@ class Recorder:
         names = (DESCRIPTION, SAMPLES, MARKS)
         if any((self.folder / name).exists() for name in names):
             raise FileExistsError
-        self._samples = _Growing(self.folder / SAMPLES)
+        self._samples = _AppendOnlyFile(self.folder / SAMPLES)
         try:
-            write_whole(self.folder / DESCRIPTION, tomlkit.dumps(about))
-            self._marks = _Growing(self.folder / MARKS)
+            write_atomically(self.folder / DESCRIPTION, tomlkit.dumps(about))
+            self._marks = _AppendOnlyFile(self.folder / MARKS)
         except BaseException:
-            # what holds nothing must not be in the way of the next attempt
+            # empty files must not prevent the next attempt
             self._samples.close()
             for name in names:
                 (self.folder / name).unlink(missing_ok=True)
             raise
-        self._encoder = ArrowEncoder(schema())
+        self._encoder = ArrowEncoder(samples_schema())
 
     def _resume(self) -> None:
         """Cut off an incomplete batch and append after it."""
         from fieldcal.session.arrow_encoder import ArrowEncoder
-        from fieldcal.session.arrow_stream import decode, whole
+        from fieldcal.session.arrow_stream import decode_stream, end_of_whole_batches
 
         path = self.folder / SAMPLES
         data = path.read_bytes() if path.exists() else b""
-        end = whole(data)
+        end = end_of_whole_batches(data)
         if end:
-            found = decode(data[:end], schema())
-            self._encoder = ArrowEncoder(schema(), found.number, found.row)
-            block = read(path)[0]
+            found = decode_stream(data[:end], samples_schema())
+            self._encoder = ArrowEncoder(samples_schema(), found.number, found.row)
+            block = read_samples(path)[0]
             self._last = (float(block.t[-1]), float(block.t_host[-1]))
-            self.rejoin()
+            self.link_reopened()
         else:
-            self._encoder = ArrowEncoder(schema())
-        self._samples = _Growing(path, end)
+            self._encoder = ArrowEncoder(samples_schema())
+        self._samples = _AppendOnlyFile(path, end)
         marks = self.folder / MARKS
         lines = marks.read_bytes() if marks.exists() else b""
-        self._marks = _Growing(marks, lines.rfind(b"\n") + 1)
+        self._marks = _AppendOnlyFile(marks, lines.rfind(b"\n") + 1)
 
-    def rejoin(self) -> None:
-        """Take note that the link was opened anew: its clock may have begun anew."""
+    def link_reopened(self) -> None:
+        """Note that the link was opened again: the device may have restarted."""
         self._shift, self._broken = 0.0, True
 
     def append(self, block: Block) -> Block:
         """Record samples, in SI units and device axes; returns them as recorded.
 
-        The times of a device whose clock began anew go on from the last sample by what
-        the host saw go by, so that they never run backwards.
+        If the device's clock restarted, its times are shifted to continue from the last
+        sample by the time that passed on the host, so that they never decrease.
         """
         if self._broken and self._last is not None:
             self._broken = False
             last, last_host = self._last
             away = float(block.t_host[0]) - last_host
-            if block.t[0] < last + BREAK:
-                away = away if np.isfinite(away) else BREAK
-                self._shift = last + max(BREAK, away) - float(block.t[0])
+            if block.t[0] < last + LEAST_BREAK:
+                away = away if np.isfinite(away) else LEAST_BREAK
+                self._shift = last + max(LEAST_BREAK, away) - float(block.t[0])
                 self.mark("rejoined", shift_s=self._shift)
         if self._shift:
             block = replace(block, t=block.t + self._shift)
@@ -203,7 +203,7 @@ class Recorder:
             self._waiting.append(block)
         if self._fault:
             raise self._refused(self._fault) from self._fault
-        if monotonic() - self._written >= FLUSH:
+        if monotonic() - self._written >= FLUSH_INTERVAL:
             self.flush()
         return block
 
@@ -215,8 +215,8 @@ class Recorder:
                 return
             waiting = concat(self._waiting)
             if len(waiting):
-                # kept until it is written, so that nothing is lost if it is not
-                self._unwritten += self._encoder.batch(to_batch(waiting))
+                # kept until written, so that nothing is lost if writing fails
+                self._unwritten += self._encoder.encode(to_record_batch(waiting))
             self._waiting = []
             try:
                 self._samples.append(self._unwritten)
@@ -227,16 +227,16 @@ class Recorder:
             self._fault = None
 
     def mark(self, event: str, **what: Any) -> None:
-        """Append a mark: what happened, with the host's time.
+        """Append a mark: an event with the host's time.
 
-        Of what the device is, the time of the last sample before is kept as well.
+        A ``device`` mark also gets the time of the last sample before it.
         """
         if event == "device" and self._last is not None:
             what["at_s"] = self._last[0]
         line = mark_line({"event": event, **what, "host_s": round(time(), 3)})
         self.flush()
         try:
-            # the samples first: a mark must never speak of what is not there
+            # the samples first: a mark must not refer to samples that are not stored
             self._samples.sync()
             self._marks.append(line.encode())
             self._marks.sync()
@@ -244,7 +244,7 @@ class Recorder:
             raise self._refused(error) from error
 
     def close(self) -> None:
-        """Write what waits and end the stream; safe to call twice."""
+        """Write the remaining samples and end the stream; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -266,13 +266,13 @@ class Recorder:
             self._held.release()
 
     def _keep_up(self) -> None:
-        """Flush and sync in the background; a fault is raised by the next call."""
+        """Flush and sync in the background; the next call raises what failed here."""
         synced = monotonic()
-        while not self._stop.wait(FLUSH / 2):
+        while not self._stop.wait(FLUSH_INTERVAL / 2):
             try:
-                if monotonic() - self._written >= FLUSH:
+                if monotonic() - self._written >= FLUSH_INTERVAL:
                     self.flush()
-                if monotonic() - synced >= SYNC:
+                if monotonic() - synced >= SYNC_INTERVAL:
                     self._samples.sync()
                     synced = monotonic()
             except SessionError:

@@ -1,9 +1,8 @@
-"""Files of raw samples: .arrows (what the tool records), .csv, .csv.gz, .parquet.
+"""Files of raw samples: .arrows (as fieldcal records them), .csv, .csv.gz, .parquet.
 
-A file that was cut off while it was written is read up to the last whole row, and the
-cut is reported; what is wrong otherwise (rows out of order, text where a number
-belongs, no rows at all) is an error that names the file, the row and the column. Rows
-are counted from 1, the row of names not among them.
+A file that was cut off is read up to the last whole row, with a warning. Other faults
+(rows out of order, text in place of a number, no rows) are errors that name the file,
+the row and the column. Rows are counted from 1, without the row of names.
 """
 
 from __future__ import annotations
@@ -16,23 +15,27 @@ import numpy as np
 
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Array, Block
-from fieldcal.session.arrow_columns import numbers
-from fieldcal.session.arrow_stream import decode, in_order
-from fieldcal.session.text_files import COLUMNS, read_text, rows_of_text
+from fieldcal.session.arrow_columns import float_values
+from fieldcal.session.arrow_stream import batches_before_damage, decode_stream
+from fieldcal.session.text_files import (
+    SAMPLE_COLUMNS,
+    iterate_text_batches,
+    read_text_table,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 ENDINGS = (".arrows", ".parquet", ".csv", ".csv.gz")
 
-PART = 1 << 17
-"""Rows that are handed over together, at most."""
+ROWS_AT_ONCE = 1 << 17
+"""Largest number of rows in a part."""
 
-READ_AT_ONCE = 1 << 16
-"""Bytes of a column that are read together."""
+BYTES_AT_ONCE = 1 << 16
+"""Bytes of a column that are read at once."""
 
 
-def find(folder: Path, stem: str = "samples") -> Path:
+def find_samples(folder: Path, stem: str = "samples") -> Path:
     """Find the samples file of a session folder.
 
     Raises
@@ -53,13 +56,13 @@ def find(folder: Path, stem: str = "samples") -> Path:
     )
 
 
-def read(path: Path) -> tuple[Block, tuple[str, ...]]:
-    """Samples of a file, unscaled, and warnings about what was cut off.
+def read_samples(path: Path) -> tuple[Block, tuple[str, ...]]:
+    """Samples of a file, in its own units, and warnings about what was cut off.
 
     Raises
     ------
     SessionError
-        If the file cannot be read, or what it says makes no sense as samples.
+        If the file cannot be read, or does not hold samples.
 
     """
     try:
@@ -73,13 +76,13 @@ def read(path: Path) -> tuple[Block, tuple[str, ...]]:
     return _block(columns), warnings
 
 
-def blocks(path: Path) -> Iterator[Block]:
-    """Samples of a file as `read` has them, part by part, however long it is.
+def iterate_samples(path: Path) -> Iterator[Block]:
+    """Samples of a file as by `read_samples`, part by part, with bounded memory.
 
     Raises
     ------
     SessionError
-        As `read` does.
+        As by `read_samples`.
 
     """
     import pyarrow as pa
@@ -91,45 +94,45 @@ def blocks(path: Path) -> Iterator[Block]:
             _check_columns(path, columns)
             t = columns["t"]
             if len(t) and not (t[0] > last and (np.diff(t) > 0).all()):
-                read(path)  # which says where
+                read_samples(path)  # raises an error that says where
             last = float(t[-1]) if len(t) else last
             whole = _block(columns)
-            for first in range(0, len(whole), PART):
-                yield whole[first : first + PART]
+            for first in range(0, len(whole), ROWS_AT_ONCE):
+                yield whole[first : first + ROWS_AT_ONCE]
     except (pa.ArrowException, OSError):
-        read(path)  # which says what is wrong with it, and where
+        read_samples(path)  # raises an error that says what is wrong, and where
         raise
     if last == -np.inf:
         raise SessionError(f"{path}: has no rows; record it again")
 
 
 def _batches(path: Path) -> Iterator[pa.RecordBatch]:
-    """Record batches of a file of any kind, with our columns."""
+    """Record batches of a file of any format, with the columns of samples."""
     if path.name.endswith(".arrows"):
-        yield from _recorded(path)
+        yield from _stream_batches(path)
     elif path.name.endswith(".parquet"):
         import pyarrow.parquet
 
         whole = pyarrow.parquet.ParquetFile(
             path, page_checksum_verification=True,
             # what it reads ahead it keeps until the end: all of the file
-            pre_buffer=False, buffer_size=READ_AT_ONCE,
+            pre_buffer=False, buffer_size=BYTES_AT_ONCE,
         )  # fmt: skip
-        if not _agrees(whole.metadata):
-            read(path)  # which says so
-        names = [n for n in whole.schema_arrow.names if n in COLUMNS]
-        yield from whole.iter_batches(batch_size=PART, columns=names)
+        if not _metadata_is_consistent(whole.metadata):
+            read_samples(path)  # raises an error that says so
+        names = [n for n in whole.schema_arrow.names if n in SAMPLE_COLUMNS]
+        yield from whole.iter_batches(batch_size=ROWS_AT_ONCE, columns=names)
     else:
-        yield from rows_of_text(path)
+        yield from iterate_text_batches(path)
 
 
-def _recorded(path: Path) -> Iterator[pa.RecordBatch]:
-    """Batches of a stream; behind a damaged place, of all that is whole at once."""
+def _stream_batches(path: Path) -> Iterator[pa.RecordBatch]:
+    """Batches of a stream; after a damaged place, all intact rows at once."""
     import pyarrow as pa
 
     rows = 0
     with pa.OSFile(str(path)) as source:
-        batches = in_order(source)
+        batches = batches_before_damage(source)
         while True:
             try:
                 batch = next(batches)
@@ -148,20 +151,20 @@ def _table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
         return _read_arrows(path)
     if path.name.endswith(".parquet"):
         return _read_parquet(path), ()
-    return read_text(path)
+    return read_text_table(path)
 
 
 def _read_arrows(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     import pyarrow as pa
 
     data = path.read_bytes()
-    found = decode(data, schema())
+    found = decode_stream(data, samples_schema())
     if found.schema is None:
         raise SessionError(
             f"{path}: holds no samples: it was cut off before the first were there"
         )
     table = pa.Table.from_batches(found.batches, found.schema)
-    return table, tuple(f"{path.name}: {sentence}" for sentence in found.says)
+    return table, tuple(f"{path.name}: {sentence}" for sentence in found.faults)
 
 
 def _read_parquet(path: Path) -> pa.Table:
@@ -172,12 +175,12 @@ def _read_parquet(path: Path) -> pa.Table:
         # its read_table loads all that reads many files as one, pandas too if installed
         file = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
         table = file.read()
-        if not _agrees(file.metadata):
+        if not _metadata_is_consistent(file.metadata):
             raise pa.ArrowInvalid(
                 "what it says of its rows and columns is contradictory"
             )
         # no checksum covers the names: what was changed there may be no text
-        return table.select([n for n in table.column_names if n in COLUMNS])
+        return table.select([n for n in table.column_names if n in SAMPLE_COLUMNS])
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
             raise
@@ -186,18 +189,18 @@ def _read_parquet(path: Path) -> pa.Table:
         ) from error
 
 
-def _agrees(about: Any) -> bool:
-    """Whether a Parquet file tells its rows and columns apart; no checksum covers that.
+def _metadata_is_consistent(about: Any) -> bool:
+    """Whether the metadata of a Parquet file are consistent; no checksum covers them.
 
-    It says everywhere how many rows it has, and no two of its columns have one name.
+    All numbers of rows must agree, and no two columns may have one name.
     """
-    names, rows = [n for n in about.schema.names if n in COLUMNS], 0
+    names, rows = [n for n in about.schema.names if n in SAMPLE_COLUMNS], 0
     if len(set(names)) < len(names):
         return False
     for i in range(about.num_row_groups):
         group = about.row_group(i)
         parts = [group.column(j) for j in range(group.num_columns)]
-        many = {p.num_values for p in parts if p.path_in_schema in COLUMNS}
+        many = {p.num_values for p in parts if p.path_in_schema in SAMPLE_COLUMNS}
         if not many <= {group.num_rows}:
             return False
         rows += group.num_rows
@@ -208,13 +211,15 @@ def _numbers(path: Path, table: pa.Table | pa.RecordBatch, name: str) -> Array:
     import pyarrow as pa
 
     column = table.column(name)
-    if name not in COLUMNS:
+    if name not in SAMPLE_COLUMNS:
         return np.empty(0)
     if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
         raise SessionError(f"{path}: column {name} holds {column.type}, not numbers")
-    if column.type != pa.float64():  # casting loads all that Arrow computes with
+    if (
+        column.type != pa.float64()
+    ):  # casting imports Arrow's compute functions, which takes long
         column = column.cast(pa.float64())
-    return numbers(column)
+    return float_values(column)
 
 
 def _check_columns(path: Path, columns: dict[str, Array]) -> None:
@@ -255,7 +260,7 @@ def _check_rows(path: Path, columns: dict[str, Array]) -> None:
 
 
 def _block(columns: dict[str, Array]) -> Block:
-    """Samples of columns, which are used up."""
+    """Samples from columns; `columns` is emptied."""
     unknown = np.full(len(columns["t"]), np.nan)
     triad = {
         kind: np.column_stack([columns.pop(kind + axis, unknown) for axis in "xyz"])
@@ -265,29 +270,29 @@ def _block(columns: dict[str, Array]) -> Block:
     return Block(columns["t"], triad["a"], triad["g"], *rest)
 
 
-def from_table(table: pa.Table) -> Block:
-    """Samples of a table with `COLUMNS` that was written here."""
-    return _block({n: numbers(table.column(n)) for n in table.column_names})
+def block_from_table(table: pa.Table) -> Block:
+    """Samples of a table with `SAMPLE_COLUMNS` that was written here."""
+    return _block({n: float_values(table.column(n)) for n in table.column_names})
 
 
-def schema() -> pa.Schema:
+def samples_schema() -> pa.Schema:
     """Columns of a samples file that is written here."""
     import pyarrow as pa
 
-    return pa.schema([(name, pa.float64()) for name in COLUMNS])
+    return pa.schema([(name, pa.float64()) for name in SAMPLE_COLUMNS])
 
 
-def to_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
-    """The samples as an Arrow record batch with all of `COLUMNS`.
+def to_record_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
+    """The samples as an Arrow record batch with all of `SAMPLE_COLUMNS`.
 
-    With `nulls`, a column of which nothing is known is null: then it takes no room in
-    Parquet. In a stream it would, of bytes that no checksum covers.
+    With `nulls`, a column without any value is null, and takes no space in Parquet. In
+    a stream it would still take space, which no checksum covers.
     """
     import pyarrow as pa
 
     columns = [block.t, *block.acc.T, *block.gyr.T]
     columns += [block.temperature, block.t_host, block.seq]
-    # pa.array would look for pandas first, and load all of it where it is installed
+    # pa.array imports pandas where it is installed, which takes long
     arrays = [
         pa.nulls(len(block), pa.float64())
         if nulls and _unknown(c)
@@ -298,7 +303,7 @@ def to_batch(block: Block, *, nulls: bool = False) -> pa.RecordBatch:
         )
         for c in columns
     ]
-    return pa.RecordBatch.from_arrays(arrays, names=list(COLUMNS))
+    return pa.RecordBatch.from_arrays(arrays, names=list(SAMPLE_COLUMNS))
 
 
 def _unknown(column: Array) -> bool:

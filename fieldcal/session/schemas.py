@@ -1,7 +1,7 @@
-"""JSON Schemas of the files that people write, and what an error says of them.
+"""JSON Schemas of the files, and the error texts for a document that violates one.
 
-The schemas are in ``schemas/``, for other programs too. The description of a key is the
-remedy that an error names.
+The schemas are in ``schemas/``. The description of a key is the remedy in the error
+text.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from importlib.resources import files
 from typing import Any
 
 
-def schema(kind: str) -> dict[str, Any]:
+def load_schema(kind: str) -> dict[str, Any]:
     """Return a schema: session, plan, mark, result, diagnosis, noise or export."""
     path = files("fieldcal").joinpath(f"schemas/{kind}.schema.json")
     found: dict[str, Any] = json.loads(path.read_text("utf-8"))
@@ -23,12 +23,12 @@ def schema(kind: str) -> dict[str, Any]:
 
 @cache
 def validator(kind: str) -> Any:
-    """What checks a document against one of the schemas."""
-    return validator_of(schema(kind))
+    """Validator for one of the schemas, by its name."""
+    return make_validator(load_schema(kind))
 
 
-def validator_of(content: Mapping[str, Any]) -> Any:
-    """What checks a document against a schema; a number is finite."""
+def make_validator(content: Mapping[str, Any]) -> Any:
+    """Validator for a schema; nan and infinity are no numbers."""
     from jsonschema import Draft202012Validator
     from jsonschema.validators import extend
 
@@ -42,12 +42,12 @@ def _is_number(_: Any, value: Any) -> bool:
     return abs(value) <= sys.float_info.max
 
 
-def refusal(tables: Mapping[str, Any], checked_by: Any) -> str:
-    """What is wrong with tables, with key and remedy; empty if nothing is.
+def schema_fault(tables: Mapping[str, Any], checked_by: Any) -> str:
+    """Fault of a document, with key and remedy; empty if it is valid.
 
     Parameters
     ----------
-    tables : as TOML reads them
+    tables : the parsed document
     checked_by : a `validator`
 
     """
@@ -78,7 +78,7 @@ def refusal(tables: Mapping[str, Any], checked_by: Any) -> str:
 
 
 def _missing(needed: Mapping[str, list[str]], table: Mapping[str, Any]) -> str:
-    """The first key that another one in the table needs."""
+    """The first missing key that another key of the table requires."""
     return next(
         key
         for given, keys in needed.items()
@@ -89,7 +89,7 @@ def _missing(needed: Mapping[str, list[str]], table: Mapping[str, Any]) -> str:
 
 
 def _key(path: list[str | int]) -> str:
-    """A key as one finds it in the file."""
+    """Key as a reader finds it in the file."""
     if len(path) < 2:
         return ".".join(map(str, path)) or "the file"
     if path[0] == "position":

@@ -1,39 +1,44 @@
-"""How well a session says how strong gravity is.
+"""Uncertainty of the gravity that a session states.
 
-Scale factors are measured by gravity, which grows from the equator to the poles, and
-falls with height. Where no place is said it may be all of its range, though somebody
-may have written a number down (9.81 mostly, which nothing checks); where a latitude is,
-that of the heights at which people live; where both are, the normal one but for the
-usual anomaly, and where gravity is stated beside them, what the two differ by.
+Scale factors are measured against gravity, which increases from the equator to the
+poles, and decreases with height. The standard deviation is
+
+- without a latitude: that of the whole range on Earth, even if gravity is stated, since
+  nothing checks that number;
+- with a latitude only: that of the heights at which people live;
+- with latitude and height: that of the usual gravity anomaly, or, if
+  gravity is stated as well, its difference from normal gravity.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.session.description import Description
 
-ANYWHERE = (gravity(90.0) - gravity(0.0)) / np.sqrt(12.0)
-"""What is not known of gravity where no place is, 1 sigma, m/s^2."""
+UNKNOWN_PLACE_SIGMA = (normal_gravity(90.0) - normal_gravity(0.0)) / np.sqrt(12.0)
+"""Standard deviation of gravity at an unknown place, m/s^2."""
 
-LIVES = 700.0
-"""Height at which people live, 1 sigma, m: half of them below 200, some at 2000
-(Cohen and Small, Hypsographic demography, 1998)."""
+HEIGHT_SIGMA = 700.0
+"""Standard deviation of the height at which people live, m: half below 200, some at
+2000 (Cohen and Small, Hypsographic demography, 1998)."""
 
-ANOMALY = 3e-4
-"""How far gravity usually is from the normal one, 1 sigma, m/s^2 (Torge and Mueller,
+ANOMALY_SIGMA = 3e-4
+"""Standard deviation of gravity from normal gravity, m/s^2 (Torge and Mueller,
 Geodesy, 4th edition: free-air anomalies of 30 mGal)."""
 
 
 def gravity_sigma(about: Description) -> float:
-    """What is not known of gravity, 1 sigma, m/s^2."""
+    """Standard deviation of the stated gravity, m/s^2."""
     site = about.raw.get("site", {})
     if "latitude_deg" not in site:
-        return float(ANYWHERE)
+        return float(UNKNOWN_PLACE_SIGMA)
     if "height_m" not in site:
-        fall = gravity(about.latitude_deg) - gravity(about.latitude_deg, LIVES)
-        return float(np.hypot(fall, ANOMALY))
-    normal = gravity(about.latitude_deg, about.height_m)
-    at_rest = about.gravity + float(about.under_way.force[1])
-    return abs(at_rest - normal) if site.get("gravity") else ANOMALY
+        fall = normal_gravity(about.latitude_deg) - normal_gravity(
+            about.latitude_deg, HEIGHT_SIGMA
+        )
+        return float(np.hypot(fall, ANOMALY_SIGMA))
+    normal = normal_gravity(about.latitude_deg, about.height_m)
+    at_rest = about.gravity + float(about.base_motion.force[1])
+    return abs(at_rest - normal) if site.get("gravity") else ANOMALY_SIGMA

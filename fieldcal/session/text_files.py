@@ -1,7 +1,7 @@
 """Samples as text: comma-separated columns under a row of names, packed by gzip or not.
 
-A text that was cut off is read up to its last whole row; what is wrong otherwise names
-the row and the column.
+A file that was cut off is read up to its last whole row. Errors name the row and the
+column.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from fieldcal.core.errors import SessionError
 if TYPE_CHECKING:
     import pyarrow as pa
 
-COLUMNS = (
+SAMPLE_COLUMNS = (
     *("t", "ax", "ay", "az", "gx", "gy", "gz"),
     *("temperature", "t_host", "seq"),
 )
-"""Every column a samples file can have, in the order they are written."""
+"""Columns that a samples file may have, in the order in which they are written."""
 
 _GUNZIP = 16 + zlib.MAX_WBITS
 
 
-def rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:
-    """Record batches of a text, unpacked as it is read."""
+def iterate_text_batches(path: Path) -> Iterator[pa.RecordBatch]:
+    """Record batches of a text file, decompressed while it is read."""
     import pyarrow as pa
     import pyarrow.csv
 
@@ -36,21 +36,21 @@ def rows_of_text(path: Path) -> Iterator[pa.RecordBatch]:
             stream,
             read_options=pyarrow.csv.ReadOptions(use_threads=False, block_size=1 << 24),
             convert_options=pyarrow.csv.ConvertOptions(
-                column_types={name: pa.float64() for name in COLUMNS},
+                column_types={name: pa.float64() for name in SAMPLE_COLUMNS},
                 null_values=["", "nan", "NaN"],
             ),
         )
         for batch in reader:
-            yield batch.select([n for n in batch.schema.names if n in COLUMNS])
+            yield batch.select([n for n in batch.schema.names if n in SAMPLE_COLUMNS])
 
 
-def read_text(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
-    """All of a text, and warnings about what was cut off.
+def read_text_table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
+    """Table of a whole text file, and warnings about what was cut off.
 
     Raises
     ------
     SessionError
-        If it is none, naming row and column.
+        If it is not such a file; names row and column.
 
     """
     import pyarrow as pa
@@ -65,9 +65,9 @@ def read_text(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
         raise SessionError(f"{path}: is empty; it needs a row of names and samples")
     data, short = _without_short_row(data)
     names = _names(data)
-    if not set(names) & set(COLUMNS):
+    if not set(names) & set(SAMPLE_COLUMNS):
         raise SessionError(
-            f"{path}: the first row must name the columns: {', '.join(COLUMNS)}"
+            f"{path}: the first row must name the columns: {', '.join(SAMPLE_COLUMNS)}"
         )
     try:
         table = pyarrow.csv.read_csv(
@@ -76,14 +76,14 @@ def read_text(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
                 use_threads=False, skip_rows=1, column_names=names
             ),
             convert_options=pyarrow.csv.ConvertOptions(
-                column_types={name: pa.float64() for name in COLUMNS},
-                include_columns=[n for n in names if n in COLUMNS],
+                column_types={name: pa.float64() for name in SAMPLE_COLUMNS},
+                include_columns=[n for n in names if n in SAMPLE_COLUMNS],
                 null_values=["", "nan", "NaN"],
             ),
         )
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise SessionError(f"{path}: {_place(data)}") from error
-    return table, cut_off(path, table) if cut or short else ()
+        raise SessionError(f"{path}: {_first_bad_row(data)}") from error
+    return table, cut_off_warnings(path, table) if cut or short else ()
 
 
 def _names(data: bytes) -> list[str]:
@@ -92,7 +92,7 @@ def _names(data: bytes) -> list[str]:
 
 
 def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
-    """What can be unpacked, and whether the end is missing."""
+    """Decompressed data as far as possible, and whether the end is missing."""
     unpack = zlib.decompressobj(_GUNZIP)
     try:
         out = unpack.decompress(data)
@@ -107,7 +107,7 @@ def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
 
 
 def _without_short_row(data: bytes) -> tuple[bytes, bool]:
-    """Leave out a last row that was cut off in the middle."""
+    """Data without an incomplete last row, and whether there was one."""
     if data.endswith(b"\n"):
         return data, False
     head, _, last = data.rpartition(b"\n")
@@ -117,8 +117,8 @@ def _without_short_row(data: bytes) -> tuple[bytes, bool]:
     return head + b"\n", True
 
 
-def _place(data: bytes) -> str:
-    """Say where the first row that is none stands: the slow way, after a failure."""
+def _first_bad_row(data: bytes) -> str:
+    """Text about the first invalid row; slow, used after a failure only."""
     lines = data.decode(errors="replace").splitlines()
     names = _names(data)
     for row, line in enumerate(lines[1:], start=1):
@@ -128,7 +128,7 @@ def _place(data: bytes) -> str:
                 f"row {row} has {len(cells)} columns, not {len(names)}; mend that row"
             )
         for name, cell in zip(names, cells, strict=False):
-            if name in COLUMNS and not _is_number(cell):
+            if name in SAMPLE_COLUMNS and not _is_number(cell):
                 return (
                     f"row {row}, column {name}: {cell.strip()[:20]!r} is not a number;"
                     " mend it, or leave it empty where the value is missing"
@@ -144,6 +144,6 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def cut_off(path: Path, table: pa.Table) -> tuple[str, ...]:
-    """What is said of a file that was cut off."""
+def cut_off_warnings(path: Path, table: pa.Table) -> tuple[str, ...]:
+    """Warnings about a file that was cut off."""
     return (f"{path.name} was cut off; its {table.num_rows} whole rows are used",)

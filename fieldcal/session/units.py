@@ -1,4 +1,4 @@
-"""Units of the samples: SI, or volts and counts by the nominal scale factors."""
+"""Units of samples: SI, or volts and counts, converted by the nominal scale factors."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ GYR_UNITS = {
     "V": 1.0,
     "count": 1.0,
 }
-"""SI units in one of each; outputs in V or counts are divided by the gauge."""
+"""SI value of each unit; outputs in V or counts are divided by the gauge."""
 
 UNSCALED = ("V", "count")
-"""Units whose scale only the nominal scale factors give."""
+"""Units that are converted by the nominal scale factors."""
 
 UNITS = {"acceleration": ACC_UNITS, "angular_rate": GYR_UNITS}
 
@@ -32,14 +32,14 @@ NOMINAL_SCALES = ("acc_scale", "gyr_scale")
 NOMINAL = {"acc_bias": 0.0, "acc_scale": 1.0, "gyr_bias": 0.0, "gyr_scale": 1.0}
 
 
-def nominal_of(table: Mapping[str, Any]) -> dict[str, Array]:
-    """The calibration that [nominal] gives, (3,) each; none where it says nothing."""
+def parse_nominal(table: Mapping[str, Any]) -> dict[str, Array]:
+    """Calibration in table [nominal], (3,) each; by default bias 0, scale factor 1."""
     given = {name: table.get(name, [usual] * 3) for name, usual in NOMINAL.items()}
     return {name: np.array(three, float) for name, three in given.items()}
 
 
-def gauge_of(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
-    """Output scale of channels in volts or counts, by the nominal scale factors.
+def output_gauge(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
+    """Volts or counts per SI unit of each triad, from the nominal scale factors.
 
     Raises
     ------
@@ -59,6 +59,6 @@ def gauge_of(units: Mapping[str, str], nominal: Mapping[str, Array]) -> Gauge:
 def full_scales(
     table: Mapping[str, Any], units: Mapping[str, str], gauge: Gauge
 ) -> dict[str, float]:
-    """Full scale of each kind that [range] gives, SI."""
+    """Full scale of each quantity in table [range], SI."""
     scale = {k: UNITS[k][units[k]] / c for k, c in zip(UNITS, gauge.size, strict=True)}
     return {k: float(table[k]) * scale[k] for k in UNITS if k in table}

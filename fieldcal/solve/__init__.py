@@ -1,6 +1,6 @@
 """Estimators: from window averages to parameters with their covariance.
 
->>> from fieldcal.core.positions import FIVE
+>>> from fieldcal.core.positions import FIVE_POSITIONS
 >>> from fieldcal.solve import Observations, solve
 """
 

@@ -22,7 +22,7 @@ from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import TILTS, Tilt, group_of
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
@@ -105,11 +105,11 @@ def solve(
     NotObservable
         If the positions determine no parameter.
 
-    >>> from fieldcal.core.positions import TWO
+    >>> from fieldcal.core.positions import TWO_POSITIONS
     >>> mean = np.zeros((2, 6))
     >>> mean[:, :3] = [[0.1, -9.81, 0.2], [-6.83672, -6.91037, 0.80457]]
     >>> cov = np.tile(np.diag([1e-6] * 3 + [1e-10] * 3), (2, 1, 1))
-    >>> result = solve(Observations(TWO, mean, cov, gravity=9.81))
+    >>> result = solve(Observations(TWO_POSITIONS, mean, cov, gravity=9.81))
     >>> result.method, np.round(result.vector("acc_scale")[0], 4).tolist()
     ('two_position', [1.0, 1.0, 1.0])
     """
@@ -317,7 +317,7 @@ class _SessionFit:
 
     def _level_assumed_note(self) -> str:
         extra = ladder_remedy(self.observations, parameters("angle_offset"))
-        cure = f"; add {join(extra)} to find it" if extra else ""
+        cure = f"; add {join_words(extra)} to find it" if extra else ""
         return (
             "these positions do not show the tilt, so the base is taken as level" + cure
         )

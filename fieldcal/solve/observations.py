@@ -15,11 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.calibration import Nominal
+from fieldcal.core.base_motion import BaseMotion
 from fieldcal.core.errors import InputError
 from fieldcal.core.grade import Grade
-from fieldcal.core.positions import Position, angles, forces, rates
+from fieldcal.core.positions import (
+    Position,
+    alpha_beta_angles,
+    specific_forces,
+    table_rates,
+)
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array
-from fieldcal.core.under_way import UnderWay
 from fieldcal.windows import Average
 
 Index = NDArray[np.integer[Any]]
@@ -63,7 +68,7 @@ class Observations:
     mounting: Array = field(default_factory=lambda: np.eye(3))
     grade: Grade = "tactical"
     nominal: Nominal = field(default_factory=Nominal)
-    under_way: UnderWay = field(default_factory=UnderWay)
+    under_way: BaseMotion = field(default_factory=BaseMotion)
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -90,7 +95,7 @@ class Observations:
         mounting: Array | None = None,
         grade: Grade = "tactical",
         nominal: Nominal | None = None,
-        under_way: UnderWay | None = None,
+        under_way: BaseMotion | None = None,
     ) -> Observations:
         """Gather the averages of windows; units and frames as in the attributes."""
         if not averages:
@@ -106,7 +111,7 @@ class Observations:
             np.eye(3) if mounting is None else mounting,
             grade,
             nominal or Nominal(),
-            under_way or UnderWay(),
+            under_way or BaseMotion(),
         )
 
     def __len__(self) -> int:
@@ -138,7 +143,7 @@ class Observations:
     @property
     def angles(self) -> tuple[Array, Array]:
         """Alpha and beta, (n,) rad each, nan where unknown."""
-        return angles(self.positions)
+        return alpha_beta_angles(self.positions)
 
     @property
     def oriented(self) -> Mask:
@@ -148,12 +153,12 @@ class Observations:
     @property
     def rotating(self) -> Mask:
         """Whether a table turns a position, (n,)."""
-        return np.array([p.turning for p in self.positions], dtype=bool)
+        return np.array([p.on_turning_table for p in self.positions], dtype=bool)
 
     @property
     def forces(self) -> Array:
         """Specific force at rest in device axes, (n, 3) m/s^2."""
-        seen: Array = forces(self.positions, self.gravity) @ self.mounting
+        seen: Array = specific_forces(self.positions, self.gravity) @ self.mounting
         return seen
 
     @property
@@ -176,7 +181,7 @@ class Observations:
     @property
     def rates(self) -> Array:
         """Known rates of a rate table in device axes, (n, 3) rad/s; 0 at rest."""
-        seen: Array = rates(self.positions) @ self.mounting
+        seen: Array = table_rates(self.positions) @ self.mounting
         return seen
 
     def _check_shapes(self, n: int) -> None:

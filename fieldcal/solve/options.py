@@ -13,7 +13,7 @@ from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import TILTS, Tilt
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.solve.observations import Observations
 
 METHODS = ("auto", "two_position", "five_position", "least_squares", "joint", "scalar")
@@ -57,7 +57,7 @@ class SolveOptions:
         if self.method not in METHODS or self.tilt not in TILT_CHOICES:
             raise InputError(
                 f"method {self.method!r} with tilt {self.tilt!r} is unknown: methods"
-                f" are {join(METHODS)}, tilts are {join(TILT_CHOICES)}"
+                f" are {join_words(METHODS)}, tilts are {join_words(TILT_CHOICES)}"
             )
         if self.lot is not None and self.as_printed:
             raise InputError("printed formulas know of no lot: leave one of them out")

@@ -17,10 +17,10 @@ import numpy as np
 
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import TILTS, ParameterName, Tilt, group_of
-from fieldcal.core.factory import WARMING, FactoryErrors
-from fieldcal.core.frames import EARTH_RATE, earth_rate_home
+from fieldcal.core.base_motion import BaseMotion
+from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
+from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.core.samples import CHANNELS, Array, Index
-from fieldcal.core.under_way import UnderWay
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import TRIADS, Cause, Group
@@ -145,7 +145,7 @@ class ParameterSet(Dictionary):
         left = tuple(
             (cause, group)
             for cause, group in known
-            if cause.name == WARM_SCALE or group.part in WARMING
+            if cause.name == WARM_SCALE or group.part in WARMING_EFFECTS
         )
         return bias_scale_at_end(
             self, (WeightedExplanation(left, 1.0), *self.explanations)
@@ -337,7 +337,7 @@ def known_earth_rate(
     latitude: float | None,
     navigation: bool,
     heading: float | None,
-    under_way: UnderWay | None = None,
+    under_way: BaseMotion | None = None,
 ) -> tuple[Array, tuple[float, float, float]]:
     """The Earth's rate in base axes, and its uncertainty, rad/s.
 
@@ -348,8 +348,8 @@ def known_earth_rate(
     if latitude is None:
         free = EARTH_RATE / float(np.sqrt(3.0))
         return np.zeros(3), (free, free, free)
-    moving = under_way or UnderWay()
-    home = earth_rate_home(latitude) + moving.rate
+    moving = under_way or BaseMotion()
+    home = earth_rate_at_home(latitude) + moving.rate
     level = float(np.hypot(home[0], home[2]))
     if navigation and heading is None:
         heading = 0.0

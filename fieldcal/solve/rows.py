@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from fieldcal.calibration import Nominal
-from fieldcal.core.frames import EARTH_RATE, earth_rate_home, force_home
-from fieldcal.core.positions import attitude_sigmas, speeds, third_angles
+from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home, specific_force_at_home
+from fieldcal.core.positions import attitude_sigmas, gamma_angles, unknown_axis_speeds
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model.rows.orientation import force_along_mean
 from fieldcal.model.rows.reduce import Rows
@@ -41,12 +41,12 @@ def rows_of_means(observations: Observations) -> RecordedRows:
         f=_measured_force(observations),
         t=np.where(np.isfinite(observations.time), observations.time, index),
         position=index,
-        gamma=third_angles(observations.positions),
+        gamma=gamma_angles(observations.positions),
         attitude_sigma=attitude_sigmas(observations.positions),
         rate=read.rates(observations.mounting),
-        speed=speeds(observations.positions)[0],
-        speed_sigma=speeds(observations.positions)[1],
-        base_force=force_home(observations.gravity)
+        speed=unknown_axis_speeds(observations.positions)[0],
+        speed_sigma=unknown_axis_speeds(observations.positions)[1],
+        base_force=specific_force_at_home(observations.gravity)
         + observations.under_way.force * [1.0, 0.0, 1.0],
         transport=observations.under_way.rate,
         mounting=observations.mounting,
@@ -112,7 +112,7 @@ def _earth_rate_at_rest(observations: Observations) -> float:
         return 0.0
     if observations.latitude is None:
         return EARTH_RATE
-    rate = earth_rate_home(observations.latitude) + observations.under_way.rate
+    rate = earth_rate_at_home(observations.latitude) + observations.under_way.rate
     return float(np.linalg.norm(rate))
 
 
@@ -123,7 +123,9 @@ def _measured_force(observations: Observations) -> Array:
     """
     nominal = observations.nominal
     apart = (observations.mean[:, ACC] - nominal.acc_bias) / np.array(nominal.acc_scale)
-    apart[~np.isfinite(apart).all(axis=1)] = force_home(observations.gravity)
+    apart[~np.isfinite(apart).all(axis=1)] = specific_force_at_home(
+        observations.gravity
+    )
     return force_along_mean(observations.gravity, np.arange(len(observations)), apart)
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from fieldcal.calibration import Method
 from fieldcal.calibration.names import AXES, ParameterName, group_of
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.samples import CHANNELS
 from fieldcal.core.samples import UNITS as CHANNEL_UNITS
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.model import thresholds
 from fieldcal.solve import words
 from fieldcal.solve.doubt import DoubtfulPosition
@@ -73,7 +73,7 @@ def _force_length_warning(observations: Observations) -> str:
     force = (observations.mean[:, :3] - nominal.acc_bias) / nominal.acc_scale
     length = np.linalg.norm(force[np.isfinite(force).all(axis=1)], axis=1)
     size, known = float(length.mean()) if len(length) else 0.0, observations.gravity
-    most = max(abs(gravity(at) - known) for at in (0.0, 90.0))
+    most = max(abs(normal_gravity(at) - known) for at in (0.0, 90.0))
     if not len(length) or abs(size - known) <= most:
         return ""
     return (
@@ -105,7 +105,7 @@ def _gyroscope_warning(
     missing = [*gyr] + ([f"{len(cross)} of 6 gyro_cross_coupling"] if cross else [])
     if not estimate.parameter_set.options.turned and not observations.rotating.any():
         return (
-            f"{join(missing)} {'are' if missing[1:] else 'is'} not estimated:"
+            f"{join_words(missing)} {'are' if missing[1:] else 'is'} not estimated:"
             " the Earth's rate gives it only roughly in these windows; average longer,"
             " or record the turns between the positions"
         )
@@ -117,7 +117,7 @@ def _gyroscope_warning(
             missing, [f"a rate of 20°/s about device axis {a}" for a in about],
             "this schedule",
         )  # fmt: skip
-    level = f"turns about device axis {join(about)} while that axis is level"
+    level = f"turns about device axis {join_words(about)} while that axis is level"
     return words.not_determined(missing, [level], "these turns")
 
 
@@ -136,8 +136,8 @@ def _norm_warning(missing: Sequence[str], estimate: ParameterEstimate, n: int) -
     elif estimate.acc.dof in words.FEW:
         why += f" (and all nine would leave {words.FEW[estimate.acc.dof]})"
     return (
-        f"{join(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
-        f" add positions with gravity half way between {join(pairs)}"
+        f"{join_words(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
+        f" add positions with gravity half way between {join_words(pairs)}"
     )
 
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fieldcal.core.chances import chi2_tail
 from fieldcal.core.gravity import G0
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.model import thresholds
 
 NO_DOF = "no degree of freedom is left to check the fit: add a verification position"
@@ -32,8 +32,8 @@ IN_WORDS = {
 def not_determined(missing: Sequence[str], remedy: Sequence[str], what: str) -> str:
     """Sentence about parameters that are not determined, with the remedy."""
     verb = "are" if len(missing) > 1 else "is"
-    cure = f": add {join(remedy)}" if remedy else ""
-    return f"{join(missing)} {verb} not determined by {what}{cure}"
+    cure = f": add {join_words(remedy)}" if remedy else ""
+    return f"{join_words(missing)} {verb} not determined by {what}{cure}"
 
 
 def chi2_chance(chi2: float, dof: int) -> float:
@@ -79,7 +79,7 @@ def effects_warning(
     """
     if sure < thresholds.NAMED:
         return ""
-    listed = join(
+    listed = join_words(
         [
             f"{IN_WORDS.get(i, i)} (probability {p:.2f})"
             for i, p in causes.items()

@@ -18,7 +18,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import ParameterName
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import Installed, names
+from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
 
 CROSS = {"cross_coupling": "acc", "gyro_cross_coupling": "gyr"}
 
@@ -73,15 +73,15 @@ def _own_output(name: str, found: Calibration) -> Calibration:
     table: Any = found.info.get("installed")
     if not table:
         return found
-    there = Installed.from_table(table)
+    there = InstalledCalibration.from_table(table)
     corrects = [n for n, v in there.values.items() if n.endswith("_ENABLE") and v]
     if corrects:
         raise InputError(
             f"{name}: {corrects[0]} was {there.values[corrects[0]]:g}, so the autopilot"
             " had corrected for temperature already; set it to 0, and record again"
         )
-    now = there.next(np.zeros(3), np.ones(3), np.zeros(3))
-    known = names(there.autopilot, there.instance)
+    now = there.parameters_after(np.zeros(3), np.ones(3), np.zeros(3))
+    known = parameter_names(there.autopilot, there.instance)
     o = {s: [now[n] for n in known[f"{s}_offset"]] for s in ("acc", "gyr")}
     k = {"acc": [now[n] for n in known["acc_scale"]], "gyr": [1.0] * 3}
     more: np.ndarray[Any, Any] = np.zeros(len(found.names))

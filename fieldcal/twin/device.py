@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect
@@ -97,11 +97,11 @@ def device_profile(
             serial or "SIM-1",
             about.grade,
         ),
-        sampling=Sampling(float(f"{rate_of(source.block):.9g}")),
+        sampling=Sampling(float(f"{sampling_rate(source.block):.9g}")),
         site=Site(
             about.latitude_deg,
             about.height_m,
-            about.gravity + float(about.under_way.force[1]),
+            about.gravity + float(about.base_motion.force[1]),
             *about.velocity,
         ),
         frame=MountingAxes((about.axes[0], about.axes[1], about.axes[2])),

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.search.inference import Inference
@@ -119,7 +119,7 @@ def _best_heading(fitted: FittedSet) -> float:
 
 def _earth_rates_by_heading(x: Experience, headings: Array) -> Array:
     """The Earth's rate in base axes for each heading, (n, 3) rad/s."""
-    east, down, north = earth_rate_home(x.latitude) + x.transport
+    east, down, north = earth_rate_at_home(x.latitude) + x.transport
     c, s = np.cos(headings), np.sin(headings)
     return np.column_stack(
         [c * east + s * north, np.full(len(c), down), c * north - s * east]

@@ -81,7 +81,7 @@ def replay_session(
     return ReplayResult(
         profile,
         runs,
-        explanation.prepared.source.about.numbered(held),
+        explanation.prepared.source.about.indices_in_file(held),
         np.array([_time_span(raw.rows, p) for p in held]),
         tuple(e.id for e in profile.effects if e.id in RANDOM),
         int(np.argmax(gain)),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.windows.cells import CellRows, SamplesBetween
 
 OFTEN = 0.5
@@ -68,7 +68,7 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
         what = "never change, or are missing"
         if len(names) == 1:
             what = "never changes, or is missing"
-        says = f"the {sensor} are not used: {join(names)} {what}"
+        says = f"the {sensor} are not used: {join_words(names)} {what}"
         numbers = tuple(channels.start + axis for axis in axes)
         found.append(DeadSensor(channels, numbers, says))
     return found
@@ -93,8 +93,8 @@ def broken_axis_messages(six: Array) -> list[str]:
         names = [CHANNELS[a] for a in stuck]
         change = "change" if len(names) > 1 else "changes"
         said.append(
-            f"{join(names)} never {change} while the rest of the sensor does: a wire or"
-            " the sensor is broken; repair it and record again"
+            f"{join_words(names)} never {change} while the rest of the sensor does: a"
+            " wire or the sensor is broken; repair it and record again"
         )
     return said
 

@@ -23,7 +23,7 @@ from typing import Literal
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
 from fieldcal.windows.quiet import QuietNoise, running_means
 
@@ -135,7 +135,7 @@ def shakes(
     root = np.cbrt(short)
     most = np.maximum(np.median(number, axis=0), 1.0)
     centred = np.sqrt(np.minimum(1.0, number / most)) * (root - np.median(root, axis=0))
-    usual = _HEAVY * DEVIATION * np.median(np.abs(centred), axis=0)
+    usual = _HEAVY * MAD_TO_SIGMA * np.median(np.abs(centred), axis=0)
     spread = _zero_as_inf(usual, least.of_roots())
     noise = np.sqrt(np.median(short, axis=0))
     levels = zip(

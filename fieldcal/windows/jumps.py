@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block, concat
 
 HALF = 5
@@ -144,7 +144,7 @@ def _noise(step: Array) -> Array:
     """Standard deviation of a row, from steps (n, 3); at least the resolution."""
     if not len(step):
         return np.full(3, np.nan)
-    usual = DEVIATION * np.median(step, axis=0) / np.sqrt(2)
+    usual = MAD_TO_SIGMA * np.median(step, axis=0) / np.sqrt(2)
     least = _least_jump(step)
     noise: Array = np.maximum(usual, np.where(np.isfinite(least), least, 0.0))
     return noise

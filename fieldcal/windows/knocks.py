@@ -41,7 +41,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.windows.cells import CELL, CellRows, CellTable, SamplesBetween, hold_last
 from fieldcal.windows.dead_axis import LiveAxisRows

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array
 from fieldcal.windows.cells import CELL
 
@@ -78,7 +78,7 @@ def estimate_quiet_noise(
         if k and len(u) < ENOUGH * 2**k:
             break
         steps = np.abs(u[2**k :] - u[: -(2**k)])
-        measured.append(DEVIATION * np.median(steps, axis=0) / np.sqrt(2))  # (1)
+        measured.append(MAD_TO_SIGMA * np.median(steps, axis=0) / np.sqrt(2))  # (1)
     known = np.array(measured)
     white, flat = _white_and_flat(known)
     tau = 2.0 ** np.arange(len(known), len(averaged))[:, None]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fieldcal.core.samples import Array, runs
+from fieldcal.core.samples import Array, runs_of_true
 from fieldcal.windows.cells import CELL, CellRows, CellTable, hold_last
 
 SPAN = 10
@@ -156,7 +156,7 @@ def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
         own = np.maximum(np.quantile(spread, 0.3, axis=0), quiet)
         own = np.maximum(own, usual.flips / _OWN)
         own = np.where(own > 0, own, np.inf)
-        for a, b in runs(np.all(spread < _OWN * own, axis=1)):
+        for a, b in runs_of_true(np.all(spread < _OWN * own, axis=1)):
             rate = np.median(level[a:b, 3:], axis=0)
             kept.append(RestRun(first + a, first + b, rate))
     if not kept:
@@ -175,7 +175,7 @@ def _calm_runs(spans: Iterable[SpanSpreads], bound: Array) -> Iterator[SpanSprea
     waiting: list[tuple[Array, Array]] = []
     began = length = 0
     for first, spread, level in spans:
-        for a, b in runs(np.all(spread < bound, axis=1)):
+        for a, b in runs_of_true(np.all(spread < bound, axis=1)):
             goes_on = began + length == first + a and length + b - a <= _LONGEST
             if waiting and not goes_on:
                 yield began, *_concatenate(waiting)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block
 
 WILD = 12.0
@@ -34,7 +34,7 @@ def _limited_steps(triad: Array) -> Array:
     if len(triad) < len("abc"):
         return triad
     step = np.abs(np.diff(triad, axis=0))
-    usual = DEVIATION * _median(step)
+    usual = MAD_TO_SIGMA * _median(step)
     # most differences of coarse outputs are 0
     least = np.where(step > 0, step, np.inf).min(axis=0, initial=np.inf)
     usual = np.where(usual > 0, usual, least)

@@ -10,20 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.sim_device.effect import SimulatedEffect
 
 
 @cache
 def ids() -> tuple[str, ...]:
     """Every effect there is, in alphabetical order."""
-    return names(__path__)
+    return module_names(__path__)
 
 
 @cache
 def kind(id_: str) -> type[SimulatedEffect]:
     """Class of an effect, whose id is one of `ids`."""
-    return class_in(f"{__name__}.{id_}", SimulatedEffect)
+    return plugin_class(f"{__name__}.{id_}", SimulatedEffect)
 
 
 @cache

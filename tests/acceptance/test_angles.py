@@ -13,9 +13,9 @@ from fieldcal.acceptance.angles import unnoticed_angle_error, unstated_angles_wa
 from fieldcal.acceptance.decision import ANGLES, Circumstances, Decision, decide
 from fieldcal.acceptance.verification import Verification, verify
 from fieldcal.calibration import Calibration, limits
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
-from fieldcal.session.description import Description, parse
+from fieldcal.session.description import Description, parse_description
 from fieldcal.solve import solve
 from fieldcal.windows import Average
 
@@ -32,7 +32,7 @@ FACES: list[tuple[float, float]] = [
 
 
 def about(**run: Any) -> Description:
-    return parse({"site": {"gravity": G}, "run": run})
+    return parse_description({"site": {"gravity": G}, "run": run})
 
 
 def read(angles: list[tuple[float, float]]) -> Array:
@@ -58,7 +58,7 @@ def calibrated(
 
 
 def five() -> list[tuple[float, float]]:
-    return [p.degrees for p in FIVE if p.degrees is not None]
+    return [p.degrees for p in FIVE_POSITIONS if p.degrees is not None]
 
 
 def held(found: Calibration, alpha: float, beta: float) -> Verification:
@@ -98,7 +98,7 @@ def test_who_is_told_before_a_run_that_nobody_vouches_for_the_angles(
     known: list[dict[str, Any]] = [{"alpha_deg": a, "beta_deg": b} for a, b in places]
     known += [{"name": f"face {i}"} for i in range(bare)]
     said = unstated_angles_warning(
-        parse({"site": {"gravity": G, **site}, "position": known})
+        parse_description({"site": {"gravity": G, **site}, "position": known})
     )
     assert ("--angles 0.01" in said and "± 0.05°" in said) == warned == bool(said)
 
@@ -106,7 +106,7 @@ def test_who_is_told_before_a_run_that_nobody_vouches_for_the_angles(
 @pytest.mark.parametrize("site", [{}, {"angle_setting_deg": 0.003}])
 def test_a_word_on_the_angles_is_relied_on_and_repeated(site: dict[str, Any]) -> None:
     """Said to `solve` or in the session."""
-    said = parse({"site": {"gravity": G, **site}})
+    said = parse_description({"site": {"gravity": G, **site}})
     found = calibrated(five(), used=0.003)
     (check,) = [c for c in decided(found, said).checks if c.name == ANGLES]
     assert check.ok is None
@@ -139,7 +139,7 @@ def test_a_certificate_is_taken_at_its_word() -> None:
     site = {"gravity": G, "angles_from": "certificate 4711"}
     assert (
         unnoticed_angle_error(
-            calibrated(five()), parse({"site": site}), BOUNDS, None, None
+            calibrated(five()), parse_description({"site": site}), BOUNDS, None, None
         )
         == ""
     )

@@ -17,14 +17,19 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.document import schema
 from fieldcal.core.errors import InputError
 from fieldcal.core.frames import mounting_matrix
-from fieldcal.core.positions import FIVE, TWO, WIDE, Position
-from fieldcal.history.family import expected
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    TWO_POSITIONS,
+    WIDE_POSITIONS,
+    Position,
+)
+from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average
 
 G = 9.81
-ABOUT = description.parse({"site": {"gravity": G}})
+ABOUT = description.parse_description({"site": {"gravity": G}})
 BOUNDS = limits.read("tactical")
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 LINK = {"samples": 10000, "missing": 0, "bad": 0}
@@ -119,7 +124,7 @@ def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read
     alone = _only(whole, ("acc_bias", "acc_scale"))
     assert decided(alone).go
     # gyroscopes that were there, and gave nothing, are no sensor that is not read
-    windows = [_held(position, np.random.default_rng(1)) for position in FIVE]
+    windows = [_held(position, np.random.default_rng(1)) for position in FIVE_POSITIONS]
     made = _on_the_ladder(alone, windows)
     assert not made.go and "gyr_bias x y z was not determined" in made.reasons[0]
     without = [replace(w, mean=np.r_[w.mean[:3], [np.nan] * 3]) for w in windows]
@@ -128,7 +133,7 @@ def test_a_required_group_that_is_missing_is_no_go_unless_its_sensor_is_not_read
 
 def _on_the_ladder(found: Calibration, windows: list[Average]) -> Decision:
     known = Circumstances(temperatures=[21.0, 21.5], link=LINK, windows=windows)
-    return decide(found, replace(ABOUT, positions=FIVE), BOUNDS, known)
+    return decide(found, replace(ABOUT, positions=FIVE_POSITIONS), BOUNDS, known)
 
 
 def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
@@ -142,8 +147,8 @@ def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
     seen = replace(whole, info={}, method="scalar")
     assert decided(seen).go, "the norm of the force knows of no tilt"
     rng = np.random.default_rng(1)
-    windows = [_held(p, rng) for p in FIVE]
-    found = solve(Observations.of(FIVE, windows, G))
+    windows = [_held(p, rng) for p in FIVE_POSITIONS]
+    found = solve(Observations.of(FIVE_POSITIONS, windows, G))
     assert {"base_tilt", "angle_offset"} & set(found.groups)
     assert "level" not in [check.name for check in decided(found).checks]
     beside = replace(found, info={**found.info, "beside_tilt_sigma_deg": 0.05})
@@ -155,9 +160,9 @@ def test_a_tilt_that_nobody_saw_and_nobody_excluded_is_no_go() -> None:
 
 def test_a_position_that_does_not_fit_is_told_beside_the_decision() -> None:
     rng = np.random.default_rng(2)
-    windows = [_held(p, rng) for p in FIVE]
+    windows = [_held(p, rng) for p in FIVE_POSITIONS]
     windows[1] = _held(Position.deg(22.0, 0.4), rng)
-    made = decided(solve(Observations.of(FIVE, windows, G)))
+    made = decided(solve(Observations.of(FIVE_POSITIONS, windows, G)))
     told = [check for check in made.checks if check.name == "positions"]
     assert [check.ok for check in told] == [None]
     assert told[0].says.startswith("the position α = 22.5°, β = 0°")
@@ -202,7 +207,9 @@ def test_false_alarms_are_as_rare_as_said(runs: int) -> None:
     spread = rng.normal(0.0, usual, (tries, runs + 1))
     seen = spread + rng.normal(0.0, sigma, spread.shape)
     sigmas = np.full(runs, sigma)
-    chances = [expected(x[:-1], sigmas, usual).chance(x[-1], sigma) for x in seen]
+    chances = [
+        next_run_distribution(x[:-1], sigmas, usual).chance(x[-1], sigma) for x in seen
+    ]
     assert np.mean(np.array(chances) < 0.01) < 0.016
     assert np.mean(np.array(chances) < 0.5) > 0.3, "nor is everything expected"
 
@@ -210,7 +217,7 @@ def test_false_alarms_are_as_rare_as_said(runs: int) -> None:
 def test_many_runs_make_the_usual_spread_forgotten() -> None:
     rng = np.random.default_rng(3)
     values = rng.normal(1.0, 0.5, 200)
-    found = expected(values, np.full(200, 0.01), 0.001)
+    found = next_run_distribution(values, np.full(200, 0.01), 0.001)
     assert found.spread == pytest.approx(0.5, rel=0.15)
     assert found.mean == pytest.approx(values.mean(), abs=1e-3)
 
@@ -274,18 +281,24 @@ def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> A
 
 @pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.thorough)])
 def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) -> None:
-    rng, position, chances = np.random.default_rng(8), propose_verification(FIVE), []
+    rng, position, chances = (
+        np.random.default_rng(8),
+        propose_verification(FIVE_POSITIONS),
+        [],
+    )
     for _ in range(runs):
-        windows = [_held(p, rng) for p in FIVE]
-        found = solve(Observations.of(FIVE, windows, G))
+        windows = [_held(p, rng) for p in FIVE_POSITIONS]
+        found = solve(Observations.of(FIVE_POSITIONS, windows, G))
         chances.append(verify(found, ABOUT, position, _held(position, rng)).chance)
     assert 0.01 < np.mean(np.array(chances) < 0.05) < 0.12
     assert np.mean(chances) == pytest.approx(0.5, abs=0.1)
 
 
 def test_a_position_that_is_off_is_no_go() -> None:
-    rng, position = np.random.default_rng(9), propose_verification(FIVE)
-    found = solve(Observations.of(FIVE, [_held(p, rng) for p in FIVE], G))
+    rng, position = np.random.default_rng(9), propose_verification(FIVE_POSITIONS)
+    found = solve(
+        Observations.of(FIVE_POSITIONS, [_held(p, rng) for p in FIVE_POSITIONS], G)
+    )
     seen = verify(found, ABOUT, position, _held(position, rng, cross=0.02))
     assert seen.residual_size == pytest.approx(0.2, abs=0.05)
     made = decide(found, ABOUT, BOUNDS, Circumstances([21.0], LINK, seen))
@@ -293,7 +306,7 @@ def test_a_position_that_is_off_is_no_go() -> None:
     assert position.name in reason and "does not explain" in reason
 
 
-@pytest.mark.parametrize("positions", [TWO, FIVE, WIDE])
+@pytest.mark.parametrize("positions", [TWO_POSITIONS, FIVE_POSITIONS, WIDE_POSITIONS])
 def test_the_verification_position_is_within_the_ladder_and_new(
     positions: tuple[Position, ...],
 ) -> None:
@@ -360,14 +373,14 @@ def test_a_gyroscopes_scale_that_is_loosely_known_is_not_worse_than_none(
 def test_gravity_that_nobody_said_is_no_go_and_one_that_was_is_not() -> None:
     known = {"temperatures": [21.0], "link": LINK}
     seen = Circumstances(**known)  # type: ignore[arg-type]
-    unsaid = decide(calibration(), description.parse({}), BOUNDS, seen)
+    unsaid = decide(calibration(), description.parse_description({}), BOUNDS, seen)
     assert not unsaid.go and len(unsaid.reasons) == 1
     assert "--latitude" in unsaid.reasons[0] and "9.780 m/s²" in unsaid.reasons[0]
     for site in ({"latitude_deg": 0.0}, {"gravity": G}):
-        about = description.parse({"site": site})
+        about = description.parse_description({"site": site})
         assert decide(calibration(), about, BOUNDS, seen).go
     gyroscopes = _only(calibration(), ("gyr_bias",))
-    made = decide(gyroscopes, description.parse({}), BOUNDS, seen)
+    made = decide(gyroscopes, description.parse_description({}), BOUNDS, seen)
     assert "site" not in [check.name for check in made.checks]
 
 
@@ -400,7 +413,7 @@ def test_a_position_that_was_not_fitted_is_a_witness() -> None:
     found = calibration()
     found = replace(found, info={**found.info, "bad_position": chances})
     assert "witnesses" in [c.name for c in decided(found).checks if c.ok is False]
-    about = description.parse({"site": {"gravity": G}})
+    about = description.parse_description({"site": {"gravity": G}})
     held = Position.deg(30, 0)
     truth = 0.1 + np.array([-G * np.sin(np.pi / 6), -G * np.cos(np.pi / 6), 0.0])
     mean = np.concatenate([truth, np.full(3, 0.01)])

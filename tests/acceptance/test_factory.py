@@ -15,7 +15,7 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.grade import Grade
-from fieldcal.core.positions import FIVE, SIX_FACES, Position, forces
+from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, Position, specific_forces
 from fieldcal.core.samples import Array
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
@@ -24,14 +24,14 @@ from fieldcal.solve.estimation import RecordedRows, estimate_parameters
 from fieldcal.solve.parameter_set import ParameterSetOptions
 
 TACTICAL = limits.read("tactical")
-ABOUT = description.parse({"format": 1})
+ABOUT = description.parse_description({"format": 1})
 G = 9.81
 NINE = tuple(Position.deg(a, b) for a in (-45, 0, 45) for b in (-30, 0, 30))
 SEEDS = [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in (1, 2, 3))]
 
 
 def found(square: float, positions: tuple[Position, ...] = SIX_FACES) -> Calibration:
-    seen = observe(positions, forces(positions, G), sigma=1e-4)
+    seen = observe(positions, specific_forces(positions, G), sigma=1e-4)
     return solve(seen, tilt="none", factory=FactoryErrors(square))
 
 
@@ -63,7 +63,7 @@ def test_it_says_how_square_axes_were_taken_to_be(
 
 def test_cross_coupling_that_is_estimated_is_relied_on_by_nothing() -> None:
     result = solve(
-        observe(NINE, forces(NINE, G)), cross=True, factory=FactoryErrors(3e-4)
+        observe(NINE, specific_forces(NINE, G)), cross=True, factory=FactoryErrors(3e-4)
     )
     assert check_factory_errors(result, ABOUT, TACTICAL) == []
     assert check_factory_errors(found(0.0), ABOUT, TACTICAL) == []
@@ -87,8 +87,10 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
     plain: list[Array] = []
     for _ in range(25):
         mixing = np.eye(3) + rng.normal(0, 5e-4, (3, 3)) * (1 - np.eye(3))
-        mean = forces(FIVE, G) @ mixing.T + rng.normal(0, 1e-4, (len(FIVE), 3))
-        seen = observe(FIVE, mean, sigma=1e-4)
+        mean = specific_forces(FIVE_POSITIONS, G) @ mixing.T + rng.normal(
+            0, 1e-4, (len(FIVE_POSITIONS), 3)
+        )
+        seen = observe(FIVE_POSITIONS, mean, sigma=1e-4)
         for square, pulls in ((5e-4, off), (0.0, plain)):
             result = solve(seen, tilt="none", factory=FactoryErrors(square))
             pulls += plain_pulls(result)
@@ -103,12 +105,12 @@ def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
     off: list[Array] = []
     plain: list[Array] = []
     for _ in range(25):
-        force = forces(FIVE, G)
+        force = specific_forces(FIVE_POSITIONS, G)
         bent = rng.normal(0, 2e-5, 3) * force**2
         bent += rng.normal(0, 1.961e-4, 3) * np.abs(force)  # as much at 1 g
         bent += rng.normal(0, 2.039e-7, 3) * force**3  # as much at 10 g
-        mean = force + bent + rng.normal(0, 1e-4, (len(FIVE), 3))
-        seen = observe(FIVE, mean, sigma=1e-4)
+        mean = force + bent + rng.normal(0, 1e-4, (len(FIVE_POSITIONS), 3))
+        seen = observe(FIVE_POSITIONS, mean, sigma=1e-4)
         for left, pulls in ((FactoryErrors(0.0, 2e-5), off), (FactoryErrors(), plain)):
             result = solve(seen, tilt="none", factory=left)
             pulls += plain_pulls(result)
@@ -120,7 +122,7 @@ def test_a_kink_is_not_taken_for_a_curve() -> None:
     """Inclined axes tell K2, and a kink at zero would be in the bias beside it."""
     inclined = tuple(Position.deg(a, b) for a in (45, -45, 135, -135) for b in (0, 35))
     places = (*SIX_FACES, *inclined)
-    force = forces(places, G)
+    force = specific_forces(places, G)
     mean = force + 1.961e-4 * np.abs(force)
     seen = observe(places, mean, sigma=1e-5)
     result = solve(seen, tilt="none", factory=FactoryErrors(0.0, 2e-5))
@@ -131,7 +133,7 @@ def test_a_kink_is_not_taken_for_a_curve() -> None:
 def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
     """Each bias keeps a part of its last change; without it the estimate is far off."""
     rng, off, plain = np.random.default_rng(1), list[Array](), list[Array]()
-    force = forces(SIX_FACES, G)
+    force = specific_forces(SIX_FACES, G)
     came = np.vstack([np.zeros(3), np.clip(np.diff(force, axis=0) / 9.80665, -1, 1)])
     for _ in range(60):
         mean = force + rng.normal(0, 5e-4, 3) * came
@@ -181,7 +183,7 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
 def test_gyroscopes_that_feel_gravity_may_have_another_bias_without() -> None:
     """At home g12 turns a bias by g12 g, and nothing of small angles tells it apart."""
     felt, level = 9e-6, (Position.deg(0, 0), Position.deg(1, 0), Position.deg(0, 1))
-    seen = observe(level, forces(level, G), gyr=np.zeros((3, 3)))
+    seen = observe(level, specific_forces(level, G), gyr=np.zeros((3, 3)))
     plain = solve(seen, tilt="none").vector("gyr_bias")[1]
     result = solve(seen, tilt="none", factory=FactoryErrors(g_sensitivity=felt))
     more = np.sqrt(result.vector("gyr_bias")[1] ** 2 - plain**2)
@@ -211,7 +213,7 @@ def test_a_size_in_another_unit_is_refused(left: dict[str, float]) -> None:
 def test_the_grade_says_what_nobody_states(
     device: dict[str, object], left: tuple[float, float, float]
 ) -> None:
-    about = description.parse({"format": 1, "device": device})
+    about = description.parse_description({"format": 1, "device": device})
     found = factory_errors(about)
     assert (found.cross_coupling, found.quadratic, found.g_sensitivity) == left
 
@@ -227,7 +229,9 @@ def test_the_grade_says_what_nobody_states(
 def test_a_wrong_angle_is_not_taken_for_a_coarse_device(
     moves: float, shows: float, ok: bool | None
 ) -> None:
-    seen = observe(SIX_FACES, forces(SIX_FACES, G) * [1.0, 0.96, 1.0], sigma=1e-4)
+    seen = observe(
+        SIX_FACES, specific_forces(SIX_FACES, G) * [1.0, 0.96, 1.0], sigma=1e-4
+    )
     result = solve(seen, tilt="none", factory=FactoryErrors(1e-3))
     told = {"grade": "consumer", "because": "acc_scale.y is -0.04 from nominal",
             "beyond": ("acc_scale.y",)}  # fmt: skip
@@ -247,10 +251,12 @@ def test_devices_of_consumer_grade_are_within_its_uncertainties() -> None:
     off: list[Array] = []
     plain: list[Array] = []
     for _ in range(30):
-        force = forces(FIVE, G)
+        force = specific_forces(FIVE_POSITIONS, G)
         mixing = np.eye(3) + rng.normal(0, 1e-2, (3, 3)) * (1 - np.eye(3))
         mean = force @ mixing.T + rng.normal(0, 2.5e-4, 3) * force * force
-        seen = observe(FIVE, mean + rng.normal(0, 1e-3, mean.shape), sigma=1e-3)
+        seen = observe(
+            FIVE_POSITIONS, mean + rng.normal(0, 1e-3, mean.shape), sigma=1e-3
+        )
         for grade, pulls in (("consumer", off), ("tactical", plain)):
             left = limits.read(grade).factory
             result = solve(seen, tilt="none", factory=left)

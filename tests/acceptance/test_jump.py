@@ -11,7 +11,7 @@ import pytest
 from fieldcal.acceptance.decision import Circumstances, decide
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.calibration import Calibration, limits
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 BOUNDS = limits.read("tactical")
 REPEAT = {"acc_bias": BOUNDS.acc_bias_repeat, "gyr_bias": BOUNDS.gyr_bias_repeat}
@@ -49,7 +49,7 @@ def test_nothing_is_said_where_nothing_jumps_or_no_limit_is_known() -> None:
 
 def test_biases_of_another_device_are_no_go() -> None:
     found = jumping(acc_bias__x=(0.05, 0.002), gyr_bias__x=(0.0112, 1e-4))
-    made = decide(found, parse({"site": {"latitude_deg": 50.0}}), BOUNDS,
+    made = decide(found, parse_description({"site": {"latitude_deg": 50.0}}), BOUNDS,
                   Circumstances())  # fmt: skip
     (check,) = [c for c in made.checks if c.name == "jump"]
     assert check.ok is False and not made.go

@@ -14,7 +14,7 @@ from fieldcal.acceptance.assessment import assess
 from fieldcal.acceptance.remedy import cheapest_remedy
 from fieldcal.calibration import Calibration, limits
 from fieldcal.calibration.limits import GradeLimits
-from fieldcal.core.positions import FIVE, TWO, ladder
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, ladder_settings
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
@@ -42,7 +42,7 @@ def decided(
 
 @pytest.mark.thorough  # as test_adaptive has it of a run that asks for it at once
 def test_the_position_that_is_asked_for_makes_it_go(tmp_path: Path) -> None:
-    five = [p.degrees or (0.0, 0.0) for p in FIVE]
+    five = [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS]
     loose = replace(LIMITS, acc_bias_sigma=1.0, acc_scale_sigma=1.0)
     first = decided(tmp_path / "first", five, loose)
     assert first.info["decision"]["go"] and "remedy" not in first.info["decision"]
@@ -52,7 +52,9 @@ def test_the_position_that_is_asked_for_makes_it_go(tmp_path: Path) -> None:
     remedy = then.info["decision"]["remedy"]
     assert not then.info["decision"]["go"] and "then GO is expected" in remedy["says"]
     besides = [(p["alpha_deg"], p["beta_deg"]) for p in remedy["positions"]]
-    assert 1 <= len(besides) <= 3 and set(besides) <= set(ladder(FIVE))
+    assert 1 <= len(besides) <= 3 and set(besides) <= set(
+        ladder_settings(FIVE_POSITIONS)
+    )
     mended = decided(tmp_path / "mended", [*five, *besides], tight)
     assert mended.info["decision"]["go"], mended.info["decision"]["reasons"]
 
@@ -79,7 +81,7 @@ def about(tmp_path: Path, angles: list[tuple[float, float]]) -> Session:
 
 
 def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
-    five = [p.degrees or (0.0, 0.0) for p in FIVE]
+    five = [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS]
     names = tuple(f"gyr_bias.{a}" for a in "xyz")
     found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
     session = about(tmp_path / "s", five)
@@ -118,7 +120,7 @@ def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> N
 
 
 def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
-    two = [p.degrees or (0.0, 0.0) for p in TWO]
+    two = [p.degrees or (0.0, 0.0) for p in TWO_POSITIONS]
     names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xy")
     session = about(tmp_path / "s", two)
     found = found_with(names, [1e-3] * 4)
@@ -126,7 +128,7 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
         found, session.about, session.about.positions, LIMITS, ["acc_scale"], 1e-4, 30.0
     )
     assert remedy is not None and "not determined yet" in remedy.says
-    assert set(remedy.positions) <= set(ladder(TWO)) - set(two)
+    assert set(remedy.positions) <= set(ladder_settings(TWO_POSITIONS)) - set(two)
     hopeless = replace(LIMITS, acc_scale_sigma=1e-9)
     assert (
         cheapest_remedy(
@@ -143,7 +145,7 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
-    session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE])
+    session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS])
     doubtful = {"name": session.positions[2].name, "probability": 0.99}
     found = replace(
         found_with(("acc_bias.x",), [1e-3]), info={"doubtful_position": doubtful}

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from fieldcal.acceptance.site import gravity_contradiction
-from fieldcal.session.description import Description, parse
+from fieldcal.session.description import Description, parse_description
 
 
 def at(**site: Any) -> Description:
-    return parse({"site": site})
+    return parse_description({"site": site})
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from fieldcal.acceptance.decision import Circumstances, decide
 from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.calibration import Calibration, limits
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 BOUNDS = limits.read("tactical")
 
@@ -40,7 +40,7 @@ def test_what_turns_leave_by_chance_or_harmlessly_is_no_reason(
 
 def test_outputs_that_are_exchanged_are_no_go() -> None:
     found = calibration(chi2=45344.0, dof=12, scatter_rad=0.029)
-    about = parse({"site": {"latitude_deg": 50.0}})
+    about = parse_description({"site": {"latitude_deg": 50.0}})
     made = decide(found, about, BOUNDS, Circumstances())
     (check,) = [c for c in made.checks if c.name == "turns"]
     assert check.ok is False

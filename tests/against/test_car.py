@@ -63,7 +63,7 @@ def calm(directions: list[list[float]], angles: bool) -> tuple[Block, object]:
         | ({"alpha_deg": 0.0, "beta_deg": 0.0} if angles else {})
         for i in range(len(directions))
     ]
-    about = description.parse({"format": 1, "position": tables})
+    about = description.parse_description({"format": 1, "position": tables})
     return Block.of(t, acc), about
 
 

@@ -33,7 +33,7 @@ def played(device: dict[str, Any], seed: int, later: float = 0.0) -> tuple[Any, 
     block = Block.of(
         table[:, 0] + later, table[:, 1:4], table[:, 4:7], unknown, unknown, unknown
     )
-    about = description.parse(
+    about = description.parse_description(
         {
             "format": 1,
             "site": {"gravity": strapdown.GRAVITY},

@@ -39,7 +39,7 @@ def described(table: Array) -> tuple[Block, Any]:
         table[:, 0], table[:, 1:4], table[:, 4:], unknown, unknown, unknown
     )
     about = {"format": 1, "site": {"gravity": G}, "position": strapdown.schedule()}
-    return block, description.parse(about)
+    return block, description.parse_description(about)
 
 
 @pytest.mark.thorough

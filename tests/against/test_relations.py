@@ -141,7 +141,7 @@ def test_what_a_simulator_does_not_know_is_no_misfit() -> None:
 
 
 def test_the_noise_of_a_window_is_known_as_well_as_is_said() -> None:
-    about = description.parse(
+    about = description.parse_description(
         {"format": 1, "position": [{"start_s": 0.0, "end_s": 2.0}]}
     )
     rng, seen = np.random.default_rng(9), []

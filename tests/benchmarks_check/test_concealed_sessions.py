@@ -10,7 +10,7 @@ from benchmarks.concealed.draws import size
 from benchmarks.concealed.judging import judged
 from benchmarks.concealed.others import OUTSIDE, example
 from benchmarks.concealed.tables import GROUPS, groups
-from fieldcal.core.positions import forces, speeds
+from fieldcal.core.positions import specific_forces, unknown_axis_speeds
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
 from fieldcal.sim_device.effects import ids, kind
@@ -56,13 +56,15 @@ def test_attitudes_told_as_one_turn_are_those_of_the_angles() -> None:
     session = kinds()["any attitude"][0](np.random.default_rng(1))
     told = session.about.positions
     plain = replace(session, attitudes=False).about.positions
-    np.testing.assert_allclose(forces(told, 9.8), forces(plain, 9.8), atol=1e-6)
+    np.testing.assert_allclose(
+        specific_forces(told, 9.8), specific_forces(plain, 9.8), atol=1e-6
+    )
 
 
 def test_a_table_of_known_speed_tells_nothing_else() -> None:
     session = kinds()["nothing, speeds"][0](np.random.default_rng(1))
     positions = session.about.positions
-    speed, _ = speeds(positions)
+    speed, _ = unknown_axis_speeds(positions)
     assert (speed > 0).sum() == len(positions) - 2
     assert not any(p.oriented or p.rate for p in positions)
 

@@ -13,7 +13,7 @@ def test_units_are_odd_and_shifted_as_often_as_said() -> None:
     some = units(np.random.default_rng(1), 400, odd=0.01, shift=3.0)
     odd = [one for one in some if one.serial.startswith("odd")]
     assert len(odd) == 4
-    value, sigma = sessions.values(some, "acc_bias.x")
+    value, sigma = sessions.parameter_values(some, "acc_bias.x")
     assert np.median(value[200:]) - np.median(value[:200]) > 0.04
     assert (sigma == 0.01).all()
     assert {one.levels["lot"] for one in some[200:]} == {"B"}

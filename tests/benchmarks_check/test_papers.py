@@ -24,7 +24,7 @@ from benchmarks.papers import (
     tilted,
     warming,
 )
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE_POSITIONS
 
 UNTIL = np.array([15.0, 30.0, 60.0, 120.0])
 
@@ -94,7 +94,7 @@ def test_the_scatter_of_table_3_is_what_the_printed_solution_makes_of_noise() ->
     assert noise == pytest.approx(0.7, abs=0.1)
     angle = over_time(tables()["table3"])["dalpha03_deg"][2]
     assert angle == pytest.approx(printed_sigma()["dalpha03_deg"] * noise, rel=0.25)
-    (limit,) = bound(OFFSET, FIVE)[6:7]
+    (limit,) = bound(OFFSET, FIVE_POSITIONS)[6:7]
     assert angle > 10 * limit * noise
     assert np.abs(tables()["table3"]["dalpha03_deg"]).max() > 1.4
 

@@ -14,7 +14,7 @@ from observed import BIAS, COUPLING, SCALE, G, observe, outputs
 from fieldcal.calibration import Calibration, Nominal, compare
 from fieldcal.calibration.document import schema
 from fieldcal.core.errors import InputError
-from fieldcal.core.positions import FIVE, SIX_FACES, WIDE
+from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, WIDE_POSITIONS
 from fieldcal.core.samples import Array, Block
 from fieldcal.solve import solve
 
@@ -127,8 +127,17 @@ def results() -> list[Calibration]:
     by_hand = observe(SIX_FACES, outputs(SIX_FACES))
     return [
         made(),
-        solve(observe(FIVE, outputs(FIVE, offset_deg=(1, -1)) + noise, gyr=gyr)),
-        solve(observe(WIDE, outputs(WIDE) + noise), method="five_position"),
+        solve(
+            observe(
+                FIVE_POSITIONS,
+                outputs(FIVE_POSITIONS, offset_deg=(1, -1)) + noise,
+                gyr=gyr,
+            )
+        ),
+        solve(
+            observe(WIDE_POSITIONS, outputs(WIDE_POSITIONS) + noise),
+            method="five_position",
+        ),
         solve(by_hand, method="scalar"),
         solve(by_hand, method="least_squares"),
     ]
@@ -210,6 +219,6 @@ def test_no_document_ends_in_anything_but_a_clear_error(key: str, junk: Any) -> 
 
 
 def test_gravity_of_another_place_shows_as_scale() -> None:
-    u = outputs(WIDE, g=G * 1.001)
-    result = solve(observe(WIDE, u), tilt="none")
+    u = outputs(WIDE_POSITIONS, g=G * 1.001)
+    result = solve(observe(WIDE_POSITIONS, u), tilt="none")
     np.testing.assert_allclose(result.vector("acc_scale")[0], SCALE * 1.001, rtol=1e-6)

@@ -138,7 +138,7 @@ def test_killed_at_any_moment_the_session_holds_all_that_was_in_the_file(
             stderr=subprocess.DEVNULL,
         )
         wait_for_samples(folder, process, int(rng.uniform(5_000, 200_000)))
-        there = len(sample_files.read(folder / "samples.arrows")[0])
+        there = len(sample_files.read_samples(folder / "samples.arrows")[0])
         process.send_signal(signal.SIGKILL)
         process.wait()
         session = Session.open(folder)
@@ -226,7 +226,9 @@ def test_a_device_that_goes_silent_keeps_what_it_said(
 
 def test_observations_of_zero_gravity_are_refused() -> None:
     from fieldcal.core.errors import InputError
-    from fieldcal.core.positions import TWO
+    from fieldcal.core.positions import TWO_POSITIONS
 
     with pytest.raises(InputError, match="gravity is 0"):
-        Observations(TWO, np.zeros((2, 6)), np.tile(np.eye(6), (2, 1, 1)), 0.0)
+        Observations(
+            TWO_POSITIONS, np.zeros((2, 6)), np.tile(np.eye(6), (2, 1, 1)), 0.0
+        )

@@ -20,7 +20,11 @@ from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.commands.console import ShownConsole
-from fieldcal.core.shown import UNSEEN, one_line, shown
+from fieldcal.core.escaping import (
+    INVISIBLE_CATEGORIES,
+    escape_invisible,
+    escape_line,
+)
 from fieldcal.run import junit
 from fieldcal.session import description
 from fieldcal.sim_device.profile import Profile
@@ -41,7 +45,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> Said:
         except SystemExit:
             pass
         both = "".join(capsys.readouterr())
-        assert shown(both) == both
+        assert escape_invisible(both) == both
         return both
 
     return call
@@ -51,10 +55,12 @@ def said(capsys: pytest.CaptureFixture[str]) -> Said:
 def test_nothing_unseen_is_left_and_what_is_shown_stays(text: str) -> None:
     import unicodedata
 
-    once = shown(text)
-    assert shown(once) == once
-    assert not {unicodedata.category(c) for c in once if c not in "\n\t"} & {*UNSEEN}
-    assert "\n" not in one_line(text)
+    once = escape_invisible(text)
+    assert escape_invisible(once) == once
+    assert not {unicodedata.category(c) for c in once if c not in "\n\t"} & {
+        *INVISIBLE_CATEGORIES
+    }
+    assert "\n" not in escape_line(text)
 
 
 def test_a_console_draws_and_carries_out_nothing() -> None:
@@ -132,7 +138,7 @@ def test_names_of_arrays_and_of_files(said: Said, tmp_path: Path) -> None:
 
 @given(st.text(), st.text())
 def test_junit_is_well_formed_whatever_a_name_holds(name: str, text: str) -> None:
-    about = description.parse(
+    about = description.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "name": name}]}
     )
     marks = [{"event": "wrong", "position": 0, "text": text}]

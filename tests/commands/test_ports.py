@@ -11,9 +11,9 @@ from wires import STREAMS, nmea
 from fieldcal.cli import main
 from fieldcal.core.errors import DeviceSilent
 from fieldcal.drivers import probe as module
-from fieldcal.drivers.columns import guess
+from fieldcal.drivers.column_guess import guess_text_options
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.probe import bauds, probe
+from fieldcal.drivers.probe import baud_rates, probe_port
 
 
 def sample(name: str) -> Say:
@@ -24,7 +24,7 @@ def sample(name: str) -> Say:
 @pytest.mark.parametrize("name", sorted(set(STREAMS) - {"text"}))
 def test_a_format_is_told_by_its_frames(name: str) -> None:
     with talking(sample(name)) as port:
-        found = probe(port, 0.5)
+        found = probe_port(port, 0.5)
         assert found.format == name
         assert found.rate_hz > 0
         with open_driver(found.url) as imu:
@@ -33,7 +33,7 @@ def test_a_format_is_told_by_its_frames(name: str) -> None:
 
 def test_the_rate_is_that_of_the_samples_in_the_time_it_listened() -> None:
     pieces = STREAMS["mip"](100, np.random.default_rng(1)).pieces
-    found = module._told("/dev/x", 115200, b"".join(pieces), took=0.5)
+    found = module._identify("/dev/x", 115200, b"".join(pieces), took=0.5)
     assert found is not None and found.rate_hz == pytest.approx(200, rel=0.03)
     assert (
         found.says == f"mip at 115200 baud, about {found.rate_hz:.0f} samples a second"
@@ -62,7 +62,7 @@ def test_what_had_waited_in_the_port_is_no_rate(
 
     monkeypatch.setattr(module, "monotonic", lambda: now[0])
     monkeypatch.setattr(module, "open_port", lambda port, baud: Backlog())
-    found = probe("/dev/x", 1.0, [115200])
+    found = probe_port("/dev/x", 1.0, [115200])
     assert found.rate_hz == pytest.approx(48, rel=0.05)
 
 
@@ -96,7 +96,7 @@ def test_an_autopilot_is_told_by_its_packets(
     sends: tuple[str, ...], query: str, says: str
 ) -> None:
     with talking(packets(*sends)) as port:
-        found = probe(port, 0.5)
+        found = probe_port(port, 0.5)
         assert found.format == "mavlink" and re.search(says, found.says)
         assert found.url == f"mavlink:{port}?baud={found.baud}{query}"
         with open_driver(f"serial:{port}?format=xsens") as imu:
@@ -118,7 +118,7 @@ def test_lines_of_numbers_are_told_with_their_columns(
         (entry,) = shown["ports"]
         answer = entry["answer"]
         assert answer["format"] == "text"
-        assert answer["baud"] == bauds()[0]
+        assert answer["baud"] == baud_rates()[0]
         assert answer["url"].endswith(
             "&columns=t,seq,gx,gy,gz,ax,ay,az,temperature&t_unit=ms&acc_unit=g"
             "&gyr_unit=deg/s&prefix=IMU&checksum=xor"
@@ -130,7 +130,7 @@ def test_lines_of_numbers_are_told_with_their_columns(
 
 def test_rates_whose_unit_nothing_tells_are_said_to_be_open() -> None:
     with talking(lambda i: b"%d,0.01,-9.81,0.02,0.001,-.002,.003\n" % (5 * i)) as port:
-        found = probe(port, 0.5)
+        found = probe_port(port, 0.5)
     assert "gyr_unit" not in found.url and "add &gyr_unit=deg/s" in found.says
 
 
@@ -145,10 +145,10 @@ def test_the_table_says_how_to_use_it(capsys: pytest.CaptureFixture[str]) -> Non
 def test_silence_and_noise_and_no_port(capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(2)
     with talking(lambda i: b"") as port:
-        assert "nothing comes" in probe(port, 0.1).says
+        assert "nothing comes" in probe_port(port, 0.1).says
     with talking(lambda i: rng.bytes(30)) as port:
-        assert "no format that is known" in probe(port, 0.1).says
-    assert "no such port" in probe("/dev/nowhere", 0.1).says
+        assert "no format that is known" in probe_port(port, 0.1).says
+    assert "no such port" in probe_port("/dev/nowhere", 0.1).says
     assert main(["ports", "--probe", "/dev/nowhere", "--json"]) == 3
     assert json.loads(capsys.readouterr().out)["ports"][0]["answer"]["url"] == ""
 
@@ -171,11 +171,11 @@ def test_separators_are_found(separator: str) -> None:
     mark = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}[separator]
     rows = [[0.01 * i, 0, 9.8, 0.1, 0, 0, 0] for i in range(20)]
     text = "".join(mark.join(map(str, row)) + "\r\n" for row in rows)
-    found = guess(text.encode(), 0.2)
+    found = guess_text_options(text.encode(), 0.2)
     assert found is not None
     assert found.startswith("columns=t,ax,ay,az,gx,gy,gz")
 
 
 def test_words_are_no_numbers() -> None:
-    assert guess(b"login: \nPassword: \n" * 20, 1.0) is None
-    assert guess(b"", 1.0) is None
+    assert guess_text_options(b"login: \nPassword: \n" * 20, 1.0) is None
+    assert guess_text_options(b"", 1.0) is None

@@ -25,28 +25,30 @@ def turned(a: float, b: float) -> Array:
 
 @given(angle, angle)
 def test_turns_are_right_handed_rotations_about_z_then_x(a: float, b: float) -> None:
-    np.testing.assert_allclose(frames.turn(a, b), turned(a, b), atol=1e-12)
+    np.testing.assert_allclose(frames.direction_cosines(a, b), turned(a, b), atol=1e-12)
 
 
 def test_angles_are_read_back_from_three_turns_also_where_beta_is_a_right_angle() -> (
     None
 ):
     for alpha, beta, gamma in itertools.product((-3.0, 0.0, 0.7), (-1.2, 0.4), (2, -1)):
-        back = frames.turns_of(frames.turn(alpha, beta, gamma))
+        back = frames.angles_of_direction_cosines(
+            frames.direction_cosines(alpha, beta, gamma)
+        )
         np.testing.assert_allclose(back, [alpha, beta, gamma], atol=1e-12)
     for alpha, beta in itertools.product((-2.5, 0.3, 2.0), (-np.pi / 2, np.pi / 2)):
-        back = frames.turns_of(frames.turn(alpha, beta))
+        back = frames.angles_of_direction_cosines(frames.direction_cosines(alpha, beta))
         np.testing.assert_allclose(back, [alpha, beta, 0.0], atol=1e-12)
         # the third turn is about the same axis, and goes into the first
-        one = frames.turn(alpha, beta, 0.4)
-        again = frames.turns_of(one)
+        one = frames.direction_cosines(alpha, beta, 0.4)
+        again = frames.angles_of_direction_cosines(one)
         assert again[2] == 0.0
-        np.testing.assert_allclose(frames.turn(*again), one, atol=1e-12)
+        np.testing.assert_allclose(frames.direction_cosines(*again), one, atol=1e-12)
 
 
 def test_many_turns_at_once_are_the_single_ones() -> None:
     alpha, beta = [[0], [1], [-2]], [0, 2]
-    every = frames.turn(alpha, beta)
+    every = frames.direction_cosines(alpha, beta)
     assert every.shape == (3, 2, 3, 3)
     for (i, (a,)), (j, b) in itertools.product(enumerate(alpha), enumerate(beta)):
         np.testing.assert_allclose(every[i, j], turned(a, b), atol=1e-12)
@@ -55,11 +57,11 @@ def test_many_turns_at_once_are_the_single_ones() -> None:
 def test_third_line_of_5_has_a_plus_sign() -> None:
     a, b, g = np.deg2rad(30), np.deg2rad(5), 9.81
     expected = [-g * np.sin(a), -g * np.cos(a) * np.cos(b), g * np.cos(a) * np.sin(b)]
-    np.testing.assert_allclose(frames.force(a, b, g), expected)
+    np.testing.assert_allclose(frames.specific_force_at_rest(a, b, g), expected)
 
 
 def test_forces_of_many_turns_are_rows() -> None:
-    found = frames.force([0.0, 0.5], 0.1, 9.81)
+    found = frames.specific_force_at_rest([0.0, 0.5], 0.1, 9.81)
     assert found.shape == (2, 3)
     expected = [turned(a, 0.1) @ [0, -9.81, 0] for a in (0.0, 0.5)]
     np.testing.assert_allclose(found, expected, atol=1e-12)
@@ -68,22 +70,22 @@ def test_forces_of_many_turns_are_rows() -> None:
 def test_earth_rate_at_home_and_turned() -> None:
     phi, a, b = np.deg2rad([50.0, 30.0, 5.0])
     omega = frames.EARTH_RATE
-    home = frames.earth_rate_home(phi)
+    home = frames.earth_rate_at_home(phi)
     np.testing.assert_allclose(home, [0, -omega * np.sin(phi), omega * np.cos(phi)])
     third = omega * (np.sin(phi) * np.cos(a) * np.sin(b) + np.cos(phi) * np.cos(b))
-    np.testing.assert_allclose((frames.turn(a, b) @ home)[2], third)
+    np.testing.assert_allclose((frames.direction_cosines(a, b) @ home)[2], third)
 
 
 def test_earth_turns_once_in_a_sidereal_day() -> None:
     day = 23 * 3600 + 56 * 60 + 4.09
     assert 2 * np.pi / frames.EARTH_RATE == pytest.approx(day, abs=0.02)
-    speed = np.linalg.norm(frames.earth_rate_home(0.7))
+    speed = np.linalg.norm(frames.earth_rate_at_home(0.7))
     assert speed == pytest.approx(frames.EARTH_RATE)
 
 
 @given(angle, st.floats(-1.5, 1.5), st.floats(0.1, 20))
 def test_angles_are_read_back_from_the_force(a: float, b: float, g: float) -> None:
-    seen = frames.angles_of(g * turned(a, b) @ [0, -1, 0])
+    seen = frames.angles_of_force_direction(g * turned(a, b) @ [0, -1, 0])
     if abs(np.cos(a)) < 1e-5:
         # along the axis of the second turn no force tells of it
         assert abs(seen[0]) == pytest.approx(np.pi / 2, abs=2e-5)
@@ -108,7 +110,7 @@ def test_angles_are_read_back_from_the_force(a: float, b: float, g: float) -> No
 def test_angles_of_the_faces_and_edges(
     along: tuple[float, float, float], expected: tuple[float, float]
 ) -> None:
-    alpha, beta = np.rad2deg(frames.angles_of(along))
+    alpha, beta = np.rad2deg(frames.angles_of_force_direction(along))
     assert beta == pytest.approx(expected[1])
     assert (alpha - expected[0]) % 360 == pytest.approx(0.0, abs=1e-9)
 
@@ -116,7 +118,7 @@ def test_angles_of_the_faces_and_edges(
 def test_of_another_rate_only_what_lies_along_the_turn_lasts() -> None:
     """The mean over a whole turn, by turning in small steps."""
     rates = np.array([[0.3, -0.2, 0.6], [0, 0, 0], [0, 0, 1e-3], [-5, 0, 0]])
-    found = frames.mean_rotation(rates)
+    found = frames.axis_projections(rates)
     for rate, left in zip(rates, found, strict=True):
         speed = np.linalg.norm(rate)
         axis = rate / speed if speed else rate

@@ -16,7 +16,7 @@ from fieldcal.core.errors import InputError
 )
 def test_gravity_on_the_ellipsoid_is_as_published(phi: float, published: float) -> None:
     for latitude in (phi, -phi):
-        assert gravity.gravity(latitude) == pytest.approx(published, abs=2e-9)
+        assert gravity.normal_gravity(latitude) == pytest.approx(published, abs=2e-9)
 
 
 def of_the_potential(latitude_deg: float, height: float) -> float:
@@ -49,11 +49,13 @@ def test_gravity_above_is_the_gradient_of_the_normal_potential(height: float) ->
     tolerance = 1.2e-10 * abs(height) + 1e-11  # of the terms that the series leaves out
     for latitude in np.linspace(-80, 90, 6):
         truth = of_the_potential(latitude, height)
-        assert gravity.gravity(latitude, height) == pytest.approx(truth, abs=tolerance)
+        assert gravity.normal_gravity(latitude, height) == pytest.approx(
+            truth, abs=tolerance
+        )
 
 
 def test_gravity_falls_with_height_by_the_free_air_gradient() -> None:
-    fall = gravity.gravity(45, 1000) - gravity.gravity(45)
+    fall = gravity.normal_gravity(45, 1000) - gravity.normal_gravity(45)
     assert fall == pytest.approx(-3.085e-3, abs=2e-6)
 
 
@@ -65,7 +67,7 @@ def test_standard_gravity_is_the_one_of_1901() -> None:
 def test_the_poles_the_deepest_and_the_highest_place_count(
     place: tuple[float, float],
 ) -> None:
-    assert 9.4 < gravity.gravity(*place) < 9.9
+    assert 9.4 < gravity.normal_gravity(*place) < 9.9
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_a_place_that_is_none_is_refused_with_its_bounds(
     place: tuple[float, float],
 ) -> None:
     with pytest.raises(InputError) as told:
-        gravity.gravity(*place)
+        gravity.normal_gravity(*place)
     assert str(told.value) == (
         f"no gravity for latitude {place[0]}° and height {place[1]} m: "
         "latitude is -90 to 90°, height -1000 to 100000 m"

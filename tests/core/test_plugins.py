@@ -7,7 +7,7 @@ from types import ModuleType
 import pytest
 
 from fieldcal import drivers, effects
-from fieldcal.core.plugins import class_in, names
+from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.physics.effect import Effect
 
 
@@ -29,26 +29,28 @@ def module_with(name: str, *classes: str) -> str:
 
 
 def test_the_class_that_a_module_defines_is_found() -> None:
-    assert class_in(module_with("m_one", "One"), Base).__name__ == "One"
-    assert class_in(module_with("m_two", "One", "Two"), Base).__name__ == "Two"
-    assert class_in(module_with("m_own", "One", "_Two"), Base).__name__ == "One"
-    found = class_in("fieldcal.effects.hum", Effect)
+    assert plugin_class(module_with("m_one", "One"), Base).__name__ == "One"
+    assert plugin_class(module_with("m_two", "One", "Two"), Base).__name__ == "Two"
+    assert plugin_class(module_with("m_own", "One", "_Two"), Base).__name__ == "One"
+    found = plugin_class("fieldcal.effects.hum", Effect)
     assert found.__module__ == "fieldcal.effects.hum"
 
 
 def test_none_is_refused_by_name() -> None:
     told = "m_none must define one public subclass of Base; it has none$"
     with pytest.raises(LookupError, match=told):
-        class_in(module_with("m_none"), Base)
+        plugin_class(module_with("m_none"), Base)
 
 
 def test_two_are_refused() -> None:
     name = module_with("m_twins", "One")
     exec("class Twin(Base): pass", vars(sys.modules[name]))
     with pytest.raises(LookupError, match="it has One, Twin"):
-        class_in(name, Base)
+        plugin_class(name, Base)
 
 
 def test_names_are_those_of_the_files() -> None:
-    assert "hum" in names(effects.__path__)
-    assert list(names(drivers.__path__)) == sorted(names(drivers.__path__))
+    assert "hum" in module_names(effects.__path__)
+    assert list(module_names(drivers.__path__)) == sorted(
+        module_names(drivers.__path__)
+    )

@@ -6,16 +6,16 @@ from scipy.spatial.transform import Rotation
 
 from fieldcal.core import positions
 from fieldcal.core.positions import (
-    FIVE,
-    SETS,
+    FIVE_POSITIONS,
+    POSITION_SETS,
     SIX_FACES,
-    TWO,
-    WIDE,
+    TWO_POSITIONS,
+    WIDE_POSITIONS,
     Position,
-    angles,
-    forces,
-    ladder,
-    rates,
+    alpha_beta_angles,
+    ladder_settings,
+    specific_forces,
+    table_rates,
 )
 
 UNKNOWN = Position("as it lies")
@@ -46,20 +46,22 @@ def test_a_position_is_oriented_by_both_angles(position: Position) -> None:
 
 def test_angles_and_rates_that_are_not_known() -> None:
     table = Position("turning", 0.1, 0.2, (0.0, 0.5, 0.0))
-    alpha, beta = angles([table, UNKNOWN])
+    alpha, beta = alpha_beta_angles([table, UNKNOWN])
     np.testing.assert_array_equal(alpha, [0.1, np.nan])
     np.testing.assert_array_equal(beta, [0.2, np.nan])
-    np.testing.assert_array_equal(rates([table, UNKNOWN]), [[0, 0.5, 0], [0, 0, 0]])
+    np.testing.assert_array_equal(
+        table_rates([table, UNKNOWN]), [[0, 0.5, 0], [0, 0, 0]]
+    )
 
 
 def test_no_position_has_no_angles_and_no_rates() -> None:
-    assert angles([])[0].shape == angles([])[1].shape == (0,)
-    assert rates([]).shape == forces([], 9.81).shape == (0, 3)
+    assert alpha_beta_angles([])[0].shape == alpha_beta_angles([])[1].shape == (0,)
+    assert table_rates([]).shape == specific_forces([], 9.81).shape == (0, 3)
 
 
 def test_forces_are_gravity_seen_from_the_turned_device() -> None:
-    found = forces([*WIDE, UNKNOWN], 9.79)
-    for position, force in zip(WIDE, found, strict=False):
+    found = specific_forces([*WIDE_POSITIONS, UNKNOWN], 9.79)
+    for position, force in zip(WIDE_POSITIONS, found, strict=False):
         # a frame turned by +a sees vectors turned by -a
         assert position.degrees
         seen = Rotation.from_euler("z", -position.degrees[0], degrees=True).apply(
@@ -74,30 +76,42 @@ def test_forces_are_those_after_a_third_turn_as_well() -> None:
     """About the y that both have turned: gravity goes from z to x."""
     gamma = np.pi / 3
     turned = Position("on its edge", 0.2, 0.7, gamma=gamma)
-    two, three = forces([Position("before", 0.2, 0.7), turned], 9.8)
+    two, three = specific_forces([Position("before", 0.2, 0.7), turned], 9.8)
     expected = Rotation.from_euler("y", -gamma).apply(two)
     np.testing.assert_allclose(three, expected, atol=1e-12)
 
 
 def test_a_ladder_goes_to_either_side_and_has_home() -> None:
     had = [Position.deg(20, 0), Position.deg(-20.0000001, 2.5), UNKNOWN]
-    found, sides = ladder(had), (-20.0, 0.0, 20.0)
+    found, sides = ladder_settings(had), (-20.0, 0.0, 20.0)
     assert sorted(found) == [(a, b) for a in sides for b in (-2.5, 0.0, 2.5)]
     assert found[0] == (0.0, 0.0) and {a for a, _ in found[:3]} == {0.0}
-    assert ladder([UNKNOWN]) == [] == ladder([])
+    assert ladder_settings([UNKNOWN]) == [] == ladder_settings([])
 
 
 def test_the_sets_are_those_of_the_paper_and_a_ladder() -> None:
-    assert [p.degrees for p in TWO] == [(0, 0), (45, 5)]
-    assert [p.degrees for p in FIVE] == [(0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5),
-                                         (45, 5)]  # fmt: skip
-    assert {p.degrees for p in WIDE} == {(0, 0), (45, 5), (45, -5), (-45, 5), (-45, -5)}
-    assert SETS == {"two": TWO, "five": FIVE, "wide": WIDE, "six_faces": SIX_FACES}
-    assert all(p.name for p in FIVE)
-    assert positions._set((0, 0), (45, 5)) == TWO
+    assert [p.degrees for p in TWO_POSITIONS] == [(0, 0), (45, 5)]
+    assert [p.degrees for p in FIVE_POSITIONS] == [
+        (0, 0), (22.5, 0), (22.5, 2.5), (45, 2.5), (45, 5)
+    ]  # fmt: skip
+    assert {p.degrees for p in WIDE_POSITIONS} == {
+        (0, 0),
+        (45, 5),
+        (45, -5),
+        (-45, 5),
+        (-45, -5),
+    }
+    assert POSITION_SETS == {
+        "two": TWO_POSITIONS,
+        "five": FIVE_POSITIONS,
+        "wide": WIDE_POSITIONS,
+        "six_faces": SIX_FACES,
+    }
+    assert all(p.name for p in FIVE_POSITIONS)
+    assert positions._set((0, 0), (45, 5)) == TWO_POSITIONS
 
 
 def test_six_faces_are_each_axis_up_and_down() -> None:
-    up = (forces(SIX_FACES, 1.0).round(12) + 0.0).tolist()
+    up = (specific_forces(SIX_FACES, 1.0).round(12) + 0.0).tolist()
     faces = [*np.eye(3).tolist(), *(-np.eye(3)).tolist()]
     assert sorted(up) == sorted((np.array(faces) + 0.0).tolist())

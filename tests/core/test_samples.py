@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core import samples
-from fieldcal.core.samples import Block, Grain, common_unit, concat, pieces
+from fieldcal.core.samples import Block, Grain, common_unit, concat, split_by_time
 
 
 def whole(n: int, start: float = 0.0) -> Block:
@@ -80,15 +80,15 @@ def test_nothing_joined_is_an_empty_block() -> None:
 
 def test_pieces_hold_all_samples_once_in_order_by_their_time() -> None:
     block = Block.of(np.array([5.0, 5.4, 6.1, 6.2, 9.3, 9.9, 10.5]), np.ones((7, 3)))
-    cut = [part.t.tolist() for part in pieces(block, 1.0)]
+    cut = [part.t.tolist() for part in split_by_time(block, 1.0)]
     # of 5 to 6, 6 to 7, 9 to 10 and beyond; where no samples came is no piece
     assert cut == [[5.0, 5.4], [6.1, 6.2], [9.3, 9.9], [10.5]]
 
 
 def test_pieces_begin_at_their_edge() -> None:
     block = Block.of(np.arange(7.0), np.ones((7, 3)))
-    assert [len(part) for part in pieces(block, 2.0)] == [2, 2, 3]
-    assert [len(part) for part in pieces(block, 60.0)] == [7]
+    assert [len(part) for part in split_by_time(block, 2.0)] == [2, 2, 3]
+    assert [len(part) for part in split_by_time(block, 60.0)] == [7]
 
 
 @pytest.mark.parametrize(

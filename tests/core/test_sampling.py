@@ -7,28 +7,30 @@ import pytest
 
 from fieldcal.core import sampling
 from fieldcal.core.samples import Block
-from fieldcal.core.sampling import rate_of, unbroken
+from fieldcal.core.sampling import has_no_pause, sampling_rate
 
 
 def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
     t = 3.0 + np.arange(1000) / 40.0
     still = np.zeros((1000, 3))
-    assert rate_of(Block.of(t, still)) == pytest.approx(40.0)
+    assert sampling_rate(Block.of(t, still)) == pytest.approx(40.0)
     bursts = t[np.arange(1000) // 10 * 10] + 1e-5 * (np.arange(1000) % 10)
-    assert rate_of(Block.of(bursts, still)) == pytest.approx(40.0)
+    assert sampling_rate(Block.of(bursts, still)) == pytest.approx(40.0)
     gap = t + 100.0 * (t > 20.0)
-    assert rate_of(Block.of(gap, still)) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
-    assert rate_of(Block.of(t[:1], still[:1])) == 1.0
+    assert sampling_rate(Block.of(gap, still)) == pytest.approx(40.0)
+    assert sampling_rate(Block.of(t[:2], still[:2])) == pytest.approx(40.0)
+    assert sampling_rate(Block.of(t[:1], still[:1])) == 1.0
 
 
 def test_every_so_many_steps_are_enough_for_the_rate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Of steps of 0.1 and 0.3 s in turn those looked at are of one kind."""
-    monkeypatch.setattr(sampling, "STEPS", 10)
+    monkeypatch.setattr(sampling, "STEPS_USED", 10)
     t = np.cumsum(np.tile([0.1, 0.3], 20))
-    assert rate_of(Block.of(t, np.zeros((40, 3)))) == pytest.approx(1 / 0.2, rel=0.6)
+    assert sampling_rate(Block.of(t, np.zeros((40, 3)))) == pytest.approx(
+        1 / 0.2, rel=0.6
+    )
 
 
 @pytest.mark.parametrize("rate", [1.0, 50.0, 1000.0])
@@ -37,11 +39,11 @@ def test_a_pause_counts_wherever_it_touches_the_samples(rate: float) -> None:
     t[20:] += 3.0 / rate  # four periods from sample 19 to 20
     inside = [(10, 30), (19, 21), (20, 25), (15, 20), (0, 40)]
     beside = [(21, 40), (0, 19), (5, 10)]
-    assert not any(unbroken(t, *span, rate) for span in inside)
-    assert all(unbroken(t, *span, rate) for span in beside)
+    assert not any(has_no_pause(t, *span, rate) for span in inside)
+    assert all(has_no_pause(t, *span, rate) for span in beside)
     # a sample or two that were lost are none
     t[20:] -= 1.0 / rate
-    assert all(unbroken(t, *span, rate) for span in [*inside, *beside])
+    assert all(has_no_pause(t, *span, rate) for span in [*inside, *beside])
 
 
 def test_the_example_holds() -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 
 
 def test_lists_read_as_sentences() -> None:
-    assert join(["a"]) == "a" and join(["a", "b", "c"]) == "a, b and c"
-    assert join(["a", "b"], "or") == "a or b" and join([]) == ""
+    assert join_words(["a"]) == "a" and join_words(["a", "b", "c"]) == "a, b and c"
+    assert join_words(["a", "b"], "or") == "a or b" and join_words([]) == ""

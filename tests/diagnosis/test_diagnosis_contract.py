@@ -115,7 +115,7 @@ def _about(profile: Profile, windows: list[HeldWindow]) -> Description:
         table = {"alpha_deg": alpha, "beta_deg": beta, "start_s": w.start}
         table |= {"end_s": w.end, "rate_deg_s": np.rad2deg(w.rate).tolist()}
         positions.append(table)
-    return description.parse(
+    return description.parse_description(
         {
             "format": 1,
             "device": {"name": "contract", "grade": profile.device.grade},

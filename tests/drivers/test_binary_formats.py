@@ -250,7 +250,7 @@ def test_esf_meas_of_two_sensors_is_put_together(counted: bool) -> None:
     np.testing.assert_allclose(block.acc[:, 2], np.arange(1, 21))
     np.testing.assert_allclose(block.gyr[:, 1], np.deg2rad(np.arange(1, 21)))
     assert block.temperature[0] == pytest.approx(40.96)
-    found = codec_class("ubx").likeness(b"".join(pieces), 2.0)
+    found = codec_class("ubx").match(b"".join(pieces), 2.0)
     assert found is not None
     assert found.query == "message=meas"
 

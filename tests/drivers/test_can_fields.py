@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.drivers.can_fields import Bytes, Field
-from fieldcal.drivers.can_map import SHIPPED, load
+from fieldcal.drivers.can_fields import Bytes, SignalField
+from fieldcal.drivers.can_map import VIRTUAL_DBC, load_database
 
 NAMED: OrderedDict[int, str | NamedSignalValue] = OrderedDict({0: "no", 1: "bad"})
 
@@ -69,7 +69,7 @@ def test_any_signal_is_what_cantools_says(pair: tuple[Signal, int], seed: int) -
     data[0], data[1] = 0, 255
     if signal.is_float:
         data[1] = 0
-    got = Field.of(signal).values(padded(data))
+    got = SignalField.of(signal).values(padded(data))
     with np.errstate(over="ignore", invalid="ignore"):
         want = decoded(message, signal, data)
     np.testing.assert_allclose(got, want, rtol=1e-12)
@@ -78,34 +78,36 @@ def test_any_signal_is_what_cantools_says(pair: tuple[Signal, int], seed: int) -
 def test_a_signal_may_end_where_the_longest_frame_does_and_no_bit_later() -> None:
     frame = np.arange(64, dtype=np.uint8)[None]
     last = bytes([60, 61, 62, 63])
-    little = Field.of(Signal("s", 480, 32, byte_order="little_endian"))
+    little = SignalField.of(Signal("s", 480, 32, byte_order="little_endian"))
     assert little.values(frame) == int.from_bytes(last, "little")
-    big = Field.of(Signal("s", 487, 32, byte_order="big_endian"))
+    big = SignalField.of(Signal("s", 487, 32, byte_order="big_endian"))
     assert big.values(frame) == int.from_bytes(last, "big")
     for beyond in (
         Signal("s", 480, 33, byte_order="little_endian"),
         Signal("s", 487, 33, byte_order="big_endian"),
     ):
         with pytest.raises(InputError, match="no frame holds such a number"):
-            Field.of(beyond)
+            SignalField.of(beyond)
 
 
 def every_signal(database: Database) -> list[tuple[Message, Signal]]:
     return [(m, s) for m in database.messages for s in m.signals]
 
 
-@pytest.mark.parametrize("pair", every_signal(load(SHIPPED)), ids=lambda p: p[1].name)
+@pytest.mark.parametrize(
+    "pair", every_signal(load_database(VIRTUAL_DBC)), ids=lambda p: p[1].name
+)
 def test_every_signal_of_the_virtual_device(pair: tuple[Message, Signal]) -> None:
     message, signal = pair
     data = np.random.default_rng(3).integers(0, 256, (200, 8), dtype=np.uint8)
-    got = Field.of(signal).values(padded(data))
+    got = SignalField.of(signal).values(padded(data))
     np.testing.assert_allclose(got, decoded(message, signal, data), rtol=1e-14)
 
 
 def test_the_file_of_the_virtual_device_is_strict() -> None:
     from cantools.database import load_file
 
-    database = load_file(SHIPPED, strict=True)
+    database = load_file(VIRTUAL_DBC, strict=True)
     assert isinstance(database, Database)
     bits = {m.name: sum(s.length for s in m.signals) for m in database.messages}
     assert bits == {"Acceleration": 64, "AngularRate": 64, "Status": 52}

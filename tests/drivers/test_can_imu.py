@@ -24,8 +24,8 @@ from processes import FIELDCAL, SIM
 from fieldcal.cli import main
 from fieldcal.core.errors import DeviceError, DeviceSilent
 from fieldcal.core.samples import Block, concat
-from fieldcal.drivers.can_bus import BusSource, open_error
-from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_bus import BusSource, bus_error_text
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
 from fieldcal.drivers.can_imu import CanImu
 from fieldcal.drivers.driver import Driver, open_driver
 from fieldcal.procedures import two_position
@@ -95,7 +95,7 @@ def test_slcan_between_two_processes_loses_nothing_of_a_minute_at_1_khz(
     with open_driver(f"can:{port}?{SLCAN}&reconnect=0") as imu:
         block = until_the_end(imu)
         health = imu.health
-    assert isinstance(health, CanHealth)
+    assert isinstance(health, CanLinkHealth)
     assert len(block) == health.samples == 60_000
     assert health.bad == health.gaps == health.incomplete == health.repeated == 0
     np.testing.assert_allclose(block.t, np.arange(60_000) / 1000, atol=1e-6)
@@ -114,7 +114,7 @@ def test_a_calibration_over_can_finds_the_truth_within_its_uncertainty(
     angles = [p.degrees or (0.0, 0.0) for p in two_position.POSITIONS]
     where = [{"alpha_deg": alpha, "beta_deg": beta} for alpha, beta in angles]
     site = {"latitude_deg": 50.45, "height_m": 170.0}
-    about = description.parse({"site": site, "position": where})
+    about = description.parse_description({"site": site, "position": where})
     options = ["--can", "slcan", "--speed", "max", "--latitude=50.45", "--height=170"]
     with (
         movers.VirtualMover(options) as device,
@@ -142,7 +142,7 @@ def test_faults_of_the_line_cost_samples_and_make_none_up(
             remote.ask(fault=fault)
             got.append(some(imu, 500))
         health = imu.health
-    assert isinstance(health, CanHealth)
+    assert isinstance(health, CanLinkHealth)
     block = concat(got)
     at = np.rint(block.t * 100).astype(int)
     assert np.abs(block.acc - twin.acc[at]).max() < 1e-4
@@ -258,7 +258,7 @@ def test_faults_of_a_bus_are_lost_doubled_and_foreign_frames(
     link, imu = bus
     device = VirtualDevice(Profile(), seed=2)
     health = imu.health
-    assert isinstance(health, CanHealth)
+    assert isinstance(health, CanLinkHealth)
     link._faults.order({"flip_bits": 3})
     pumped(link, device.take(400))
     block = some(imu, 397)
@@ -341,7 +341,9 @@ def test_a_kernel_without_can_and_channels_that_are_not_there(
         (19, "no such CAN channel"),
         (100, "is down"),
     ):
-        assert says in open_error("socketcan", OSError(number, "what the kernel says"))
+        assert says in bus_error_text(
+            "socketcan", OSError(number, "what the kernel says")
+        )
 
 
 def test_a_network_without_multicast(

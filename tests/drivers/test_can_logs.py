@@ -14,16 +14,21 @@ from hypothesis import strategies as st
 
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array
-from fieldcal.drivers.can_frames import ERROR, EXTENDED, FRAME, Packed
-from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import (
+    ERROR_FLAG,
+    EXTENDED_FLAG,
+    FRAME_DTYPE,
+    FrameBuffer,
+)
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.lawicel import Lawicel
+from fieldcal.drivers.lawicel import LawicelDecoder
 
 
 def lines(rows: list[bytes]) -> bytes:
     """The same frames as an adapter writes them."""
     text = ""
-    for row in np.frombuffer(b"".join(rows), FRAME):
+    for row in np.frombuffer(b"".join(rows), FRAME_DTYPE):
         data = row["data"][: row["size"]].tobytes().hex().upper()
         text += f"t{row['id']:03X}{row['size']}{data}\r"
     return text.encode()
@@ -32,12 +37,12 @@ def lines(rows: list[bytes]) -> bytes:
 def test_lines_of_an_adapter_in_any_pieces() -> None:
     data = lines(stream(20))
     for text, bad in ((data, 0), (data.replace(b"t021", b"t0218", 1), 1)):
-        health = CanHealth()
-        whole = Lawicel(health).feed(b"\a\rz\rV1013\r" + text)
+        health = CanLinkHealth()
+        whole = LawicelDecoder(health).feed(b"\a\rz\rV1013\r" + text)
         assert health.bad == bad
-        decoder = Lawicel(CanHealth())
+        decoder = LawicelDecoder(CanLinkHealth())
         got = b"".join(decoder.feed(text[i : i + 1]) for i in range(len(text)))
-        a, b = np.frombuffer(whole, FRAME), np.frombuffer(got, FRAME)
+        a, b = np.frombuffer(whole, FRAME_DTYPE), np.frombuffer(got, FRAME_DTYPE)
         for name in ("id", "size", "data"):
             np.testing.assert_array_equal(a[name], b[name])
         assert len(a) == 40 - bad
@@ -50,9 +55,9 @@ def test_mutated_lines_never_break_the_decoder(data: st.DataObject) -> None:
         at = data.draw(st.integers(0, len(text) - 1))
         text[at : at + data.draw(st.integers(0, 2))] = data.draw(st.binary(max_size=3))
         text = text or bytearray(b"t")
-    health = CanHealth()
-    whole = Lawicel(health).feed(bytes(text))
-    rows = np.frombuffer(whole, FRAME)
+    health = CanLinkHealth()
+    whole = LawicelDecoder(health).feed(bytes(text))
+    rows = np.frombuffer(whole, FRAME_DTYPE)
     assert (rows["size"] <= 64).all() and len(rows) + health.bad <= text.count(13)
 
 
@@ -79,10 +84,10 @@ def test_messages_of_any_kind_come_out_as_they_are_however_few_fit(
     ]  # fmt: skip
     waiting, out, seen, more = iter(messages), [], 0, True
     while more:
-        packed = Packed(most)
+        packed = FrameBuffer(most)
         packed.fill(waiting, {"can0": 3, "can1": 4})
         out += packed.frames.tolist()
-        seen, more = seen + packed.seen, packed.full
+        seen, more = seen + packed.messages_seen, packed.full
     assert seen == len(messages)
     for row, message in zip(
         out, (m for m in messages if not m.is_remote_frame), strict=True
@@ -90,10 +95,10 @@ def test_messages_of_any_kind_come_out_as_they_are_however_few_fit(
         t, identifier, size, bus, data = row
         assert (t, bus) == (message.timestamp, 3 + (message.channel == "can1"))
         if message.is_error_frame:
-            assert (identifier & ERROR, size) == (ERROR, 0)
+            assert (identifier & ERROR_FLAG, size) == (ERROR_FLAG, 0)
         else:
             assert identifier & 0x1FFFFFFF == message.arbitration_id
-            assert bool(identifier & EXTENDED) == message.is_extended_id
+            assert bool(identifier & EXTENDED_FLAG) == message.is_extended_id
             assert data[:size].tobytes() == message.data and not data[size:].any()
 
 
@@ -107,14 +112,14 @@ def test_a_log_of_somebody_else_says_which_frames_are_missing(tmp_path: Path) ->
 
 
 def test_every_kind_of_line() -> None:
-    health = CanHealth()
+    health = CanLinkHealth()
     kinds = b"t1232AABB\rT12345678100\rt1230ABCD\rd1239" + b"11" * 12 + b"\rr1238\r"
     wrong = b"t1239" + b"0" * 18 + b"\rt12\rQ\rt123201\rt1231 A\r\xff\r"
-    rows = np.frombuffer(Lawicel(health).feed(kinds + wrong), FRAME)
+    rows = np.frombuffer(LawicelDecoder(health).feed(kinds + wrong), FRAME_DTYPE)
     assert rows["id"].tolist() == [0x123, 0x12345678 | 1 << 31, 0x123, 0x123]
     assert rows["size"].tolist() == [2, 1, 0, 12]
     assert health.bad == 6
-    decoder = Lawicel(health)
+    decoder = LawicelDecoder(health)
     for _ in range(10):
         decoder.feed(b"x" * 10_000)
     assert len(decoder._rest) < 200
@@ -127,7 +132,7 @@ def test_a_log_is_played_as_the_bus_was(tmp_path: Path) -> None:
     for ending in (".log", ".asc", ".blf", ".trc"):
         path = tmp_path / f"drive.day.1{ending}"
         with can.Logger(path) as log:
-            for row in np.frombuffer(b"".join(stream(200)), FRAME):
+            for row in np.frombuffer(b"".join(stream(200)), FRAME_DTYPE):
                 log(
                     can.Message(
                         timestamp=1e9 + float(row["t"]),
@@ -153,7 +158,7 @@ def test_a_log_of_two_buses_with_the_same_frames_is_asked_about_and_never_mixed(
     lines = []
     for i in range(5000):
         for bus, number in ((0, i), (1, i + 3000)) if i >= 4000 else ((0, i),):
-            for row in np.frombuffer(b"".join(sample(number, seq=False)), FRAME):
+            for row in np.frombuffer(b"".join(sample(number, seq=False)), FRAME_DTYPE):
                 data = row["data"][: row["size"]].tobytes().hex()
                 at = i / 100 + row["t"] % 0.01 + bus * 1e-6
                 lines.append(f"({at:.6f}) can{bus} {row['id']:03X}#{data}\n")

@@ -19,8 +19,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Block
-from fieldcal.drivers.can_frames import ERROR, pack
-from fieldcal.drivers.can_groups import CanHealth
+from fieldcal.drivers.can_frame_groups import CanLinkHealth
+from fieldcal.drivers.can_frames import ERROR_FLAG, frame_row
 from fieldcal.drivers.can_map import read_map
 from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.options import Options
@@ -62,7 +62,11 @@ def test_spoilt_streams_give_right_samples_however_they_are_cut(
         rows = [
             r
             for row in rows
-            for r in [row, pack(0, 32, True, b"12345678"), pack(0, 7, False, b"")]
+            for r in [
+                row,
+                frame_row(0, 32, True, b"12345678"),
+                frame_row(0, 7, False, b""),
+            ]
         ]
     late = "seq" in query and data.draw(st.booleans())
     if late:
@@ -107,7 +111,7 @@ def test_a_lost_frame_costs_its_sample_and_no_other(dbc: Path) -> None:
 
 def test_a_stuck_counter_is_no_memory_leak(dbc: Path) -> None:
     options = Options("can", f"dbc={dbc}&rate=100&map={KEYED}")
-    decoder = CanAssembler(read_map(options), CanHealth(), options)
+    decoder = CanAssembler(read_map(options), CanLinkHealth(), options)
     some = frames([sample(7)[0]] * 1000)
     for _ in range(20):
         assert decoder.feed(some, some["t"]) is None
@@ -134,9 +138,9 @@ def test_a_slow_temperature_is_held(dbc: Path) -> None:
 
 def test_damaged_frames_are_counted_and_left_out(dbc: Path) -> None:
     rows = stream(10)
-    rows[4] = pack(0.02, 32, False, b"\x01\x00")
-    rows[8] = pack(0.04, 32, False, b"\x00\x80" + bytes(4) + b"\x04\x00")
-    rows.append(pack(0, ERROR, False, b""))
+    rows[4] = frame_row(0.02, 32, False, b"\x01\x00")
+    rows[8] = frame_row(0.04, 32, False, b"\x00\x80" + bytes(4) + b"\x04\x00")
+    rows.append(frame_row(0, ERROR_FLAG, False, b""))
     block, health = decode(dbc, f"map={KEYED}", rows)
     assert numbers(block) == [0, 1, 3, 5, 6, 7, 8, 9]
     assert (health.bad, health.incomplete, health.errors) == (2, 2, 1)
@@ -161,7 +165,9 @@ def test_a_multiplexed_frame_is_several(tmp_path: Path) -> None:
     path = tmp_path / "mux.dbc"
     path.write_text(MUX, encoding="cp1252")
     rows = [
-        pack(i / 100, 5, False, bytes([kind | i % 16 << 4, i, kind, 0, 0, 0, 0, 0]))
+        frame_row(
+            i / 100, 5, False, bytes([kind | i % 16 << 4, i, kind, 0, 0, 0, 0, 0])
+        )
         for i in range(50)
         for kind in (0, 1)
     ]
@@ -195,7 +201,7 @@ def test_stamps_put_frames_together_and_unwrap(tmp_path: Path) -> None:
         for identifier in (6, 5):
             if (i, identifier) != (1500, 6):
                 data = (i % 100).to_bytes(2, "little") + stamp
-                rows.append(pack(i / 100, identifier, False, data))
+                rows.append(frame_row(i / 100, identifier, False, data))
     block, health = decode(path, "", rows, [100, 101, 3000])
     kept = np.delete(np.arange(3000), 1500)
     np.testing.assert_allclose(block.t, kept / 100, atol=1e-4)
@@ -211,7 +217,7 @@ def test_frames_of_noise_break_nothing_however_they_are_cut(
 ) -> None:
     rng = np.random.default_rng(seed)
     rows = [
-        pack(
+        frame_row(
             float(rng.uniform(0, 3)),
             int(rng.choice([32, 33, 33, 34, 35])),
             bool(rng.uniform() < 0.1),

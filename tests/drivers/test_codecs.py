@@ -10,14 +10,14 @@ from wires import STREAMS, Stream
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
-from fieldcal.drivers.codec import Codec, formats, open_codec
+from fieldcal.drivers.codec import Codec, open_codec, wire_formats
 from fieldcal.drivers.options import Options
 
 N = 40
 KNOWN = {name: STREAMS[name](N, np.random.default_rng(7)) for name in STREAMS}
 FEW = {name: STREAMS[name](16, np.random.default_rng(7)) for name in STREAMS}
 
-every_format = pytest.mark.parametrize("name", formats())
+every_format = pytest.mark.parametrize("name", wire_formats())
 
 
 @cache
@@ -49,7 +49,7 @@ def assert_same(one: Block, other: Block) -> None:
 
 
 def test_every_format_has_a_stream() -> None:
-    assert tuple(sorted(STREAMS)) == formats()
+    assert tuple(sorted(STREAMS)) == wire_formats()
 
 
 def test_an_unknown_format_is_refused_with_those_there_are() -> None:
@@ -125,7 +125,7 @@ def test_damage_makes_no_fault_and_no_memory(
     codec = decoder(name, stream)
     for piece in cut(bytes(spoilt), step):
         codec.feed(piece)
-        assert codec.waiting <= codec.longest
+        assert codec.waiting_bytes <= codec.longest
         assert len(codec._arrivals) <= codec.longest + 1
 
 

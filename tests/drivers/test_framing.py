@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldcal.drivers.framing import Candidates, resolve, rows
+from fieldcal.drivers.framing import FrameCandidates, byte_rows, select_frames
 
 candidate = st.tuples(st.integers(0, 200), st.integers(2, 30), st.booleans())
 
@@ -40,12 +40,12 @@ def test_the_same_as_byte_by_byte(
     starts = np.array(sorted(at), dtype=int)
     ends = np.array([start + at[start][0] for start in sorted(at)], dtype=int)
     good = np.array([at[s][1] or s + at[s][0] > size for s in sorted(at)], dtype=bool)
-    got = resolve(Candidates(starts, ends, good, size), size)
+    got = select_frames(FrameCandidates(starts, ends, good, size), size)
     expected = by_steps(at, size, size)
     assert (got.starts.tolist(), got.rest, got.bad, got.skipped) == expected
 
 
 @given(st.binary(min_size=50, max_size=60), st.lists(st.integers(0, 40), max_size=9))
 def test_rows(data: bytes, starts: list[int]) -> None:
-    got = rows(np.frombuffer(data, np.uint8), np.array(starts, dtype=int), 10)
+    got = byte_rows(np.frombuffer(data, np.uint8), np.array(starts, dtype=int), 10)
     assert [row.tobytes() for row in got] == [data[s : s + 10] for s in starts]

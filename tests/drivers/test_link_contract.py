@@ -26,7 +26,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import DeviceSilent
 from fieldcal.core.samples import Block, concat
 from fieldcal.drivers import codec
-from fieldcal.drivers.driver import Driver, Health, open_driver
+from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import build_observations
 from fieldcal.session import description
 from fieldcal.sim_device.remote import RemoteDevice
@@ -62,7 +62,7 @@ WINDOWS = (0.0, 27.0), (33.0, 59.5)
 
 SITE = {"latitude_deg": 50.45, "height_m": 170.0}
 WHERE = [{"alpha_deg": 0.0, "beta_deg": 0.0}, {"alpha_deg": 45.0, "beta_deg": 5.0}]
-ABOUT = description.parse({"site": SITE, "position": WHERE})
+ABOUT = description.parse_description({"site": SITE, "position": WHERE})
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 
@@ -107,7 +107,7 @@ def device(sent: str, truth: Path, speed: str, *before: str) -> Iterator[str]:
         yield place
 
 
-def heard(name: str, truth: Path) -> tuple[Block, Health]:
+def heard(name: str, truth: Path) -> tuple[Block, LinkHealth]:
     """All that the device says in a minute."""
     sent, url = LINES[name]
     # datagrams that nobody takes are lost: there a device cannot wait for its host
@@ -148,7 +148,7 @@ def test_every_driver_and_every_wire_format_has_its_line() -> None:
     drivers = {path.stem.removesuffix("_imu") for path in folder.glob("*_imu.py")}
     spoken = {url.partition(":")[0] for _, url in LINES.values()}
     assert spoken == drivers - {"replay"}
-    assert set(codec.formats()) <= set(LINES)
+    assert set(codec.wire_formats()) <= set(LINES)
 
 
 def one_a_link() -> list[Any]:
@@ -191,7 +191,7 @@ def test_the_same_on_a_bus_of_datagrams(
 
 def assert_whole_and_true(
     block: Block,
-    health: Health,
+    health: LinkHealth,
     file: Path,
     reference: Calibration,
     datagrams: bool = False,

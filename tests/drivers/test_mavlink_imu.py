@@ -109,9 +109,9 @@ def test_installed_calibration_is_read_and_composed(
         with opened(f"mavlink:{where}") as imu:
             installed = imu.installed
             assert installed is not None and not installed.missing
-            np.testing.assert_allclose(installed.of("acc_offset"), [0.5, 0, 0])
+            np.testing.assert_allclose(installed.vector("acc_offset"), [0.5, 0, 0])
             np.testing.assert_allclose(
-                installed.of("acc_scale"), [1, 1.02, 1], rtol=1e-6
+                installed.vector("acc_scale"), [1, 1.02, 1], rtol=1e-6
             )
             assert json.loads(json.dumps(imu.notes))["installed"]["parameters"][name]
             before = taken(imu, 1.0).acc.mean(axis=0)
@@ -121,7 +121,7 @@ def test_installed_calibration_is_read_and_composed(
     np.testing.assert_allclose(
         before, bias + scale * [0, -9.81, 0], atol=0.02, rtol=1e-3
     )
-    new = installed.next(bias, scale, np.zeros(3))
+    new = installed.parameters_after(bias, scale, np.zeros(3))
     query = "&".join(f"{key}={value:.9g}" for key, value in new.items())
     place = f"tcpin:127.0.0.1:0?autopilot={kind}&{query}"
     with autopilot(place, *options) as (where, _), opened(f"mavlink:{where}") as imu:
@@ -135,14 +135,14 @@ def test_the_installed_calibration_is_taken_out_and_given_back() -> None:
         with opened(f"mavlink:{where}?installed=identity") as imu:
             raw = taken(imu, 1.0).acc.mean(axis=0)
             assert imu.installed is not None
-            new = imu.installed.next(BIAS, SCALE, np.zeros(3))
+            new = imu.installed.parameters_after(BIAS, SCALE, np.zeros(3))
         np.testing.assert_allclose(raw, BIAS + SCALE * [0, -9.81, 0], atol=0.02)
         assert new["INS_ACCOFFS_X"] == 0.2
         assert new["INS_ACCSCAL_Y"] == pytest.approx(1 / 0.992)
         with opened(f"mavlink:{where}") as imu:
             assert imu.installed is not None
-            np.testing.assert_allclose(imu.installed.of("acc_offset"), [0.5, 0, 0])
-            assert imu.installed.of("acc_scale")[1] == pytest.approx(1.02)
+            np.testing.assert_allclose(imu.installed.vector("acc_offset"), [0.5, 0, 0])
+            assert imu.installed.vector("acc_scale")[1] == pytest.approx(1.02)
 
 
 def test_what_cannot_be_given_back_is_named() -> None:
@@ -182,7 +182,7 @@ def test_a_turned_board_is_not_composed() -> None:
         assert imu.installed is not None
         assert imu.installed.values["SENS_BOARD_ROT"] == 2
         with pytest.raises(InputError, match="SENS_BOARD_ROT = 2 turns"):
-            imu.installed.next(np.zeros(3), np.ones(3), np.zeros(3))
+            imu.installed.parameters_after(np.zeros(3), np.ones(3), np.zeros(3))
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_parameters_that_do_not_come_are_named() -> None:
             assert "did not answer: INS_ACCOFFS_X" in imu.says[0]
             assert imu.installed is not None
             with pytest.raises(InputError, match="is not known, without"):
-                imu.installed.next(np.zeros(3), np.ones(3), np.zeros(3))
+                imu.installed.parameters_after(np.zeros(3), np.ones(3), np.zeros(3))
 
 
 def test_a_peer_that_closes_is_one_sentence() -> None:

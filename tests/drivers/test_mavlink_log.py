@@ -16,8 +16,8 @@ pytest.importorskip("pymavlink")
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array, Block, Grain, concat
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.mavlink_log import split
-from fieldcal.drivers.mavlink_samples import Decoder
+from fieldcal.drivers.mavlink_log import split_log
+from fieldcal.drivers.mavlink_samples import MavlinkDecoder
 from fieldcal.drivers.options import Options
 from fieldcal.run.link_marks import LinkMarks
 
@@ -43,7 +43,7 @@ def about(shared: Path) -> dict[str, Any]:
 
 
 def decoded(data: bytes, query: str) -> Block:
-    decoder = Decoder(Options("test", query))
+    decoder = MavlinkDecoder(Options("test", query))
     block = decoder.feed(data, 0.0)
     assert block is not None
     return block
@@ -90,7 +90,7 @@ def test_truncation_left_in_shows(log: bytes, about: dict[str, Any]) -> None:
 
 
 def test_units_are_told_and_counts_agree(log: bytes) -> None:
-    decoder = Decoder(Options("test", "message=RAW_IMU"))
+    decoder = MavlinkDecoder(Options("test", "message=RAW_IMU"))
     block = decoder.feed(log, 0.0)
     assert block is not None
     assert len(block) == decoder.health.samples == 16917
@@ -150,7 +150,7 @@ def test_cuts_and_garbage_change_nothing(log: bytes, message: str) -> None:
     data = log[:6_000]
     whole = decoded(data, f"message={message}")
     for size in (1, 7, 64, 5000):
-        decoder = Decoder(Options("test", f"message={message}"))
+        decoder = MavlinkDecoder(Options("test", f"message={message}"))
         parts = [
             decoder.feed(data[i : i + size], 0.0) for i in range(0, len(data), size)
         ]
@@ -170,10 +170,10 @@ def test_mutated_bytes_give_no_wrong_sample(log: bytes) -> None:
         spoilt = data.copy()
         at = rng.integers(0, len(data), 10_000)
         spoilt[at] = rng.integers(0, 256, len(at))
-        decoder = Decoder(Options("test", "message=RAW_IMU"))
+        decoder = MavlinkDecoder(Options("test", "message=RAW_IMU"))
         for i in range(0, len(spoilt), 4096):
             block = decoder.feed(spoilt[i : i + 4096].tobytes(), 0.0)
-            assert decoder.waiting <= decoder.longest
+            assert decoder.waiting_bytes <= decoder.longest
             if block is not None:
                 wrong += sum(row.tobytes() not in known for row in block.six)
     # thousands of packets were spoilt, and a check of 16 bits lets one of 65536 pass
@@ -183,7 +183,7 @@ def test_mutated_bytes_give_no_wrong_sample(log: bytes) -> None:
 @settings(max_examples=60)
 @given(st.binary(max_size=600))
 def test_any_bytes_are_survived(data: bytes) -> None:
-    decoder = Decoder(Options("test", "message=RAW_IMU"))
+    decoder = MavlinkDecoder(Options("test", "message=RAW_IMU"))
     assert decoder.feed(data, 0.0) is None
-    assert decoder.waiting <= decoder.longest
-    assert sum(len(chunk.data) for chunk in split(data)) <= len(data)
+    assert decoder.waiting_bytes <= decoder.longest
+    assert sum(len(chunk.data) for chunk in split_log(data)) <= len(data)

@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import all as dialect
 from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.core.samples import Array, Block
 from fieldcal.drivers.driver import open_driver
-from fieldcal.drivers.mavlink_samples import Decoder
+from fieldcal.drivers.mavlink_samples import MavlinkDecoder
 from fieldcal.drivers.mavlink_units import untruncated_mean
 from fieldcal.drivers.options import Options
 from fieldcal.sim_device.mavlink_packing import HIGHRES, RAW, messages
@@ -53,8 +53,8 @@ def older(number: int, block: Block) -> bytes:
     return b"".join(packets)
 
 
-def decoder(query: str) -> Decoder:
-    return Decoder(Options("test", query))
+def decoder(query: str) -> MavlinkDecoder:
+    return MavlinkDecoder(Options("test", query))
 
 
 def fed(query: str, data: bytes) -> Block:

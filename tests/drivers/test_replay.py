@@ -12,7 +12,7 @@ from wires import STREAMS
 from fieldcal.cli import main
 from fieldcal.core.errors import DeviceError, InputError, SessionError
 from fieldcal.core.samples import Block, concat
-from fieldcal.drivers import pace
+from fieldcal.drivers import playback
 from fieldcal.drivers.driver import open_driver
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.can_packing import frames
@@ -64,7 +64,7 @@ def test_a_samples_file_at_the_speed_asked_for(
 ) -> None:
     path, clock = csv(tmp_path / "samples.csv", 1001, 100), Clock()
     for name in ("monotonic", "sleep"):
-        monkeypatch.setattr(pace, name, getattr(clock, name))
+        monkeypatch.setattr(playback, name, getattr(clock, name))
     assert len(everything(f"replay:{path}?speed=50")) == 1001
     assert clock.now - 7.0 == pytest.approx(10.0 / 50, rel=0.05)
     with open_driver(f"replay:{path}?speed=0.01") as imu:

@@ -18,7 +18,12 @@ from fieldcal.core.errors import DeviceError, DeviceSilent, InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.drivers.reader import Chunk
-from fieldcal.drivers.serial_imu import RECENT, SerialImu, reason, recent
+from fieldcal.drivers.serial_imu import (
+    RECENT_BYTES,
+    SerialImu,
+    last_chunks,
+    port_error_text,
+)
 
 ACC, GYR, CYCLES = wit_acc(1), wit_gyr(1), wit_cycles(3000)
 
@@ -184,10 +189,10 @@ def test_of_a_flood_of_noise_little_is_kept() -> None:
     """As much as tells a format, whatever the size of the pieces."""
     for size in (1, 1000, 1 << 16):
         chunks = [Chunk(0.01 * i, bytes(size)) for i in range(20_000 // size + 40)]
-        kept = recent(chunks)
+        kept = last_chunks(chunks)
         assert kept == chunks[-len(kept) :]
-        assert RECENT <= sum(len(c.data) for c in kept) < RECENT + size
-    assert recent(chunks[:0]) == []
+        assert RECENT_BYTES <= sum(len(c.data) for c in kept) < RECENT_BYTES + size
+    assert last_chunks(chunks[:0]) == []
 
 
 def test_frames_without_a_sample(pty: tuple[int, str]) -> None:
@@ -241,7 +246,7 @@ def test_permission_denied(tmp_path: Path) -> None:
     port = tmp_path / "port"
     port.touch(mode=0o000)
     if os.access(port, os.R_OK):
-        assert "dialout" in reason(PermissionError(13, "Permission denied"))
+        assert "dialout" in port_error_text(PermissionError(13, "Permission denied"))
         return
     with pytest.raises(DeviceError, match="no permission; add yourself"):
         open_driver(f"serial:{port}")

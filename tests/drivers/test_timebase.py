@@ -6,22 +6,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.arrivals import Arrivals
-from fieldcal.drivers.driver import Health
-from fieldcal.drivers.stamps import Stamps
-from fieldcal.drivers.timebase import Rate
+from fieldcal.drivers.arrival_timebase import ArrivalTimebase
+from fieldcal.drivers.driver import LinkHealth
+from fieldcal.drivers.stamp_timebase import StampTimebase
+from fieldcal.drivers.timebase import RateTimebase
 
 
-def placed(clock: Stamps, stamps: Array, host: Array | None = None) -> Array:
+def placed(clock: StampTimebase, stamps: Array, host: Array | None = None) -> Array:
     steps = np.ones(len(stamps), dtype=int)
     return clock.times(stamps, steps, stamps * 0 if host is None else host)
 
 
 def test_fine_stamps_stay_as_they_are() -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = 5 + np.cumsum(np.random.default_rng(0).uniform(0.009, 0.011, 9000))
-    np.testing.assert_array_equal(placed(Stamps(health), stamps), stamps)
-    assert health == Health()
+    np.testing.assert_array_equal(placed(StampTimebase(health), stamps), stamps)
+    assert health == LinkHealth()
 
 
 @given(
@@ -35,10 +35,10 @@ def test_coarse_stamps_become_even_whatever_the_pieces(
 ) -> None:
     truth = np.delete((np.arange(400) + phase) / rate, sorted(lost))
     stamps = np.floor(truth * 1000) / 1000
-    whole = placed(Stamps(Health(), 1e-3), stamps)
+    whole = placed(StampTimebase(LinkHealth(), 1e-3), stamps)
     assert np.all(np.diff(whole) > 0)
     assert np.all(np.abs(whole - truth) < 1.01e-3)
-    pieces = Stamps(Health(), 1e-3)
+    pieces = StampTimebase(LinkHealth(), 1e-3)
     parts = [placed(pieces, part) for part in np.split(stamps, sorted(cuts))]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
@@ -47,39 +47,39 @@ def test_a_jittered_millisecond_clock_at_1_khz_loses_no_sample() -> None:
     rng = np.random.default_rng(2)
     truth = np.arange(60_000) / 1000
     stamps = np.floor((truth + rng.uniform(0, 2e-3, len(truth))) * 1000) / 1000
-    health = Health()
-    t = placed(Stamps(health, 1e-3), np.maximum.accumulate(stamps))
+    health = LinkHealth()
+    t = placed(StampTimebase(health, 1e-3), np.maximum.accumulate(stamps))
     assert not np.isnan(t).any()
     assert np.all(np.diff(t) > 0)
     assert health.repeated == health.gaps == 0
 
 
 def test_missing_samples_are_counted_from_the_stamps() -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = np.delete(np.arange(1000) / 200, [100, 101, 500, 700, 701, 702])
-    placed(Stamps(health), stamps)
+    placed(StampTimebase(health), stamps)
     assert (health.gaps, health.missing) == (3, 6)
 
 
 def test_a_gap_right_at_the_start_does_not_spoil_the_count() -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = np.delete(np.arange(1000) / 200, [*range(3, 60), 500])
-    placed(Stamps(health), stamps)
+    placed(StampTimebase(health), stamps)
     assert (health.gaps, health.missing) == (1, 1)
 
 
 def test_old_stamps_are_dropped() -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = np.arange(100) / 100
     stamps[50], stamps[60] = stamps[49], stamps[57]
-    t = placed(Stamps(health), stamps)
+    t = placed(StampTimebase(health), stamps)
     assert np.flatnonzero(np.isnan(t)).tolist() == [50, 60]
     assert health.repeated == 2
 
 
 def test_a_counter_is_unwrapped() -> None:
     counts = (2**32 - 700 + 10 * np.arange(200)) % 2**32
-    t = placed(Stamps(Health(), span=2**32 * 1e-6), counts * 1e-6)
+    t = placed(StampTimebase(LinkHealth(), span=2**32 * 1e-6), counts * 1e-6)
     np.testing.assert_allclose(np.diff(t), 1e-5, atol=1e-12)
 
 
@@ -88,10 +88,10 @@ def test_a_counter_is_unwrapped() -> None:
 def test_time_goes_on_over_a_reboot_by_what_the_host_saw(
     span: float, up: float
 ) -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = np.concatenate([up + np.arange(100) / 100, np.arange(100) / 100])
     host = np.concatenate([np.arange(100) / 100, 4 + np.arange(100) / 100])
-    t = placed(Stamps(health, span=span), stamps, host)
+    t = placed(StampTimebase(health, span=span), stamps, host)
     assert np.all(np.diff(t) > 0)
     assert t[100] - t[99] == pytest.approx(4 - 0.99)
     np.testing.assert_allclose(np.diff(t[100:]), 0.01, atol=1e-9)
@@ -99,26 +99,26 @@ def test_time_goes_on_over_a_reboot_by_what_the_host_saw(
 
 
 def test_an_hour_unplugged_is_no_reboot() -> None:
-    health = Health()
+    health = LinkHealth()
     stamps = np.concatenate([np.arange(100) / 100, 3600 + np.arange(100) / 100])
-    t = placed(Stamps(health), stamps, stamps)
+    t = placed(StampTimebase(health), stamps, stamps)
     np.testing.assert_array_equal(t, stamps)
     assert (health.restarts, health.gaps) == (0, 1)
 
 
 def test_a_rate_goes_on_over_a_broken_link() -> None:
-    health = Health()
-    clock = Rate(health, 100.0)
+    health = LinkHealth()
+    clock = RateTimebase(health, 100.0)
     ones, none = np.ones(10, dtype=int), np.full(10, np.nan)
     first = clock.times(none, ones, np.full(10, 50.0))
-    clock.broken()
+    clock.link_broken()
     second = clock.times(none, ones, np.full(10, 52.5))
     np.testing.assert_allclose(first, np.arange(10) / 100)
     np.testing.assert_allclose(second, 0.09 + 2.5 + np.arange(10) / 100)
     assert health.gaps == 1
 
 
-def in_batches(clock: Rate, sent: Array, arrived: Array, most: int) -> Array:
+def in_batches(clock: RateTimebase, sent: Array, arrived: Array, most: int) -> Array:
     """Feed samples as they arrive, several batches at a time."""
     parts = []
     for some in np.array_split(np.arange(len(sent)), max(1, len(sent) // most)):
@@ -131,27 +131,29 @@ def in_batches(clock: Rate, sent: Array, arrived: Array, most: int) -> Array:
 def test_a_silent_device_is_a_gap_and_a_stalled_host_is_none(most: int) -> None:
     sent = np.arange(1000) / 100
     silent = sent + 2.5 * (sent >= 5)
-    health = Health()
-    t = in_batches(Rate(health, 100.0), sent, silent + 7, most)
+    health = LinkHealth()
+    t = in_batches(RateTimebase(health, 100.0), sent, silent + 7, most)
     assert health.gaps == 1 and abs(health.missing - 250) <= 1
     np.testing.assert_allclose(np.diff(t)[499], 2.51, atol=0.02)
     stalled = np.where((sent >= 5) & (sent < 7.5), 7.5, sent)
-    health = Health()
-    t = in_batches(Rate(health, 100.0), sent, stalled + 7, most)
+    health = LinkHealth()
+    t = in_batches(RateTimebase(health, 100.0), sent, stalled + 7, most)
     if most > 250:  # else what waited is not seen together
         assert health.gaps == 0
         np.testing.assert_allclose(t, sent)
 
 
 def test_a_device_that_does_not_run_in_real_time_is_not_judged_by_arrivals() -> None:
-    health = Health()
+    health = LinkHealth()
     sent = np.arange(1000) / 100
-    t = in_batches(Rate(health, 100.0), sent, sent / 20 + 1.5 * (sent >= 5), 7)
+    t = in_batches(RateTimebase(health, 100.0), sent, sent / 20 + 1.5 * (sent >= 5), 7)
     assert health.gaps == 0
     np.testing.assert_allclose(t, sent)
 
 
-def arrive(clock: Arrivals, sent: Array, batch: int, rng: np.random.Generator) -> Array:
+def arrive(
+    clock: ArrivalTimebase, sent: Array, batch: int, rng: np.random.Generator
+) -> Array:
     """Feed samples sent at these times in batches, each with a delay of its own."""
     parts = []
     for some in np.split(sent, range(batch, len(sent), batch)):
@@ -165,7 +167,7 @@ def test_arrivals_teach_the_rate_not_their_jitter(batch: int) -> None:
     errors, slopes = [], []
     for seed in range(4):
         sent = 1e9 + np.arange(12_000) / 201.3
-        clock = Arrivals(Health())
+        clock = ArrivalTimebase(LinkHealth())
         t = arrive(clock, sent, batch, np.random.default_rng(seed))
         known = ~np.isnan(t)
         assert known.mean() > 0.97
@@ -178,18 +180,18 @@ def test_arrivals_teach_the_rate_not_their_jitter(batch: int) -> None:
 
 
 def test_lost_samples_show_in_the_arrivals() -> None:
-    health = Health()
+    health = LinkHealth()
     sent = np.delete(np.arange(6000) / 100, range(3000, 3300))
-    t = arrive(Arrivals(health), sent, 1, np.random.default_rng(0))
+    t = arrive(ArrivalTimebase(health), sent, 1, np.random.default_rng(0))
     assert (health.gaps, health.missing) == (1, 300)
     np.testing.assert_allclose(t[4000:], sent[4000:] + 0.004, atol=3e-3)
 
 
 def test_a_passing_delay_is_no_gap() -> None:
-    health = Health()
+    health = LinkHealth()
     sent = np.arange(6000) / 100
     host = sent + np.random.default_rng(0).exponential(0.002, 6000)
     host[3000:3020] = host[3020]
-    t = Arrivals(health).times(sent * np.nan, np.ones(6000, dtype=int), host)
+    t = ArrivalTimebase(health).times(sent * np.nan, np.ones(6000, dtype=int), host)
     assert health.gaps == 0
     np.testing.assert_allclose(t[200:], sent[200:] + 0.002, atol=4e-3)

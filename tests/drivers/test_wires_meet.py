@@ -34,7 +34,7 @@ TEMPERATURE, TIME = 0.051, 1.1e-3
 
 
 def test_the_virtual_device_writes_what_the_drivers_read() -> None:
-    assert wire.formats() == codec.formats()
+    assert wire.formats() == codec.wire_formats()
 
 
 @pytest.mark.parametrize("name", wire.formats())

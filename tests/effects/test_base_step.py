@@ -11,7 +11,7 @@ import pytest
 from session_folders import CALM, FACES, WIDE, places, recorded, write_session
 
 from fieldcal.cli import main
-from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Motion, Sensor
@@ -22,7 +22,7 @@ from fieldcal.sim_device.vocabulary import checked_effect
 def rows(**known: object) -> Experience:
     rng = np.random.default_rng(3)
     alpha, beta, gamma = rng.uniform(-1.5, 1.5, (3, 12))
-    more = {"gamma": gamma, "base_rate": earth_rate_home(0.9), **known}
+    more = {"gamma": gamma, "base_rate": earth_rate_at_home(0.9), **known}
     return Experience.at_rest(alpha, beta, 9.81, **more)
 
 

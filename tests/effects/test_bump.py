@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.signal.chain import check_chain
 from fieldcal.physics.recording import Rows
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 HZ, N, G = 50.0, 1000, 9.8
 
@@ -24,7 +24,7 @@ def touched(at: int, many: int = 8) -> tuple[NDArray[np.bool_], list[Rows]]:
     windows = [{"start_s": 0.0, "end_s": 9.99}, {"start_s": 9.99, "end_s": 20.0}]
     held = [{"alpha_deg": 0.0, "beta_deg": 0.0, **w} for w in windows]
     site = {"gravity": G, "latitude_deg": 50.0}
-    about = parse({"format": 1, "site": site, "position": held})
+    about = parse_description({"format": 1, "site": site, "position": held})
     checked = check_chain(block, about)
     rows = [fault.rows for name, fault in checked.faults if name == "bump"]
     usable: NDArray[np.bool_] = np.all(checked.usable, axis=1)
@@ -54,7 +54,9 @@ def test_single_wild_samples_are_replaced_and_are_no_bumps() -> None:
     block = Block.of(t, acc, rng.normal(0, 1e-3, (N, 3)))
     held = [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 0.0, "end_s": 50.0}]
     site = {"gravity": G, "latitude_deg": 50.0}
-    checked = check_chain(block, parse({"format": 1, "site": site, "position": held}))
+    checked = check_chain(
+        block, parse_description({"format": 1, "site": site, "position": held})
+    )
     named = [f for name, f in checked.faults if name == "bump" and f.values]
     assert [round(float(f.values["at_s"])) for f in named] == [25]
     decoded = [f.values for name, f in checked.faults if name == "decode_fault"]
@@ -78,7 +80,9 @@ def bumps_while_shaken(seed: int, push: float) -> list[float]:
     windows = [{"start_s": 0.0, "end_s": 39.9}, {"start_s": 40.1, "end_s": 79.9}]
     held = [{"alpha_deg": 0.0, "beta_deg": 0.0, **w} for w in windows]
     site = {"gravity": G, "latitude_deg": 50.0}
-    checked = check_chain(block, parse({"format": 1, "site": site, "position": held}))
+    checked = check_chain(
+        block, parse_description({"format": 1, "site": site, "position": held})
+    )
     return [f.from_s for name, f in checked.faults if name == "bump" and f.values]
 
 
@@ -113,7 +117,9 @@ def pushed(
         {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b} for a, b in ends
     ]
     site = {"gravity": G, "latitude_deg": 50.0}
-    checked = check_chain(block, parse({"format": 1, "site": site, "position": held}))
+    checked = check_chain(
+        block, parse_description({"format": 1, "site": site, "position": held})
+    )
     return [(f.from_s, f.to_s) for name, f in checked.faults if name == "bump"]
 
 
@@ -145,7 +151,7 @@ def test_a_sway_that_turns_back_at_the_end_of_a_window_is_no_push() -> None:
             for a, b in ends
         ]
         site = {"gravity": G, "latitude_deg": 50.0}
-        about = parse({"format": 1, "site": site, "position": held})
+        about = parse_description({"format": 1, "site": site, "position": held})
         checked = check_chain(Block.of(t, acc, rates), about)
         assert [f for name, f in checked.faults if name == "bump"] == []
 
@@ -160,7 +166,7 @@ def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
     six[100:700, 2] = np.nan
     six[400:430, 3] += 5e-3
     held = [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 0.0, "end_s": 20.0}]
-    about = parse({"format": 1, "site": {"gravity": G}, "position": held})
+    about = parse_description({"format": 1, "site": {"gravity": G}, "position": held})
     checked = check_chain(Block.of(t, six[:, :3], six[:, 3:]), about)
     (found,) = [fault for name, fault in checked.faults if name == "bump"]
     assert found.channel == "gx" and abs(found.from_s - 8.0) < 0.1
@@ -203,7 +209,7 @@ def test_however_short_a_window_is_and_whatever_is_in_it_nothing_breaks(
         {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": float(a), "end_s": float(b)}
         for a, b in ends
     ]
-    about = parse({"format": 1, "site": {"gravity": G}, "position": held})
+    about = parse_description({"format": 1, "site": {"gravity": G}, "position": held})
     checked = check_chain(Block.of(t, six[:, :3], six[:, 3:]), about)
     assert checked.usable.shape == six.shape
     for fault in checked.faults:

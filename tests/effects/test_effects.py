@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes.columns import RowView, effect_basis
@@ -40,7 +40,7 @@ def experience() -> Experience:
         warming=rng.standard_normal(ROWS),
         heating=rng.standard_normal(ROWS),
         variance=rng.uniform(0, 1, (ROWS, 3)),
-        base_rate=earth_rate_home(0.9),
+        base_rate=earth_rate_at_home(0.9),
         latitude=0.9,
         joint_turns=joints,
     )

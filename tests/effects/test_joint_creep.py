@@ -11,8 +11,8 @@ import pytest
 from session_folders import CALM, WIDE, places, recorded, write_session
 
 from fieldcal.cli import main
-from fieldcal.core.frames import earth_rate_home, turn
-from fieldcal.core.rotation import logarithm
+from fieldcal.core.frames import direction_cosines, earth_rate_at_home
+from fieldcal.core.rotation import rotation_vectors
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis import diagnose
 from fieldcal.effects import catalogue
@@ -43,7 +43,7 @@ def rows(t: Array, crept: Array | float = 0.0, **more: object) -> Experience:
     """Rows at rest, each in the position that was turned to last."""
     p = np.searchsorted(AT, t, side="right") - 1
     alpha, beta = (ANGLES[p, :2] + crept).T
-    known = {"base_rate": earth_rate_home(0.9), "mounting": P, **more}
+    known = {"base_rate": earth_rate_at_home(0.9), "mounting": P, **more}
     turned = JointTurns.of(AT, ANGLES)
     return Experience.at_rest(
         alpha,
@@ -73,11 +73,11 @@ def test_it_turns_the_device_about_its_joints() -> None:
     for k, one in enumerate(t[1:], 1):
         p = int(np.searchsorted(AT, one, side="right") - 1)
         before, after = (
-            P.T @ turn(*(ANGLES[p] + np.append(off(np.array([s]))[0], 0)))
+            P.T @ direction_cosines(*(ANGLES[p] + np.append(off(np.array([s]))[0], 0)))
             for s in (one - d, one + d)
         )
         # of a vector that stays in space the device sees the opposite turn
-        rate = logarithm(before @ after.T) / (2 * d)
+        rate = rotation_vectors(before @ after.T) / (2 * d)
         seen = rate + crept.w[k] - rows(t).w[k]
         np.testing.assert_allclose(by[k, 3:], seen, atol=5e-7)
 
@@ -107,7 +107,12 @@ def test_a_turn_is_about_the_axes_as_they_have_crept() -> None:
     about = np.array([0.0, 0.0, 0.7])
     a, g = np.full(2, ANGLES[2, 0]), np.full(2, ANGLES[2, 2])
     plain, crept = (
-        np.array([turn(*one) @ about for one in zip(a, beta + more, g, strict=True)])
+        np.array(
+            [
+                direction_cosines(*one) @ about
+                for one in zip(a, beta + more, g, strict=True)
+            ]
+        )
         @ P
         for more in (np.zeros(2), size[:, 1])
     )

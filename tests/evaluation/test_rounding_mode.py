@@ -17,14 +17,14 @@ from fieldcal.evaluation.rounding_mode import (
     with_rounding_uncertainty,
     zero_crossings,
 )
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session
 
 STEP = 0.05
 
 
 def session(acc: Array) -> Session:
-    made = Session(Path("rounded"), parse({"site": {"latitude_deg": 50.0}}))
+    made = Session(Path("rounded"), parse_description({"site": {"latitude_deg": 50.0}}))
     t = np.arange(len(acc)) / 100.0
     made.__dict__["block"] = Block.of(t, acc, np.zeros_like(acc))
     return made

@@ -20,11 +20,16 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    PX4,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
-from fieldcal.session.schemas import schema
+from fieldcal.session.schemas import load_schema
 
 
 def samples(rng: np.random.Generator, n: int = 200) -> Block:
@@ -37,7 +42,7 @@ def corrected(
     values: dict[str, float], autopilot: int, instance: int, raw: Block
 ) -> tuple[Array, Array]:
     """(raw - offset) * scale, as both autopilots do it."""
-    known = names(autopilot, instance)
+    known = parameter_names(autopilot, instance)
     offset, scale, gyro = (
         np.array([values[n] for n in known[what]])
         for what in ("acc_offset", "acc_scale", "gyr_offset")
@@ -67,8 +72,10 @@ def test_what_was_installed_is_put_together_with_what_was_found(
 ) -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
-        known = names(number, 1)
-        device = Installed(number, 1, dict.fromkeys(known["rotation"], 0.0), taken_out)
+        known = parameter_names(number, 1)
+        device = InstalledCalibration(
+            number, 1, dict.fromkeys(known["rotation"], 0.0), taken_out
+        )
         for what, centre, width in (
             ("acc_offset", 0, 0.4),
             ("acc_scale", 1, 0.03),
@@ -79,7 +86,7 @@ def test_what_was_installed_is_put_together_with_what_was_found(
         acc, gyr = corrected(device.values, number, 1, raw)
         sent = raw if taken_out else Block.of(raw.t, acc, gyr)
         new = module.parameters(
-            cal, installed=Installed.from_table(device.as_table())
+            cal, installed=InstalledCalibration.from_table(device.as_table())
         ).values
         acc, gyr = corrected(dict(new), number, 1, raw)
         np.testing.assert_allclose(acc, cal.apply(sent).acc, atol=1e-12)
@@ -106,14 +113,14 @@ def test_parameters_of_another_program_or_a_turned_board_are_refused() -> None:
     rng = np.random.default_rng(4)
     cal = calibration(rng, 0.0)
     with pytest.raises(InputError, match="another autopilot"):
-        ardupilot.parameters(cal, installed=Installed(PX4, 0))
-    turned = Installed(
-        PX4, 0, {n: 1.0 for some in names(PX4, 0).values() for n in some}
+        ardupilot.parameters(cal, installed=InstalledCalibration(PX4, 0))
+    turned = InstalledCalibration(
+        PX4, 0, {n: 1.0 for some in parameter_names(PX4, 0).values() for n in some}
     )
     with pytest.raises(InputError, match="SENS_BOARD_ROT"):
         px4.parameters(cal, installed=turned)
     with pytest.raises(InputError, match="in full"):
-        Installed.from_table({"parameters": 3})
+        InstalledCalibration.from_table({"parameters": 3})
 
 
 def source(folder: Path, cal: Calibration, raw: Block) -> ExportSource:
@@ -213,7 +220,7 @@ def test_json_follows_its_schema_and_corrects(
     made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:
     told = json.loads(written(made[0], "json", tmp_path).read_text())
-    jsonschema.validate(told, schema("export"))
+    jsonschema.validate(told, load_schema("export"))
     _, raw, true = made
     for name, u, f in (
         ("accelerometer", raw.acc, true.acc),

@@ -81,8 +81,10 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
 
     assert main([*call, "--diagnose", "--resume"]) == 1
     assert json.loads(capsys.readouterr().out)["done"] == 0
-    kept = Database(store).done(
-        lambda db: sessions.found(db, {"lot": "L7"}, documents=True, reduced=True)
+    kept = Database(store).run(
+        lambda db: sessions.find_sessions(
+            db, {"lot": "L7"}, documents=True, reduced=True
+        )
     )
     small = ReducedSession.from_bytes(kept[0].reduced or b"")
     assert {c.effect for c in small.columns} >= {"cross_coupling", "g_sensitivity"}

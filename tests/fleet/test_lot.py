@@ -236,9 +236,9 @@ def test_the_command_reads_the_store_and_writes_a_page(
 
     def put(db: object) -> None:
         for one in units(station=2.0):
-            sessions.keep(db, one)  # type: ignore[arg-type]
+            sessions.store_session(db, one)  # type: ignore[arg-type]
 
-    data.done(put, write=True)
+    data.run(put, write=True)
     own, page = ["--history", str(tmp_path / "h")], tmp_path / "lot.html"
     assert main(["lot", "lot=7", *own, "--json"]) == 1
     said = json.loads(capsys.readouterr().out)

@@ -41,7 +41,7 @@ def calibration(x: Array, sigma: Array, together: float = 0.0) -> Calibration:
 
 
 def stored(i: int, found: Calibration, place: bool = True) -> StoredSession:
-    one = sessions.of_calibration(Path(f"/s/{i}"), found, None)
+    one = sessions.session_of_calibration(Path(f"/s/{i}"), found, None)
     known = {"conditions": {"latitude_deg": 50.0}, "site": {"height_m": 100.0}}
     result = {**(one.result or {}), **(known if place else {})}
     return replace(one, serial=f"A{i}", levels={"lot": "7"}, result=result)
@@ -166,9 +166,9 @@ def test_solve_takes_the_lot_from_the_store(
             off = 0.5 * wide * rng.standard_normal(len(names))
             made = replace(Calibration.from_json(alone), values=mean + off)
             one = stored(i, replace(made, covariance=1e-4 * made.covariance))
-            sessions.keep(db, one)  # type: ignore[arg-type]
+            sessions.store_session(db, one)  # type: ignore[arg-type]
 
-    Database(tmp_path / "h").done(put, write=True)
+    Database(tmp_path / "h").run(put, write=True)
     call = ["solve", str(five), "--lot", "lot=7", *own]
     assert main(call) in (0, 1)
     text = capsys.readouterr().out

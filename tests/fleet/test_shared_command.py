@@ -43,7 +43,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     database = Database(tmp_path / "h")
     for name in list(made)[:-2]:
         kept = solved(SessionTask(diagnose=True), name)
-        database.done(lambda db, kept=kept: sessions.keep(db, kept), write=True)  # type: ignore[misc]
+        database.run(lambda db, kept=kept: sessions.store_session(db, kept), write=True)  # type: ignore[misc]
     return ["diagnose", *made, "--shared", "--history", str(tmp_path / "h")]
 
 

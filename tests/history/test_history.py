@@ -19,9 +19,9 @@ from fieldcal.commands.history import lines
 from fieldcal.commands.report import write
 from fieldcal.core.errors import InputError
 from fieldcal.evaluation.observations import observe, usable_windows
-from fieldcal.history.place import default_place
-from fieldcal.history.store import History, family
-from fieldcal.history.trend import trend
+from fieldcal.history.location import default_location
+from fieldcal.history.store import History, family_runs
+from fieldcal.history.trend import parameter_trend
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
@@ -128,10 +128,10 @@ def test_the_place_is_that_of_the_user_unless_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("FIELDCAL_HISTORY", "/x/h.sqlite")
-    assert default_place() == Path("/x/h.sqlite")
+    assert default_location() == Path("/x/h.sqlite")
     monkeypatch.delenv("FIELDCAL_HISTORY")
     monkeypatch.setenv("XDG_DATA_HOME", "/data")
-    assert default_place() == Path("/data/fieldcal/history.sqlite")
+    assert default_location() == Path("/data/fieldcal/history.sqlite")
 
 
 def bench(folder: Path) -> Session:
@@ -139,12 +139,12 @@ def bench(folder: Path) -> Session:
     import pyarrow as pa
     import pyarrow.parquet
 
-    from fieldcal.session.sample_files import to_batch
+    from fieldcal.session.sample_files import to_record_batch
 
     folder.mkdir()
     windows = [(0.0, 0.0, 5.0, 15.0), (np.pi / 4, np.radians(5.0), 25.0, 35.0)]
     block = simulate(Profile(), windows, seed=1)
-    table = pa.Table.from_batches([to_batch(block)])
+    table = pa.Table.from_batches([to_record_batch(block)])
     pyarrow.parquet.write_table(table, folder / "samples.parquet")
     lines_ = ['[device]\nserial = "A1"\n[site]\nlatitude_deg = 50.45\nheight_m = 170.0']
     for alpha, beta, start, end in windows:
@@ -173,9 +173,9 @@ def test_only_runs_that_were_go_or_accepted_are_the_family(tmp_path: Path) -> No
     history.add("2026-03-04", Path("/s/4"), calibration(0.9, go=False))
     history.add("2026-03-05", Path("/s/5"), calibration(0.9))
     runs = history.runs("A1")
-    assert [r.number for r in family(runs)] == [1, 2, 3, 5]
+    assert [r.number for r in family_runs(runs)] == [1, 2, 3, 5]
     history.accept("A1", 4)
-    assert [r.number for r in family(history.runs("A1"))] == [4, 5]
+    assert [r.number for r in family_runs(history.runs("A1"))] == [4, 5]
     with pytest.raises(InputError, match="has no calibration number 77"):
         history.accept("A1", 77)
 
@@ -185,8 +185,8 @@ def test_a_run_out_of_family_is_flagged_and_the_next_is_not(tmp_path: Path) -> N
     history = filled(tmp_path / "h.sqlite", *(0.2 + 0.01 * rng.standard_normal(12)))
     history.add("2026-03-20", Path("/s/x"), calibration(1.0, go=False))
     history.add("2026-03-21", Path("/s/y"), calibration(0.2))
-    points = trend(history.runs("A1"), "acc_bias.x", BOUNDS)
-    assert [p.run.number for p in points if p.odd] == [13]
+    points = parameter_trend(history.runs("A1"), "acc_bias.x", BOUNDS)
+    assert [p.run.number for p in points if p.out_of_family] == [13]
     assert 0.01 < points[-1].spread < 0.05
     shown = lines(points)
     assert max(map(len, shown)) <= 80

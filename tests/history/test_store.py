@@ -27,7 +27,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.history import database, sessions
 from fieldcal.history.database import Database
-from fieldcal.history.place import Place
+from fieldcal.history.location import StoreLocation
 from fieldcal.history.sessions import StoredSession
 from fieldcal.history.store import History
 from fieldcal.history.tables import METADATA
@@ -57,19 +57,21 @@ def calibration(bias: float = 0.2, serial: str = "A1") -> Calibration:
 
 
 def stored(number: int, **other: object) -> StoredSession:
-    one = sessions.of_calibration(Path(f"/s/{number}"), calibration(0.1 * number), None)
+    one = sessions.session_of_calibration(
+        Path(f"/s/{number}"), calibration(0.1 * number), None
+    )
     return replace(one, reduced=bytes([number % 256]) * 100, **other)  # type: ignore[arg-type]
 
 
-def put(place: Place, *some: StoredSession) -> None:
+def put(place: StoreLocation, *some: StoredSession) -> None:
     data = Database(place)
     for one in some:
-        data.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
+        data.run(lambda db, one=one: sessions.store_session(db, one), write=True)  # type: ignore[misc]
 
 
-def everything(place: Place, **wanted: str) -> list[StoredSession]:
-    return Database(place).done(
-        lambda db: sessions.found(db, wanted, documents=True, reduced=True)
+def everything(place: StoreLocation, **wanted: str) -> list[StoredSession]:
+    return Database(place).run(
+        lambda db: sessions.find_sessions(db, wanted, documents=True, reduced=True)
     )
 
 
@@ -79,7 +81,7 @@ def test_a_session_comes_back_as_it_was(tmp_path: Path) -> None:
     put(tmp_path / "h", one, stored(2))
     assert everything(tmp_path / "h", lot="7") == [one]
     assert everything(tmp_path / "h", lot="8") == []
-    values, sigmas = sessions.values(everything(tmp_path / "h"), "acc_bias.x")
+    values, sigmas = sessions.parameter_values(everything(tmp_path / "h"), "acc_bias.x")
     np.testing.assert_allclose(np.sort(values), [0.1, 0.2])
     np.testing.assert_allclose(sigmas, 1e-3)
 
@@ -124,19 +126,19 @@ def test_migrations_make_the_tables_that_the_program_uses(tmp_path: Path) -> Non
         return {t: {c["name"] for c in look.get_columns(t)}
                 for t in METADATA.tables}  # fmt: skip
 
-    made = Database(tmp_path / "h").done(columns)
+    made = Database(tmp_path / "h").run(columns)
     assert made == {
         name: {c.name for c in table.c} for name, table in METADATA.tables.items()
     }
-    scripts = ScriptDirectory.from_config(database._config())  # type: ignore[arg-type]
-    assert scripts.get_current_head() == database.HEAD
+    scripts = ScriptDirectory.from_config(database._alembic_config())  # type: ignore[arg-type]
+    assert scripts.get_current_head() == database.LAST_MIGRATION
 
 
-def write(place: Place, name: int) -> None:
+def write(place: StoreLocation, name: int) -> None:
     put(place, *(replace(stored(i), folder=f"/{name}/{i}") for i in range(6)))
 
 
-def writers(place: Place, count: int) -> list[ForkServerProcess]:
+def writers(place: StoreLocation, count: int) -> list[ForkServerProcess]:
     """Processes that write some sessions each."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([__name__])
@@ -190,10 +192,13 @@ def test_a_full_disk_leaves_what_was_there_and_nothing_half(tmp_path: Path) -> N
 
 
 def test_a_word_that_is_no_condition_is_refused() -> None:
-    assert sessions.parsed(["lot=7", "since=2026"]) == {"lot": "7", "since": "2026"}
+    assert sessions.parse_filters(["lot=7", "since=2026"]) == {
+        "lot": "7",
+        "since": "2026",
+    }
     for wrong in ("lot", "colour=red"):
         with pytest.raises(InputError, match="is no condition"):
-            sessions.parsed([wrong])
+            sessions.parse_filters([wrong])
 
 
 def test_an_address_that_is_none_is_said_without_its_password() -> None:
@@ -280,7 +285,7 @@ def test_postgresql_restarted_among_eight_writers_loses_nothing(tmp_path: Path) 
                 server.stop()
                 back = threading.Timer(0.3, server.start)
                 back.start()
-            data.done(lambda db, one=one: sessions.keep(db, one), write=True)  # type: ignore[misc]
+            data.run(lambda db, one=one: sessions.store_session(db, one), write=True)  # type: ignore[misc]
         back.join()
         # writers that had not reached the server yet may have found it away
         codes = ended(some)

@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.session.stream_facts import StreamFacts
-from fieldcal.session.clock import SteadyClock
+from fieldcal.session.clock_steps import ClockStepRemover
 from fieldcal.session.folder import Session
 
 FIX = 1.7e9
 """A time of day that a receiver might tell, s since 1970."""
 
 
-def steadied(t: Array, cuts: list[int]) -> tuple[Array, SteadyClock]:
+def steadied(t: Array, cuts: list[int]) -> tuple[Array, ClockStepRemover]:
     """Times after the clock's steps, handed over in pieces."""
-    block, clock = Block.of(t, np.ones((len(t), 3))), SteadyClock()
+    block, clock = Block.of(t, np.ones((len(t), 3))), ClockStepRemover()
     edges = [0, *sorted(c for c in cuts if c < len(t)), len(t)]
     parts = [block[a:b] for a, b in zip(edges, edges[1:], strict=False)]
-    return concat([*(clock.add(p) for p in parts), clock.rest()]).t, clock
+    return concat([*(clock.add(p) for p in parts), clock.flush()]).t, clock
 
 
 @given(

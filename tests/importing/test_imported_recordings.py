@@ -13,7 +13,7 @@ from recordings import REAL
 
 from fieldcal.cli import main
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import findings
+from fieldcal.session.integrity import file_faults
 
 PYULOG, STREAMS = "pyulog_samples", "autopilot_streams"
 HAND, SUN = "tomisuarez_mpu6050", "sunsided_mpu6050_temp"
@@ -120,7 +120,7 @@ def test_a_recording_is_brought_in_as_its_provenance_says(
         assert {p.name for p in (tmp_path / "s").iterdir()} == set(expected)
     for stream, found in expected.items():
         folder = tmp_path / "s" / stream
-        assert not list(findings(folder))
+        assert not list(file_faults(folder))
         facts = imported(folder)
         assert facts["rows"] == found.rows == len(Session.open(folder).block)
         assert facts["end_s"] - facts["start_s"] == pytest.approx(

@@ -26,7 +26,7 @@ from fieldcal.importing.session.ingest import import_stream
 from fieldcal.importing.session.validation import RowValidator
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import findings
+from fieldcal.session.integrity import file_faults
 
 INSTALLED = {
     "INS_ACCOFFS_X": 0.1, "INS_ACCOFFS_Y": 0.2, "INS_ACCOFFS_Z": 0.3,
@@ -74,7 +74,7 @@ def test_px4_sensors_are_kept_apart_with_their_own_calibration(tmp_path: Path) -
         np.testing.assert_array_equal(
             Session.open(folder).block.temperature, block.temperature
         )
-        assert not list(findings(folder))
+        assert not list(file_faults(folder))
         assert any("2 ms apart" in s for s in mark(folder, "imported")["says"])
     device = mark(out / "sensor_accel.1", "device")
     assert device["device_id"] == 101 and device["installed"]["taken_out"]
@@ -509,9 +509,9 @@ def test_a_column_that_damage_gave_the_name_of_another_is_refused(
     path = tmp_path / "samples.parquet"
     path.write_bytes(whole)
     with pytest.raises(SessionError, match="is not a whole Parquet file"):
-        sample_files.read(path)
+        sample_files.read_samples(path)
     with pytest.raises(SessionError, match="is not a whole Parquet file"):
-        list(sample_files.blocks(path))
+        list(sample_files.iterate_samples(path))
 
 
 @settings(max_examples=150, deadline=None)
@@ -531,7 +531,7 @@ def test_changed_bytes_of_an_imported_session_invent_no_sample(
     path = tmp_path_factory.mktemp("changed") / "samples.parquet"
     path.write_bytes(whole)
     try:
-        found, _ = sample_files.read(path)
+        found, _ = sample_files.read_samples(path)
     except SessionError as error:
         assert str(error).startswith(f"{path}: ")
         return

@@ -76,7 +76,7 @@ def test_without_gyroscopes_names_or_unit(tmp_path: Path) -> None:
 def test_times_that_are_written_are_kept(tmp_path: Path) -> None:
     rows = np.column_stack([40.0 * np.arange(12), means(3, 12)])
     _, made = session(tmp_path, rows, f"t [s],{SIX}")
-    assert made.about.timed
+    assert made.about.means_timed
     np.testing.assert_allclose(made.block.t, rows[:, 0])
 
 

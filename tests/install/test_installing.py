@@ -21,7 +21,7 @@ from processes import TWO_POSITION, simulated, steady, wait_for_samples
 from fieldcal.cli import main
 from fieldcal.drivers.driver import open_driver
 from fieldcal.drivers.mavlink_imu import MavlinkImu
-from fieldcal.drivers.mavlink_installed import Installed
+from fieldcal.drivers.mavlink_installed import InstalledCalibration
 from fieldcal.session.marks import mark_line
 
 HAS = "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02&INS_GYROFFS_Z=0.01"
@@ -129,7 +129,7 @@ def begun(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
             run.wait()
 
 
-def installed(url: str) -> Installed:
+def installed(url: str) -> InstalledCalibration:
     """What the autopilot has now."""
     with open_driver(url) as imu:
         assert isinstance(imu, MavlinkImu) and imu.installed is not None
@@ -151,7 +151,7 @@ def test_a_run_that_is_told_to_end_gives_the_calibration_back(
         run.send_signal(number)
         assert run.wait() == 130
         again = installed(url)
-        np.testing.assert_allclose(again.of("acc_offset"), [0.5, 0, 0])
+        np.testing.assert_allclose(again.vector("acc_offset"), [0.5, 0, 0])
         assert again.values["INS_GYROFFS_Z"] == pytest.approx(0.01)
 
 
@@ -162,11 +162,11 @@ def test_what_a_killed_run_left_out_can_be_given_back(
     with begun(folder) as (run, url):
         run.kill()
         run.wait()
-        np.testing.assert_array_equal(installed(url).of("acc_offset"), 0)
+        np.testing.assert_array_equal(installed(url).vector("acc_offset"), 0)
         assert main(["undo", str(folder), "--yes"]) == 0
         assert "INS_ACCOFFS_X: 0 -> 0.5" in capsys.readouterr().out
         again = installed(url)
-        np.testing.assert_allclose(again.of("acc_offset"), [0.5, 0, 0])
+        np.testing.assert_allclose(again.vector("acc_offset"), [0.5, 0, 0])
         assert again.values["INS_ACCSCAL_Y"] == pytest.approx(1.02)
         assert main(["undo", str(folder), "--yes"]) == 2
         assert "nothing was written from there" in capsys.readouterr().err

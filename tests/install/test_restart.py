@@ -18,10 +18,18 @@ from processes import HANGS, TWO_POSITION, simulated, steady
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.drivers.mavlink_parameters import ParameterLink
-from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch
-from fieldcal.session.installed import NOTHING, as_sent, in_one_calibration
+from fieldcal.drivers.mavlink_watch import STABLE_ROUNDS, InstalledWatch
+from fieldcal.session.installed_calibration import (
+    NO_CORRECTION,
+    nominal_as_sent,
+    under_last_calibration,
+)
 from fieldcal.session.marks import read_marks
 
 TURNED = {"alpha_deg": 45, "beta_deg": 5}
@@ -130,29 +138,29 @@ def test_a_parameter_that_does_not_change_by_itself_still_refuses(
     assert "INS_ACCOFFS_Y = 0.7 on the autopilot" in capsys.readouterr().err
 
 
-def told(installed: Installed, watch: InstalledWatch, offset: float) -> None:
+def told(installed: InstalledCalibration, watch: InstalledWatch, offset: float) -> None:
     """One whole round of answers."""
-    for some in names(ARDUPILOT, 0).values():
+    for some in parameter_names(ARDUPILOT, 0).values():
         for name in some:
             watch.hear(name, {"INS_GYROFFS_X": offset}.get(name, 1.0))
 
 
 def test_it_is_read_until_it_is_stable() -> None:
-    installed = Installed(ARDUPILOT, 0)
+    installed = InstalledCalibration(ARDUPILOT, 0)
     watch = InstalledWatch(installed)
     for offset, waits in ((0.0, True), (0.0, False)):
         told(installed, watch, offset)
-        assert watch.waits is waits
+        assert watch.is_reading is waits
     assert (watch.readings, watch.changes) == (1, 0)
-    watch.again(STABLE)
+    watch.start_over(STABLE_ROUNDS)
     for offset, waits in ((0.0, True), (0.1, True), (0.2, True), (0.2, False)):
         told(installed, watch, offset)
-        assert watch.waits is waits
+        assert watch.is_reading is waits
     assert watch.changes == 2
     assert installed.values["INS_GYROFFS_X"] == 0.2
     # an answer that nobody asked for, as when another program sets it
     watch.hear("INS_GYROFFS_X", 0.3)
-    assert watch.waits and "INS_GYROFFS_X" not in watch.open
+    assert watch.is_reading and "INS_GYROFFS_X" not in watch.unheard
 
 
 def test_samples_before_a_change_are_as_if_it_had_been_there() -> None:
@@ -173,7 +181,7 @@ def test_samples_before_a_change_are_as_if_it_had_been_there() -> None:
     again: dict[str, Any] = {"event": "device", "installed": {"in_samples": used[1]}}
     marks.append({**again, "until_s": 4.0, "at_s": 6.0})
     recorded = Block.of(t, acc, gyr)
-    one, said = in_one_calibration(recorded, marks)
+    one, said = under_last_calibration(recorded, marks)
     kept = (t <= 4.0) | (t > 6.0)
     np.testing.assert_array_equal(one.t, t[kept])
     new = (raw_acc - used[1]["acc_offset"]) * used[1]["acc_scale"]
@@ -184,20 +192,20 @@ def test_samples_before_a_change_are_as_if_it_had_been_there() -> None:
     assert len(said) == 1 and "20 are left out" in said[0]
     # told to correct nothing: what counts is the sensor's own output
     marks[1] = {**marks[1], "installed": {**marks[1]["installed"], "taken_out": True}}
-    one, _ = in_one_calibration(recorded, marks)
+    one, _ = under_last_calibration(recorded, marks)
     np.testing.assert_allclose(one.acc, raw_acc[kept], atol=1e-12)
     # a run that was broken off: sure up to its last window
     window = {"event": "window", "start_s": 1.0, "end_s": 3.0}
     broken = [marks[0], window, {**again, "at_s": 5.0}]
-    one, _ = in_one_calibration(recorded, broken)
+    one, _ = under_last_calibration(recorded, broken)
     np.testing.assert_array_equal(one.t, t[(t <= 3.0) | (t > 5.0)])
     # what nobody knows is not put together with what is known
     nothing = {"event": "device", "installed": {"in_samples": None}, "at_s": 6.0}
     unknown = [marks[0], nothing]
-    assert in_one_calibration(recorded, unknown)[0].t[0] > 6.0
+    assert under_last_calibration(recorded, unknown)[0].t[0] > 6.0
     same = [marks[0], {**marks[0], "at_s": 3.0}]
-    assert in_one_calibration(recorded, same) == (recorded, ())
-    assert NOTHING.keys() == used[0].keys()
+    assert under_last_calibration(recorded, same) == (recorded, ())
+    assert NO_CORRECTION.keys() == used[0].keys()
 
 
 def test_what_an_autopilot_takes_out_is_no_error_of_the_device() -> None:
@@ -209,7 +217,7 @@ def test_what_an_autopilot_takes_out_is_no_error_of_the_device() -> None:
         "acc_offset": [0.5, 0, 0], "acc_scale": [1, 1.02, 1], "gyr_offset": [0, 0, 0.04]
     }  # fmt: skip
     mark: dict[str, Any] = {"event": "device", "installed": {"in_samples": used}}
-    sent = as_sent(nominal, [mark])
+    sent = nominal_as_sent(nominal, [mark])
     force = np.array([3.0, -4.0, 8.0])
     by_sensor = nominal["acc_bias"] + nominal["acc_scale"] * force
     np.testing.assert_allclose(
@@ -219,5 +227,5 @@ def test_what_an_autopilot_takes_out_is_no_error_of_the_device() -> None:
     np.testing.assert_allclose(sent["gyr_bias"], [0, 0, -0.04])
     mark["installed"]["taken_out"] = True
     for marks in ([], [mark]):
-        for name, value in as_sent(nominal, marks).items():
+        for name, value in nominal_as_sent(nominal, marks).items():
             np.testing.assert_array_equal(value, nominal[name])

@@ -23,7 +23,12 @@ from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
 from fieldcal.commands.write import prepared
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    PX4,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.proposal import changes, problems
 from fieldcal.session.folder import Session
@@ -40,12 +45,14 @@ def autopilot(query: str = "") -> Iterator[str]:
         yield f"mavlink:{place}?system=1&component=1"
 
 
-def installed(autopilot: int = ARDUPILOT, taken_out: bool = False) -> Installed:
-    known = names(autopilot, 0)
+def installed(
+    autopilot: int = ARDUPILOT, taken_out: bool = False
+) -> InstalledCalibration:
+    known = parameter_names(autopilot, 0)
     values = dict.fromkeys((*known["acc_offset"], *known["gyr_offset"]), 0.05)
     values |= dict.fromkeys(known["acc_scale"], 1.02)
     values |= dict.fromkeys(known["rotation"], 0.0)
-    return Installed(autopilot, 0, values, taken_out)
+    return InstalledCalibration(autopilot, 0, values, taken_out)
 
 
 def calibration(go: bool = True) -> Calibration:
@@ -70,7 +77,7 @@ def session(tmp_path: Path) -> Path:
     return make(tmp_path / "s", calibration(), installed())
 
 
-def make(folder: Path, found: Calibration, there: Installed) -> Path:
+def make(folder: Path, found: Calibration, there: InstalledCalibration) -> Path:
     folder.mkdir()
     (folder / "session.toml").write_text("format = 1\n")
     mark = {"event": "device", "installed": there.as_table()}
@@ -79,7 +86,7 @@ def make(folder: Path, found: Calibration, there: Installed) -> Path:
     return folder
 
 
-def old_query(there: Installed) -> str:
+def old_query(there: InstalledCalibration) -> str:
     return "&".join(f"{k}={v}" for k, v in there.values.items())
 
 
@@ -97,7 +104,7 @@ def test_what_is_installed_takes_all_of_it_out(
     true, raw_bias, raw_scale = np.array([1.0, -9.8, 0.3]), offsets[3:], scales[3:]
     raw = raw_bias + np.array(raw_scale) * true
     there = installed(program, taken_out)
-    known = names(program, 0)
+    known = parameter_names(program, 0)
     there.values |= dict(zip(known["acc_offset"], o.tolist(), strict=True))
     there.values |= dict(zip(known["acc_scale"], k.tolist(), strict=True))
     # what was sent is (r - o) k, unless it was taken out for the recording
@@ -254,11 +261,11 @@ def test_a_session_of_no_autopilot_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scale", [float("nan"), 0.0, -1.0])
 def test_a_damaged_installed_scale_is_said_and_never_built_on(scale: float) -> None:
     there = installed()
-    name = names(ARDUPILOT, 0)["acc_scale"][1]
+    name = parameter_names(ARDUPILOT, 0)["acc_scale"][1]
     there.values[name] = scale
     assert name in there.remark and "set it anew" in there.remark
     with pytest.raises(InputError, match=name):
-        there.next(np.array(BIAS), np.array(SCALE), np.array(GYR))
+        there.parameters_after(np.array(BIAS), np.array(SCALE), np.array(GYR))
     json.dumps(there.as_table(), allow_nan=False)
-    again = Installed.from_table(there.as_table())
+    again = InstalledCalibration.from_table(there.as_table())
     assert again.missing == ([name] if np.isnan(scale) else [])

@@ -16,7 +16,7 @@ from processes import FIELDCAL, HANGS, simulated
 
 from benchmarks.write_undo import OLD, WRITTEN, session, trial
 from fieldcal.cli import main
-from fieldcal.drivers.mavlink_parameters import ParameterLink, same
+from fieldcal.drivers.mavlink_parameters import ParameterLink, same_float32
 from fieldcal.install.transaction import SAVED
 
 
@@ -47,12 +47,12 @@ def test_after_a_kill_it_is_given_back_or_finished(
         assert main([then, *to]) == 0
         with ParameterLink(url.removeprefix("mavlink:")) as link:
             kept = link.read(WRITTEN)
-        assert all(same(kept[n], OLD[n]) for n in WRITTEN) == (then == "undo")
+        assert all(same_float32(kept[n], OLD[n]) for n in WRITTEN) == (then == "undo")
         if then == "write":
             assert main(["undo", *to]) == 0
             with ParameterLink(url.removeprefix("mavlink:")) as link:
                 kept = link.read(WRITTEN)
-            assert all(same(kept[n], OLD[n]) for n in WRITTEN)
+            assert all(same_float32(kept[n], OLD[n]) for n in WRITTEN)
     (last,) = sorted(recorded.glob(f"{SAVED}*"))[-1:]
     assert json.loads(last.read_text())["undone"]
     capsys.readouterr()

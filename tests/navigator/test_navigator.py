@@ -28,7 +28,7 @@ def solved(folder: Path, **how: Any) -> tuple[Calibration, Sensors]:
     rng = np.random.default_rng(how.pop("seed", 1))
     sensors = how.pop("sensors", None) or Sensors.drawn(rng)
     record(folder, sensors, rng, **how)
-    about = description.read(folder / "session.toml")
+    about = description.read_description(folder / "session.toml")
     return calibrate_navigator(folder, about), sensors
 
 
@@ -205,11 +205,15 @@ def test_what_cannot_be_used_is_refused(
     record(tmp_path, EXACT, np.random.default_rng(1), faces=FACES[:1], seconds=20.0)
     (tmp_path / file).write_text(content)
     with pytest.raises(InputError, match=says):
-        calibrate_navigator(tmp_path, description.read(tmp_path / "session.toml"))
+        calibrate_navigator(
+            tmp_path, description.read_description(tmp_path / "session.toml")
+        )
 
 
 def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     record(tmp_path, EXACT, rng, faces=FACES[:1], columns=("vn",), azimuth_deg=9.0)
     with pytest.raises(InputError, match="has one of them"):
-        calibrate_navigator(tmp_path, description.read(tmp_path / "session.toml"))
+        calibrate_navigator(
+            tmp_path, description.read_description(tmp_path / "session.toml")
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.physics.joint_turns import JointTurns
 
 P = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
@@ -42,7 +42,9 @@ def test_axes_are_those_about_which_a_joint_turns_the_device(seed: int) -> None:
     for k, row in enumerate([1, 1, 1, 2, 2]):
         for joint in (0, 1):
             step = d * np.eye(3)[joint]
-            up, down = (P.T @ turn(*(angles[row] + s * step)) @ v for s in (1, -1))
-            held = P.T @ turn(*angles[row]) @ v
+            up, down = (
+                P.T @ direction_cosines(*(angles[row] + s * step)) @ v for s in (1, -1)
+            )
+            held = P.T @ direction_cosines(*angles[row]) @ v
             moved = -np.cross(axes[k, :, joint], held)
             np.testing.assert_allclose((up - down) / (2 * d), moved, atol=1e-8)

@@ -49,7 +49,7 @@ def explained(
         alpha, beta = p.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
         tables.append({**angles, "start_s": w[2], "end_s": w[3]})
-    about = description.parse(
+    about = description.parse_description(
         {
             "site": {"latitude_deg": 45.0, "height_m": 0.0},
             "device": {"grade": "tactical", **left},

@@ -9,7 +9,13 @@ import pytest
 
 from fieldcal.cli import main
 from fieldcal.core.errors import PlanError
-from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    SIX_FACES,
+    TWO_POSITIONS,
+    WIDE_POSITIONS,
+    Position,
+)
 from fieldcal.planning import planner
 from fieldcal.planning.aliasing import find_aliases
 from fieldcal.planning.planner import (
@@ -28,7 +34,7 @@ def test_the_paper_s_five_positions_reach_the_published_bound(shared: Path) -> N
     """Figures of errata.md, for 1 mm/s^2 of noise on each mean."""
     text = (shared / "paper" / "errata.md").read_text()
     assert "4.8, 10.7, 5.2" in text and "0.26, 1.06, 2.7" in text
-    found = expected(FIVE, UNIT, 1.0, G)
+    found = expected(FIVE_POSITIONS, UNIT, 1.0, G)
     bias = [1e3 * found[f"acc_bias.{a}"] for a in "xyz"]
     scale = [1e3 * found[f"acc_scale.{a}"] for a in "xyz"]
     np.testing.assert_allclose(bias, [4.8, 10.7, 5.2], rtol=0.06)
@@ -39,13 +45,13 @@ def test_the_paper_s_five_positions_reach_the_published_bound(shared: Path) -> N
 
 def test_its_own_five_are_three_times_better_than_the_paper_s() -> None:
     ours = expected(best_positions(5, Ladder(), G), UNIT, 1.0, G)
-    paper = expected(FIVE, UNIT, 1.0, G)
+    paper = expected(FIVE_POSITIONS, UNIT, 1.0, G)
 
     def worst(found: dict[str, float]) -> float:
         return max(found[f"acc_bias.{a}"] for a in "xyz")
 
     assert worst(paper) > 3 * worst(ours)
-    assert worst(expected(WIDE, UNIT, 1.0, G)) < worst(paper) / 3
+    assert worst(expected(WIDE_POSITIONS, UNIT, 1.0, G)) < worst(paper) / 3
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])
@@ -67,7 +73,7 @@ def test_no_random_set_within_the_limits_beats_the_chosen_one(n: int) -> None:
 
 
 def test_two_positions_leave_the_tilt_and_level_ones_the_scale() -> None:
-    assert "angle_offset.alpha0_deg" not in expected(TWO, UNIT, 1.0, G)
+    assert "angle_offset.alpha0_deg" not in expected(TWO_POSITIONS, UNIT, 1.0, G)
     level = expected((Position.deg(0, 0), Position.deg(30, 0)), UNIT, 1.0, G)
     assert "acc_scale.z" not in level and "acc_bias.z" in level
     assert "acc_scale.x" in level
@@ -81,10 +87,10 @@ def test_positions_that_cannot_determine_anything_are_refused() -> None:
 
 
 def test_an_extra_position_is_new_and_helps() -> None:
-    extra = planner.extra_position(FIVE, Ladder(), G)
-    assert extra.degrees not in {p.degrees for p in FIVE}
-    before = expected(FIVE, UNIT, 1.0, G)
-    after = expected((*FIVE, extra), UNIT, 1.0, G)
+    extra = planner.extra_position(FIVE_POSITIONS, Ladder(), G)
+    assert extra.degrees not in {p.degrees for p in FIVE_POSITIONS}
+    before = expected(FIVE_POSITIONS, UNIT, 1.0, G)
+    after = expected((*FIVE_POSITIONS, extra), UNIT, 1.0, G)
     assert after["acc_bias.y"] < before["acc_bias.y"] / 2
 
 
@@ -93,7 +99,7 @@ def test_aliases_that_follow_from_the_geometry() -> None:
     six = find_aliases(SIX_FACES, G)
     assert "gravity_error" in six.hidden and "cubic" in six.hidden
     assert dict(six.pairs)["quadratic"] == ("scale_asymmetry",)
-    two = find_aliases(TWO, G)
+    two = find_aliases(TWO_POSITIONS, G)
     assert {"base_tilt", "angle_offset", "quadratic"} <= set(two.hidden)
 
 

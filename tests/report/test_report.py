@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fieldcal.cli import main
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.core.samples import Array, Block
 from fieldcal.report import EarlierCalibration, ReportMaterial, gather, packing, render
 from fieldcal.report.agreement import correlation_matrix
@@ -289,7 +289,7 @@ def test_the_norm_misses_gravity_by_bias_and_scale_before(
     errors = norm_errors(material)
     assert errors is not None
     truth, g = Profile().truth, material.session.gravity
-    alpha, beta = np.deg2rad(np.array([p.degrees for p in FIVE]) + TILT).T
+    alpha, beta = np.deg2rad(np.array([p.degrees for p in FIVE_POSITIONS]) + TILT).T
     f = np.column_stack(
         [-np.sin(alpha), -np.cos(alpha) * np.cos(beta), np.cos(alpha) * np.sin(beta)]
     )

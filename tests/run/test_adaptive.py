@@ -240,14 +240,14 @@ def test_what_a_calibration_finds_anyway_is_not_what_is_wrong(
         explanation=SimpleNamespace(probable_causes=standing),
         calibration=SimpleNamespace(names=("acc_bias.x", "base_tilt.about_x_deg")),
     )
-    assert adaptive._named(so_far) == said  # type: ignore[arg-type]
+    assert adaptive._certain_causes(so_far) == said  # type: ignore[arg-type]
 
 
 def test_only_a_plan_that_finds_its_positions_says_how_many_there_are_at_most() -> None:
     about = plan_file.task_from_tables({"run": ADAPTIVE}, "the test").about
-    assert procedures.most(about, "adaptive") == 9
-    assert procedures.most(about, "five_position") is None
+    assert procedures.max_positions(about, "adaptive") == 9
+    assert procedures.max_positions(about, "five_position") is None
     more = plan_file.task_from_tables(
         {"run": {**ADAPTIVE, "most": 6}}, "the test"
     ).about
-    assert procedures.most(more, "adaptive") == 6
+    assert procedures.max_positions(more, "adaptive") == 6

@@ -17,11 +17,11 @@ from fieldcal.core.errors import (
     Stopped,
     WrongPosition,
 )
-from fieldcal.core.frames import turn
-from fieldcal.core.positions import FIVE, TWO, Position
-from fieldcal.core.samples import Array, Block, pieces
+from fieldcal.core.frames import direction_cosines
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
+from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.diagnosis import diagnose
-from fieldcal.drivers.driver import Driver, Health, open_driver
+from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, hold
@@ -41,7 +41,9 @@ from fieldcal.sim_device.in_process import InProcess
 from fieldcal.sim_device.profile import Climate, Profile
 from fieldcal.windows import Average
 
-ABOUT = description.parse({"site": {"latitude_deg": 50.45, "height_m": 170.0}})
+ABOUT = description.parse_description(
+    {"site": {"latitude_deg": 50.45, "height_m": 170.0}}
+)
 
 
 @dataclass
@@ -125,7 +127,7 @@ def events(bench: Bench) -> list[str]:
 def test_windows_are_taken_after_the_turn_and_every_sample_is_recorded(
     bench: Bench,
 ) -> None:
-    first, second = bench.engine.run(hold_all(TWO, 12.0))
+    first, second = bench.engine.run(hold_all(TWO_POSITIONS, 12.0))
     assert 12.0 <= first.end - first.start < 12.3
     assert events(bench) == ["asked", "window", "asked", "window"]
     block = Session.open(bench.folder).block
@@ -138,7 +140,7 @@ def test_windows_are_taken_after_the_turn_and_every_sample_is_recorded(
 
 def test_a_wrong_turn_is_said_before_anything_is_averaged(bench: Bench) -> None:
     bench.turner.slips = [(0, 0), (-45, 5)]
-    averages = bench.engine.run(hold_all(TWO, 10.0))
+    averages = bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     wrong = [t for t in bench.turner.told if "wrong way" in t]
     assert len(wrong) == 1 and "α is turned the wrong way" in wrong[0]
     assert averages[1].mean[0] < 0, "the window must be from +45 degrees"
@@ -149,7 +151,7 @@ def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
     bench.turner.slips = [(0, 0), (30, 5)]
     bench.turner.corrects = False
     with pytest.raises(WrongPosition, match="turn it by"):
-        bench.engine.run(hold_all(TWO, 10.0))
+        bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert events(bench) == ["asked", "window", "asked", "wrong"]
 
 
@@ -168,13 +170,13 @@ def test_a_fast_device_gives_whoever_turns_it_some_time_by_the_clock(
         bench = make(recorder, driver)
         bench.turner.slips, bench.turner.corrects = [(30, 5)] * 3, False
         with pytest.raises(WrongPosition, match="turn it by"):
-            bench.engine.run(hold_all(TWO, 10.0))
+            bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert 10.0 < driver.host_time() < 10.5
 
 
 def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
     bench.turner.bump_at = [2.5]  # too early for anything to be kept
-    average = bench.engine.run(hold_all(TWO[:1], 20.0))[0]
+    average = bench.engine.run(hold_all(TWO_POSITIONS[:1], 20.0))[0]
     assert events(bench) == ["asked", "rejected", "told", "asked", "window"]
     mark = [m for m in Session.open(bench.folder).marks() if m["event"] == "rejected"]
     assert mark[0]["at_s"] == pytest.approx(bench.turner.bumped[0], abs=0.5)
@@ -184,12 +186,14 @@ def test_a_bump_rejects_the_window_and_it_is_taken_again(bench: Bench) -> None:
 def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
     _restless(bench)
     with pytest.raises(CalibrationFailed, match="without a disturbance in 5 tries"):
-        bench.engine.run(hold_all(TWO[:1], 30.0))
+        bench.engine.run(hold_all(TWO_POSITIONS[:1], 30.0))
 
 
 def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
     turner = _restless(bench, times=7)
-    Engine(turner.driver, turner, ABOUT, bench.recorder).run(hold_all(TWO[:1], 15.0))
+    Engine(turner.driver, turner, ABOUT, bench.recorder).run(
+        hold_all(TWO_POSITIONS[:1], 15.0)
+    )
     assert len(turner.told) == 7 and events(bench).count("window") == 1
     assert "times now" not in turner.told[1]
     assert "disturbed 7 times now: fix the device better" in turner.told[6]
@@ -213,7 +217,7 @@ def _restless(bench: Bench, times: int = 99) -> Turner:
 
 
 def test_a_hold_ends_early_once_the_sigma_asked_for_is_reached(bench: Bench) -> None:
-    average: Average = bench.engine.run(hold(0, TWO[0], 120.0, sigma=5e-3))
+    average: Average = bench.engine.run(hold(0, TWO_POSITIONS[0], 120.0, sigma=5e-3))
     assert average.end - average.start < 60.0
     assert average.sigma[:3].max() <= 5e-3
 
@@ -233,7 +237,7 @@ class Hiccup(InProcess):
 def test_samples_missing_inside_a_window_reject_it(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         bench = make(recorder, Hiccup(VirtualDevice(seed=1)))
-        bench.engine.run(hold_all(TWO[:1], 20.0))
+        bench.engine.run(hold_all(TWO_POSITIONS[:1], 20.0))
     assert "no samples came between" in bench.turner.told[0]
     assert events(bench).count("window") == 1
 
@@ -260,7 +264,7 @@ def test_a_link_pulled_for_a_moment_costs_a_window_and_no_more(
     """One that loses some all the time is taken as it is; it is judged in the end."""
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         bench = make(recorder, Pulled(VirtualDevice(seed=1), pulls), lost_share=1e-3)
-        bench.engine.run(hold_all(TWO[:1], 20.0))
+        bench.engine.run(hold_all(TWO_POSITIONS[:1], 20.0))
     assert "10 samples were lost before 14." in " ".join(bench.turner.told) or pulls[0]
     ended = events(bench)
     assert ended.count("rejected") + ended.count("kept") == rejected
@@ -286,9 +290,9 @@ def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
     driver = Returning(VirtualDevice(seed=1))
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         bench = make(recorder, driver)
-        bench.engine.run(hold_all(TWO[:1], 10.0))
+        bench.engine.run(hold_all(TWO_POSITIONS[:1], 10.0))
         driver.put_down_at = driver.device.time + later  # on the way, and at rest
-        bench.engine.run(hold_all(TWO, 10.0))
+        bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert events(bench).count("window") == 2
 
 
@@ -296,7 +300,7 @@ def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -
     bench.turner.slips, bench.turner.corrects = [(0, 0), (30, 5)], False
     turner = bench.turner
     engine = Engine(turner.driver, turner, ABOUT, bench.recorder, give_up=90.0)
-    engine.run(hold_all(TWO, 10.0))
+    engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert events(bench) == ["asked", "window", "asked", "wrong", "wrong", "window"]
 
 
@@ -321,7 +325,7 @@ def test_nobody_gives_up_on_a_mover_that_is_at_work(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         turner = Slow(InProcess(VirtualDevice(seed=3)))
         engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=20.0)
-        engine.run(hold_all(TWO, 10.0))
+        engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert not turner.told
     marks = Session.open(tmp_path / "s").marks()
     assert [m["event"] for m in marks] == ["asked", "window", "asked", "window"]
@@ -331,7 +335,7 @@ class Dead(Driver):
     """A device that says nothing."""
 
     def __init__(self, address: str = "") -> None:
-        self.name, self.health = "dead device", Health()
+        self.name, self.health = "dead device", LinkHealth()
 
     def receive(self, timeout: float) -> Block | None:
         return None
@@ -346,7 +350,7 @@ def test_a_wrong_format_is_said_at_once_with_the_one_that_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What comes instead is on the screen while the run still waits for samples."""
-    monkeypatch.setattr("fieldcal.drivers.driver.LOOK", 0.1)
+    monkeypatch.setattr("fieldcal.drivers.driver.SILENCE_INTERVAL", 0.1)
     lines = (b"%d,0.01,-9.81,0.02,0,0,0.00%d\n" % (10 * i, i % 3) for i in range(10**6))
     with talking(lambda i: next(lines)) as port:
         told: list[str] = []
@@ -361,7 +365,7 @@ def test_a_wrong_format_is_said_at_once_with_the_one_that_comes(
         with driver, Recorder(tmp_path / "s", {"format": 1}) as recorder:
             engine = Engine(driver, operator, ABOUT, recorder)
             with pytest.raises(Stopped):
-                engine.run(hold_all(TWO, 10.0))
+                engine.run(hold_all(TWO_POSITIONS, 10.0))
     assert "these are no witmotion bytes; try format=text&columns=t,ax" in told[0]
     assert "by itself" not in told[0]
 
@@ -371,13 +375,13 @@ def test_a_silent_device_is_said_to_be_silent(tmp_path: Path) -> None:
         turner = Turner(InProcess(VirtualDevice()))
         engine = Engine(Dead(), turner, ABOUT, recorder)
         with pytest.raises(DeviceSilent, match="dead device has sent no sample"):
-            engine.run(hold_all(TWO, 5.0))
+            engine.run(hold_all(TWO_POSITIONS, 5.0))
 
 
 def test_the_operator_sees_where_the_device_is_and_how_far_the_average_is(
     bench: Bench,
 ) -> None:
-    bench.engine.run(hold_all(TWO, 10.0))
+    bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     seen = [v for v in bench.turner.views if v.phase == "turning" and v.arrival]
     last = seen[-1].arrival
     assert last is not None and last.alpha_deg == pytest.approx(45, abs=2)
@@ -389,18 +393,18 @@ def test_the_operator_sees_where_the_device_is_and_how_far_the_average_is(
 
 
 def test_what_was_taken_before_is_not_asked_for_again(bench: Bench) -> None:
-    first, second = bench.engine.run(hold_all(TWO, 10.0))
+    first, second = bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
     again = Engine(
         bench.turner.driver, bench.turner, ABOUT, bench.recorder, 60.0, {0: first}
     )
-    averages = again.run(hold_all(TWO, 10.0))
+    averages = again.run(hold_all(TWO_POSITIONS, 10.0))
     assert averages[0] is first and averages[1].start > second.end
     assert events(bench).count("asked") == 3
 
 
 def test_a_position_left_out_is_told_to_the_procedure(bench: Bench) -> None:
     bench.turner.wishes = [*[None] * 30, "skip"]
-    held = bench.engine.run(hold_each(FIVE[:2], 10.0))
+    held = bench.engine.run(hold_each(FIVE_POSITIONS[:2], 10.0))
     assert list(held) == [1]
     assert "was left out by the operator" in bench.turner.told[0]
 
@@ -415,48 +419,58 @@ def test_a_taken_position_is_wanted_again(bench: Bench) -> None:
 
 
 def _then_repeat(turner: Turner) -> Plan[None]:
-    yield from hold_all(TWO[:1], 5.0)
+    yield from hold_all(TWO_POSITIONS[:1], 5.0)
     turner.wishes = ["repeat"]
-    yield from hold(1, TWO[1], 5.0)
+    yield from hold(1, TWO_POSITIONS[1], 5.0)
 
 
 def test_an_operator_may_stop(bench: Bench) -> None:
     bench.turner.wishes = ["stop"]
     with pytest.raises(Stopped):
-        bench.engine.run(hold_all(TWO, 10.0))
+        bench.engine.run(hold_all(TWO_POSITIONS, 10.0))
 
 
 def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
     """Every pair of the five, on bases tilted by up to a degree and a half."""
     rng = np.random.default_rng(6)
     for _ in range(5):
-        tilt = turn(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
-        f = {i: _force(p, tilt) for i, p in enumerate(FIVE)}
+        tilt = direction_cosines(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
+        f = {i: _force(p, tilt) for i, p in enumerate(FIVE_POSITIONS)}
         for wanted, there in itertools.permutations(range(5), 2):
             known = (
-                AcceptedPosition(FIVE[wanted - 1], f[wanted - 1]) if wanted else None
+                AcceptedPosition(FIVE_POSITIONS[wanted - 1], f[wanted - 1])
+                if wanted
+                else None
             )
-            waiting = PositionWait(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            waiting = PositionWait(
+                Hold(wanted, FIVE_POSITIONS[wanted], 10.0), FIVE_ABOUT, known
+            )
             waiting.add(_resting(f[there]), 4.0)
             assert not waiting.arrived, (wanted, there)
-            waiting = PositionWait(Hold(wanted, FIVE[wanted], 10.0), FIVE_ABOUT, known)
+            waiting = PositionWait(
+                Hold(wanted, FIVE_POSITIONS[wanted], 10.0), FIVE_ABOUT, known
+            )
             waiting.add(_resting(f[wanted]), 4.0)
             assert waiting.arrived, (wanted, waiting.problem)
 
 
-FIVE_ABOUT = description.parse(
+FIVE_ABOUT = description.parse_description(
     {
         "site": {"gravity": 9.81},
         "position": [
             dict(zip(("alpha_deg", "beta_deg"), p.degrees or (), strict=False))
-            for p in FIVE
+            for p in FIVE_POSITIONS
         ],
     }
 )
 
 
 def _force(position: Position, tilt: Array) -> Array:
-    f: Array = turn(position.alpha or 0.0, position.beta or 0.0) @ tilt @ [0, -9.81, 0]
+    f: Array = (
+        direction_cosines(position.alpha or 0.0, position.beta or 0.0)
+        @ tilt
+        @ [0, -9.81, 0]
+    )
     return f
 
 
@@ -467,7 +481,7 @@ def _resting(f: Array) -> Block:
 
 
 def test_nothing_is_known_of_a_time_without_samples() -> None:
-    waiting = PositionWait(Hold(0, FIVE[0], 10.0), FIVE_ABOUT, None)
+    waiting = PositionWait(Hold(0, FIVE_POSITIONS[0], 10.0), FIVE_ABOUT, None)
     block = _resting(np.array([0.0, -9.81, 0.0]))
     waiting.add(block[:150], 1.5)
     assert waiting.seconds > 1.0
@@ -482,7 +496,7 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
         turner = Turner(driver)
         warm_up = WarmUpWatch(0.5, 40.0)
         engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
-        engine.run(hold_all(TWO[:1], 10.0))
+        engine.run(hold_all(TWO_POSITIONS[:1], 10.0))
     assert "still warming up" in turner.told[0] and "Enter goes on" in turner.told[0]
     states = [v.reason for v in turner.views]
     waits = [r.text for r in states if r.state is WaitState.WARMING_UP]
@@ -532,7 +546,7 @@ def test_what_was_before_a_restart_is_no_cooling_down(tmp_path: Path) -> None:
         turner = Turner(driver)
         warm_up = WarmUpWatch(0.5, 600.0)
         engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
-        engine.run(hold_all(TWO[:1], 14.0))
+        engine.run(hold_all(TWO_POSITIONS[:1], 14.0))
     assert any("started anew at 10.0" in text for text in turner.told)
     assert not any("cooling" in v.reason.text for v in turner.views)
     assert not any("cooling" in text for text in turner.told)
@@ -565,7 +579,7 @@ def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
 
     leaning = Leaning(turner.driver)
     engine = Engine(turner.driver, leaning, ABOUT, bench.recorder)
-    (found,) = engine.run(hold_all(TWO[:1], 20.0))
+    (found,) = engine.run(hold_all(TWO_POSITIONS[:1], 20.0))
     assert "a lasting change" in leaning.told[0] and "hold still" in leaning.told[0]
     bench.recorder.close()
     before = Session.open(bench.folder).block.between(2.0, 9.0)
@@ -585,7 +599,7 @@ def test_gyroscopes_in_degrees_are_asked_about_before_any_turn(tmp_path: Path) -
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         made = make(recorder, InDegrees(VirtualDevice(seed=3)))
         with pytest.raises(WrongPosition):
-            made.engine.run(hold_all(TWO, 10.0))
+            made.engine.run(hold_all(TWO_POSITIONS, 10.0))
     reasons = {v.reason.text for v in made.turner.views}
     assert any("if they are in deg/s, begin again" in text for text in reasons)
 
@@ -600,7 +614,7 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
     acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
     gyr = np.column_stack([rate, 0 * t, 0 * t]) + 2e-3 * rng.standard_normal((1200, 3))
     block = Block.of(t, acc + 0.02 * rng.standard_normal((1200, 3)), scale * gyr)
-    for piece in pieces(block, 0.1):
+    for piece in split_by_time(block, 0.1):
         units.add(piece)
     assert ("they are in deg/s and not in rad/s" in units.says) == wrong
     assert not units.question(99.0)
@@ -623,13 +637,13 @@ def test_a_slow_turn_tells_the_unit_too(
     gyr += [0.01, -0.02, 0.015] + 2e-3 * rng.standard_normal((2200, 3))
     acc = 9.81 * np.column_stack([0 * t, -np.cos(angle), np.sin(angle)])
     block = Block.of(t, acc + 0.02 * rng.standard_normal((2200, 3)), scale * gyr)
-    for piece in pieces(block, 0.1):
+    for piece in split_by_time(block, 0.1):
         units.add(piece)
     assert units.unit == unit
 
 
 def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:
-    bench.engine.run(hold_all(FIVE, 10.0))
+    bench.engine.run(hold_all(FIVE_POSITIONS, 10.0))
     assert not any("gyr_unit" in text for text in bench.turner.told)
     states = {view.reason.state for view in bench.turner.views}
     assert WaitState.WRONG_UNIT not in states
@@ -655,7 +669,7 @@ def test_a_unit_on_another_face_is_recognised(up: str, axes: str) -> None:
     """Lying flat with z up is a mounting, and not -89.3° in β."""
     f = np.zeros(3)
     f["xyz".index(up[1])] = 9.7 if up[0] == "+" else -9.7
-    waiting = PositionWait(Hold(0, FIVE[0], 10.0), ABOUT, None)
+    waiting = PositionWait(Hold(0, FIVE_POSITIONS[0], 10.0), ABOUT, None)
     rng = np.random.default_rng(0)
     for start in np.arange(0.0, 8.0, 0.1):
         t = start + np.arange(10) / 100
@@ -667,7 +681,7 @@ def test_a_unit_on_another_face_is_recognised(up: str, axes: str) -> None:
 
 
 def test_a_turn_that_was_not_made_is_no_mounting() -> None:
-    waiting = PositionWait(Hold(0, FIVE[3], 10.0), ABOUT, None)
+    waiting = PositionWait(Hold(0, FIVE_POSITIONS[3], 10.0), ABOUT, None)
     rng = np.random.default_rng(0)
     for start in np.arange(0.0, 8.0, 0.1):
         t = start + np.arange(10) / 100
@@ -696,7 +710,7 @@ def test_a_gust_costs_what_it_spoils(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", tables) as recorder:
         turner = Windy(InProcess(VirtualDevice(seed=3)))
         engine = Engine(turner.driver, turner, ABOUT, recorder, give_up=60.0)
-        taken = engine.run(hold_all(TWO[:1], 30.0))
+        taken = engine.run(hold_all(TWO_POSITIONS[:1], 30.0))
     session = Session.open(tmp_path / "s")
     windows = [m for m in session.marks() if m["event"] == "window"]
     for window in windows:

@@ -12,7 +12,7 @@ import pytest
 from fieldcal.commands import ports
 from fieldcal.commands.introduce import introduce
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Array, Block, pieces
+from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.run.introduction import introduce_device, rate_unit_from_turn
 from fieldcal.run.movers import VirtualMover
 
@@ -70,8 +70,8 @@ def test_one_turn_by_hand_tells_the_unit(scale: float, unit: str) -> None:
     gyr = scale * np.column_stack([rate, 0 * t, 0 * t])
     noise = rng.standard_normal((2, len(t), 3)) * [[[0.02]], [[2e-3 * scale]]]
     block = Block.of(t, acc + noise[0], gyr + noise[1])
-    assert rate_unit_from_turn(pieces(block, 0.1), 9.81, 60.0) == unit
-    assert rate_unit_from_turn(pieces(block[:300], 0.1), 9.81, 2.0) is None
+    assert rate_unit_from_turn(split_by_time(block, 0.1), 9.81, 60.0) == unit
+    assert rate_unit_from_turn(split_by_time(block[:300], 0.1), 9.81, 2.0) is None
 
 
 @pytest.fixture

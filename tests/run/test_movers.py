@@ -12,7 +12,7 @@ import pytest
 from processes import HANGS, script
 
 from fieldcal.core.errors import MoverFailed, MoverGone
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.run import patient_mover
 from fieldcal.run.command_mover import CommandMover
 from fieldcal.run.movers import RunningDevice
@@ -43,7 +43,7 @@ def test_a_command_is_called_with_the_position(tmp_path: Path) -> None:
     call = script(tmp_path, f"import sys; open({str(out)!r}, 'w').write(str(sys.argv))")
     with CommandMover(call, 20.0) as mover:
         assert not mover.busy()
-        mover.turn(FIVE[3], 3)
+        mover.turn(FIVE_POSITIONS[3], 3)
         wait(mover)
     assert "'4', '45', '2.5', 'α = 45°, β = 2.5°'" in out.read_text()
 
@@ -70,7 +70,7 @@ def test_a_command_that_is_not_there_is_said() -> None:
         CommandMover(["/no/such/turntable"], 1.0) as mover,
         pytest.raises(MoverFailed, match="cannot be called"),
     ):
-        mover.turn(FIVE[0], 0)
+        mover.turn(FIVE_POSITIONS[0], 0)
 
 
 @pytest.mark.parametrize("system", ["posix", "macos"], indirect=True)
@@ -86,7 +86,7 @@ def test_all_that_a_command_has_started_ends_with_it(tmp_path: Path) -> None:
             CommandMover(script(tmp_path, body + last), 600.0) as mover,
             ThreadPoolExecutor() as pool,
         ):
-            mover.turn(FIVE[0], 0)
+            mover.turn(FIVE_POSITIONS[0], 0)
             with pool.submit(open, pipe).result() as alive:  # the child has begun
                 if not last:
                     wait(mover)
@@ -117,7 +117,7 @@ def test_a_mover_that_is_gone_is_tried_again_like_a_device(
     gone, told = Gone([True, True] + [False] * 20), list[str]()
     mover = PatientMover(gone, 20.0)
     mover.tell = told.append
-    mover.turn(FIVE[0], 0)
+    mover.turn(FIVE_POSITIONS[0], 0)
     looks = []
     for _ in range(12):
         looks.append(mover.busy())
@@ -125,7 +125,7 @@ def test_a_mover_that_is_gone_is_tried_again_like_a_device(
     assert gone.turned == 3 and looks[-1] is False and not all(looks)
     assert told == ["no answer; tried again for 20 s"]
     for_ever = PatientMover(Gone([True] * 50), 20.0)
-    for_ever.turn(FIVE[0], 0)
+    for_ever.turn(FIVE_POSITIONS[0], 0)
     with pytest.raises(MoverGone, match="no answer"):
         for _ in range(60):
             assert for_ever.busy()
@@ -143,7 +143,7 @@ def test_a_virtual_device_that_listens_again_is_turned_again(tmp_path: Path) -> 
     def served(listening: Control) -> RunningDevice:
         device = RunningDevice(control)
         with ThreadPoolExecutor() as pool:
-            turning = pool.submit(device.turn, FIVE[0])
+            turning = pool.submit(device.turn, FIVE_POSITIONS[0])
             while not turning.done():
                 listening.serve()
         return device
@@ -152,12 +152,12 @@ def test_a_virtual_device_that_listens_again_is_turned_again(tmp_path: Path) -> 
     device = served(first)
     first.close()
     with pytest.raises(MoverGone, match="gone|failed"):
-        device.turn(FIVE[1])
+        device.turn(FIVE_POSITIONS[1])
     with pytest.raises(MoverGone, match="no virtual device listens"):
-        device.turn(FIVE[1])
+        device.turn(FIVE_POSITIONS[1])
     again = Control(answer, control)
     with ThreadPoolExecutor() as pool:
-        turning = pool.submit(device.turn, FIVE[1])
+        turning = pool.submit(device.turn, FIVE_POSITIONS[1])
         while not turning.done():
             again.serve()
     device.close()

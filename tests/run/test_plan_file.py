@@ -52,11 +52,11 @@ def test_a_whole_plan_is_taken() -> None:
     assert named is not None and named.degrees == (10.0, 1.0)
 
 
-@pytest.mark.parametrize("name", procedures.names())
+@pytest.mark.parametrize("name", procedures.procedure_names())
 def test_a_procedure_brings_its_positions(name: str) -> None:
     task = plan_file.task_from_tables({"run": {"procedure": name}}, "plan.toml")
     taken = [p.degrees for p in task.about.positions]
-    assert taken == [p.degrees for p in procedures.procedure(name).POSITIONS]
+    assert taken == [p.degrees for p in procedures.load_procedure(name).POSITIONS]
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldcal.core.frames import force, turn
-from fieldcal.core.positions import FIVE, SETS, TWO, Position, forces
+from fieldcal.core.frames import direction_cosines, specific_force_at_rest
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    POSITION_SETS,
+    TWO_POSITIONS,
+    Position,
+    specific_forces,
+)
 from fieldcal.core.samples import Array
 from fieldcal.run.position_check import AcceptedPosition, check_position
 
@@ -17,18 +23,18 @@ SCALE = np.array([1.008, 0.992, 1.004])
 
 def measured(alpha: float, beta: float, tilt: float = 0.0) -> Array:
     """What a raw device with bias and scale shows on a tilted base; degrees."""
-    base = turn(np.deg2rad(tilt), np.deg2rad(-tilt)) @ [0, -G, 0]
-    f: Array = turn(np.deg2rad(alpha), np.deg2rad(beta)) @ base
+    base = direction_cosines(np.deg2rad(tilt), np.deg2rad(-tilt)) @ [0, -G, 0]
+    f: Array = direction_cosines(np.deg2rad(alpha), np.deg2rad(beta)) @ base
     return BIAS + SCALE * f
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", POSITION_SETS)
 @pytest.mark.parametrize("tilt", [-2.0, 0.0, 2.0])
 def test_the_right_positions_are_accepted_from_a_raw_device_on_a_tilted_base(
     name: str, tilt: float
 ) -> None:
     held: AcceptedPosition | None = None
-    for position in SETS[name]:
+    for position in POSITION_SETS[name]:
         alpha, beta = position.degrees or (0, 0)
         f = measured(alpha, beta, tilt)
         arrival = check_position(position, f, G, held)
@@ -50,22 +56,22 @@ def test_the_right_positions_are_accepted_from_a_raw_device_on_a_tilted_base(
     ],
 )
 def test_a_slip_is_named(alpha: float, beta: float, says: str) -> None:
-    held = AcceptedPosition(TWO[0], measured(0, 0))
-    arrival = check_position(TWO[1], measured(alpha, beta), G, held)
+    held = AcceptedPosition(TWO_POSITIONS[0], measured(0, 0))
+    arrival = check_position(TWO_POSITIONS[1], measured(alpha, beta), G, held)
     assert not arrival.ok and says in arrival.problem
 
 
 def test_a_step_of_two_and_a_half_degrees_is_told_from_none() -> None:
-    held = AcceptedPosition(FIVE[1], measured(22.5, 0))
-    assert not check_position(FIVE[2], measured(22.5, 0), G, held).ok
-    assert check_position(FIVE[2], measured(22.5, 2.5), G, held).ok
-    assert not check_position(FIVE[2], measured(22.5, -2.5), G, held).ok
+    held = AcceptedPosition(FIVE_POSITIONS[1], measured(22.5, 0))
+    assert not check_position(FIVE_POSITIONS[2], measured(22.5, 0), G, held).ok
+    assert check_position(FIVE_POSITIONS[2], measured(22.5, 2.5), G, held).ok
+    assert not check_position(FIVE_POSITIONS[2], measured(22.5, -2.5), G, held).ok
 
 
 def test_the_first_position_upside_down_or_in_a_wrong_unit() -> None:
-    over = check_position(TWO[0], measured(180, 0), G, None)
+    over = check_position(TWO_POSITIONS[0], measured(180, 0), G, None)
     assert not over.ok and "upside down" in over.problem
-    in_g = check_position(TWO[0], measured(0, 0) / G, G, None)
+    in_g = check_position(TWO_POSITIONS[0], measured(0, 0) / G, G, None)
     assert not in_g.ok and "unit" in in_g.problem
 
 
@@ -77,21 +83,23 @@ def test_without_angles_only_the_norm_is_judged() -> None:
 
 @given(st.floats(-180, 180), st.floats(-90, 90))
 def test_angles_shown_are_the_angles_held(alpha: float, beta: float) -> None:
-    f = force(np.deg2rad(alpha), np.deg2rad(beta), G)
+    f = specific_force_at_rest(np.deg2rad(alpha), np.deg2rad(beta), G)
     seen = check_position(Position("x"), f, G, None)
-    again = force(np.deg2rad(seen.alpha_deg), np.deg2rad(seen.beta_deg), G)
+    again = specific_force_at_rest(
+        np.deg2rad(seen.alpha_deg), np.deg2rad(seen.beta_deg), G
+    )
     np.testing.assert_allclose(again, f, atol=1e-6)
 
 
 def test_a_position_with_a_third_angle_is_found_and_missed() -> None:
     wanted = Position.deg(20.0, 10.0, gamma=40.0)
-    there = forces([wanted], 9.81)[0]
+    there = specific_forces([wanted], 9.81)[0]
     assert check_position(wanted, there, 9.81, None).ok
-    away = forces([Position.deg(20.0, 10.0)], 9.81)[0]
+    away = specific_forces([Position.deg(20.0, 10.0)], 9.81)[0]
     found = check_position(wanted, away, 9.81, None)
     assert not found.ok and "asked for is α = 20°, β = 10°, γ = 40°" in found.problem
     assert found.problem.startswith("γ is not turned yet: the device is at")
-    other = forces([Position.deg(26.0, 10.0, gamma=40.0)], 9.81)[0]
+    other = specific_forces([Position.deg(26.0, 10.0, gamma=40.0)], 9.81)[0]
     found = check_position(wanted, other, 9.81, AcceptedPosition(wanted, there))
     assert (found.alpha_deg, found.beta_deg) == pytest.approx((26.0, 10.0))
     assert "α = 26.0°, β = 10.0° if γ is 40°" in found.problem

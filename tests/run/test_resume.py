@@ -218,7 +218,7 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     recorded(tmp_path / "s")
     with pytest.raises(SessionError, match="--resume"):
         Recorder(tmp_path / "s", TABLES)
-    assert description.read(tmp_path / "s" / "session.toml").positions
+    assert description.read_description(tmp_path / "s" / "session.toml").positions
 
 
 @pytest.mark.parametrize(

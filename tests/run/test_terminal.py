@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fieldcal.core.positions import FIVE, Position
-from fieldcal.drivers.driver import ClockLine, Health
+from fieldcal.core.positions import FIVE_POSITIONS, Position
+from fieldcal.drivers.driver import ClockFit, LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
@@ -26,7 +26,7 @@ from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
 MISPLACED = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
-HOLD = Hold(1, FIVE[1], 30.0)
+HOLD = Hold(1, FIVE_POSITIONS[1], 30.0)
 
 
 def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
@@ -40,7 +40,7 @@ def view(phase: Phase, elapsed: float = 0.0, **changes: object) -> OperatorView:
         "reason": MISPLACED,
         "rate_hz": 100.0,
         "temperature": 24.5,
-        "health": Health(samples=1234),
+        "health": LinkHealth(samples=1234),
     }
     return OperatorView(**(known | changes))  # type: ignore[arg-type]
 
@@ -67,7 +67,11 @@ def sized(width: int, height: int, *wishes: Wish) -> ConsoleOperator:
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, force_terminal=True)
     made = ConsoleOperator(
-        "fieldcal · five_position", FIVE, ManualMover(), console, keyboard=Keys(*wishes)
+        "fieldcal · five_position",
+        FIVE_POSITIONS,
+        ManualMover(),
+        console,
+        keyboard=Keys(*wishes),
     )
     made.place(HOLD)
     return made
@@ -84,7 +88,9 @@ def screen(operator: ConsoleOperator, width: int = 80, height: int = 24) -> str:
 @pytest.fixture
 def operator() -> ConsoleOperator:
     console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
-    made = ConsoleOperator("fieldcal · five_position", FIVE, ManualMover(), console)
+    made = ConsoleOperator(
+        "fieldcal · five_position", FIVE_POSITIONS, ManualMover(), console
+    )
     made.place(HOLD)
     return made
 
@@ -104,9 +110,11 @@ def test_positions_that_are_found_on_the_way_are_counted_as_they_come(
     width: int, height: int
 ) -> None:
     console = Console(file=io.StringIO(), width=width, height=height)
-    made = ConsoleOperator("adaptive", FIVE[:2], ManualMover(), console, most=9)
+    made = ConsoleOperator(
+        "adaptive", FIVE_POSITIONS[:2], ManualMover(), console, most=9
+    )
     made.place(HOLD)
-    made.place(Hold(2, FIVE[4], 30.0))
+    made.place(Hold(2, FIVE_POSITIONS[4], 30.0))
     said = screen(made, width, height)
     assert "α = 45°, β = 5°" in said and "/2" not in said
     assert "position 3 of at most 9" in said or width < 80
@@ -196,7 +204,7 @@ def test_everything_fits_80_by_24(operator: ConsoleOperator, phase: Phase) -> No
 def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
     out = io.StringIO()
     console = Console(file=out, width=100, height=40, force_terminal=True)
-    made = ConsoleOperator("t", FIVE, ManualMover(), console)
+    made = ConsoleOperator("t", FIVE_POSITIONS, ManualMover(), console)
     made.place(HOLD)
     made.show(view("turning"))
     console.print(made.screen())
@@ -209,10 +217,10 @@ def test_on_a_tall_screen_the_instruction_is_read_from_afar() -> None:
 
 def test_many_positions_leave_room_for_what_is_said() -> None:
     console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
-    with ConsoleOperator("t", FIVE * 6, ManualMover(), console) as made:
-        made.place(Hold(14, FIVE[4], 30.0))
+    with ConsoleOperator("t", FIVE_POSITIONS * 6, ManualMover(), console) as made:
+        made.place(Hold(14, FIVE_POSITIONS[4], 30.0))
         made.tell("a sentence of the usual length about what happened, and what to do")
-        made.show(view("turning", hold=Hold(14, FIVE[4], 30.0)))
+        made.show(view("turning", hold=Hold(14, FIVE_POSITIONS[4], 30.0)))
         said = screen(made)
     assert len(said.splitlines()) <= 24 and "15  α = 45°, β = 5°" in said
     assert "link: 100 Hz" in said and "! a sentence of the usual" in said
@@ -221,7 +229,9 @@ def test_many_positions_leave_room_for_what_is_said() -> None:
 def test_plain_lines_for_a_log() -> None:
     out = io.StringIO()
     console = Console(file=out, width=200)
-    with ConsoleOperator("t", FIVE, ManualMover(), console, plain=True) as operator:
+    with ConsoleOperator(
+        "t", FIVE_POSITIONS, ManualMover(), console, plain=True
+    ) as operator:
         operator.place(HOLD)
         operator.tell("bumped")
         for elapsed in np.arange(0, 30, 0.1):
@@ -302,14 +312,14 @@ def test_the_scale_is_always_the_same() -> None:
 
 @pytest.mark.parametrize(("sigma", "shown"), [(0.3, "1"), (9.6, "10"), (43.0, "43")])
 def test_the_clock_is_shown_in_whole_ppm(sigma: float, shown: str) -> None:
-    health = Health(samples=1234, clock=ClockLine(-20.2, sigma, 0.0, 1e-3))
+    health = LinkHealth(samples=1234, clock=ClockFit(-20.2, sigma, 0.0, 1e-3))
     text = link_state(view("averaging", health=health)).plain
     assert text.endswith(f"clock -20 ± {shown} ppm")
 
 
 def test_a_clock_of_which_nothing_is_known_is_not_shown() -> None:
     """After the computer was asleep."""
-    health = Health(samples=1234, clock=ClockLine(-93958.0, 20272.0, 0.0, 5.0))
+    health = LinkHealth(samples=1234, clock=ClockFit(-93958.0, 20272.0, 0.0, 5.0))
     assert "clock" not in link_state(view("averaging", health=health)).plain
 
 
@@ -355,7 +365,7 @@ def test_the_box_is_drawn_turned_clockwise(
     middle = (len(lowest) - 1) / 2
     assert (np.mean(dots) > middle) == right_lower
     assert (np.mean(dots) < middle) == left_lower
-    assert "facing N" in draw_joints(FIVE[1], 40, 5)[-1]
+    assert "facing N" in draw_joints(FIVE_POSITIONS[1], 40, 5)[-1]
 
 
 @pytest.mark.parametrize("size", [(80, 24), (40, 15), (110, 40)])
@@ -363,7 +373,7 @@ def test_a_position_of_three_angles_is_shown_whole(size: tuple[int, int]) -> Non
     file = io.StringIO()
     console = Console(file=file, width=size[0], height=size[1], force_terminal=True)
     third = Position.deg(22.5, 2.5, gamma=120.0)
-    every = (*FIVE[:1], third, *FIVE[2:])
+    every = (*FIVE_POSITIONS[:1], third, *FIVE_POSITIONS[2:])
     made = ConsoleOperator(
         "fieldcal · positions", every, ManualMover(), console, keyboard=Keys()
     )
@@ -396,7 +406,7 @@ def test_a_terminal_of_few_letters_gets_others_in_their_place_and_no_drawing(
     console = Console(
         file=out, width=size[0], height=size[1], force_terminal=True, color_system=None
     )
-    made = ConsoleOperator("t", FIVE, ManualMover(), console)
+    made = ConsoleOperator("t", FIVE_POSITIONS, ManualMover(), console)
     made.place(HOLD)
     made.show(view("turning"))
     console.print(made.screen())  # strictly: a letter that is not there is an error

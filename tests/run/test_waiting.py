@@ -26,7 +26,7 @@ def turning_to(alpha_deg: float, sways: bool) -> float:
     gyr[:, 2] = np.gradient(alpha, t)
     noise = rng.standard_normal((len(t), 6)) * np.repeat([5e-3, 1e-3], 3)
     block = Block.of(t, acc + noise[:, :3], gyr + noise[:, 3:])
-    about = description.parse(
+    about = description.parse_description(
         {
             "format": 1,
             "site": {"gravity": G, "sways": sways},
@@ -61,7 +61,7 @@ def test_a_gust_is_no_turn_and_calls_nobody_anew(
     acc += gust[:, None] * 0.5 * rng.standard_normal(acc.shape)
     gyr = 1e-3 * rng.standard_normal(acc.shape) * (1 + 50 * gust[:, None])
     block = Block.of(t, acc, gyr)
-    about = description.parse(
+    about = description.parse_description(
         {
             "format": 1,
             "site": {"gravity": G},

@@ -31,17 +31,17 @@ from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
 from fieldcal.service import openapi
-from fieldcal.service.bounds import Bounds
-from fieldcal.service.jobs import RESULTS, Jobs
+from fieldcal.service.bounds import ServiceBounds
+from fieldcal.service.jobs import RESULTS_FOLDER, JobStore
 from fieldcal.service.queue import JobQueue
-from fieldcal.service.server import Service, tokens_in
-from fieldcal.service.work import OPTIONS, JobTask
+from fieldcal.service.server import Service, read_tokens
+from fieldcal.service.work import IMPORT_OPTIONS, JobTask
 from fieldcal.sim_device.profile import Profile
 
 TOKEN = "0123456789abcdef-token"
 OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 FACES = [(0, 0), (90, 0), (-90, 0), (180, 0), (0, 90), (0, -90)]
-BOUNDS = Bounds(upload=20_000_000, jobs=3, kept=2)
+BOUNDS = ServiceBounds(upload=20_000_000, jobs=3, kept=2)
 
 
 @dataclass
@@ -106,8 +106,8 @@ class Held:
         (upload,) = (Path(folder) / "upload").iterdir()
         if upload.read_bytes() == b"bad":
             return StoredSession(folder, error=f"{folder}: is bad; send another")
-        (Path(folder) / RESULTS).mkdir()
-        (Path(folder) / RESULTS / "report.html").write_text("<p>it</p>")
+        (Path(folder) / RESULTS_FOLDER).mkdir()
+        (Path(folder) / RESULTS_FOLDER / "report.html").write_text("<p>it</p>")
         found = {"verdict": "consistent"}
         return StoredSession(folder, "A1", go=True, good=True, result={},
                              diagnosis=found)  # fmt: skip
@@ -116,17 +116,17 @@ class Held:
 @dataclass
 class Served:
     client: Client
-    jobs: Jobs
+    jobs: JobStore
     task: Held
     service: Service
 
 
 @contextmanager
 def serving(root: Path) -> Iterator[Served]:
-    jobs, task = Jobs(root / "jobs", BOUNDS), Held()
+    jobs, task = JobStore(root / "jobs", BOUNDS), Held()
     pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
     queue = JobQueue(jobs, Database(root / "h"), pool, task)
-    service = Service.of("127.0.0.1", 0, jobs, queue, [TOKEN, "other" * 4])
+    service = Service.listen("127.0.0.1", 0, jobs, queue, [TOKEN, "other" * 4])
     thread = threading.Thread(target=service.serve)
     with queue:
         thread.start()
@@ -159,7 +159,7 @@ def test_what_is_sent_is_done_and_can_be_had_and_taken_away(served: Served) -> N
     assert page.body == b"<p>it</p>"
     assert page.headers.get_all("content-security-policy")[0].startswith("sandbox")
     assert len(page.headers.get_all("content-security-policy")) == 1
-    (stored,) = Database(served.jobs.root.parent / "h").done(sessions.found)
+    (stored,) = Database(served.jobs.root.parent / "h").run(sessions.find_sessions)
     assert stored.serial == "A1" and stored.go is True
     here = f"/api/sessions/{job['id']}"
     assert client.ask(here, method="DELETE").status == 204
@@ -251,9 +251,9 @@ def test_what_was_under_way_is_done_at_the_next_start(tmp_path: Path) -> None:
         first.client.over(done)
         job = first.jobs.get(done)
         assert job is not None
-        first.jobs.changed(job, state="working")
-        (first.jobs.folder(done) / RESULTS / "report.html").unlink()
-        (first.jobs.folder(done) / RESULTS).rmdir()
+        first.jobs.update(job, state="working")
+        (first.jobs.folder(done) / RESULTS_FOLDER / "report.html").unlink()
+        (first.jobs.folder(done) / RESULTS_FOLDER).rmdir()
         (first.jobs.root / ".ab.part").mkdir()
     with serving(tmp_path) as second:
         second.task.may.set()
@@ -282,7 +282,7 @@ def test_openapi_says_what_there_is(served: Served) -> None:
     there = {path: set(item) - {"parameters"} for path, item in told["paths"].items()}
     assert there == routes
     post = told["paths"]["/api/sessions"]["post"]
-    assert {p["name"] for p in post["parameters"]} == {"filename", *OPTIONS}
+    assert {p["name"] for p in post["parameters"]} == {"filename", *IMPORT_OPTIONS}
     for path, item in told["paths"].items():
         named = {p["name"] for p in item.get("parameters", []) if p["in"] == "path"}
         assert named == set(re.findall(r"{(\w+)}", path))
@@ -300,14 +300,14 @@ def test_tokens_are_secret_and_long(tmp_path: Path) -> None:
     path = tmp_path / "t"
     path.write_text(f"# of the line\n{TOKEN}  # station A\n\n")
     path.chmod(0o600)
-    assert tokens_in(path) == [TOKEN]
+    assert read_tokens(path) == [TOKEN]
     path.chmod(0o644)
     with pytest.raises(InputError, match="chmod 600"):
-        tokens_in(path)
+        read_tokens(path)
     path.write_text("short\n")
     path.chmod(0o600)
     with pytest.raises(InputError, match="16 letters"):
-        tokens_in(path)
+        read_tokens(path)
 
 
 def zipped(folder: Path) -> bytes:
@@ -345,7 +345,7 @@ def test_a_process_of_its_own_serves_sessions_and_recordings(tmp_path: Path) -> 
             process.send_signal(signal.SIGTERM)
             process.wait(HANGS)
     assert good["state"] == "done" and good["good"] is True, good
-    assert good["documents"] == sorted(openapi.DOCUMENTS)
+    assert good["documents"] == sorted(openapi.DOCUMENT_TYPES)
     assert bad["state"] == "failed" and bad["error"] and bad["log"]
     assert str(tmp_path) not in bad["error"]
     made = tmp_path / "served" / numbers[0] / "results"
@@ -358,7 +358,7 @@ def test_a_process_of_its_own_serves_sessions_and_recordings(tmp_path: Path) -> 
     suite = ElementTree.parse(made / "junit.xml").getroot()
     assert suite.get("errors") == "0"
     assert "acc bias" in (made / "report.html").read_text()
-    (stored,) = Database(tmp_path / "h").done(sessions.found)
+    (stored,) = Database(tmp_path / "h").run(sessions.find_sessions)
     assert stored.serial == "A7" and stored.good
 
 
@@ -370,13 +370,13 @@ def test_a_recording_is_imported_with_what_is_said_of_it(tmp_path: Path) -> None
         ",".join(f"{v:.9g}" for v in (t, *a, *g))
         for t, a, g in zip(block.t, block.acc, block.gyr, strict=True)
     ]
-    jobs = Jobs(tmp_path / "jobs", BOUNDS)
-    part = jobs.begun()
+    jobs = JobStore(tmp_path / "jobs", BOUNDS)
+    part = jobs.begin_upload()
     (part / "upload").mkdir()
     (part / "upload" / "log.csv").write_text("\n".join(rows))
     said = {"serial": "A9", "latitude": "50.45", "lot": "7", "acc_unit": "m/s^2",
             "gyr_unit": "rad/s", "time_unit": "s"}  # fmt: skip
-    job = jobs.added(part, "log.csv", "2026-01-01", said)
+    job = jobs.add_job(part, "log.csv", "2026-01-01", said)
     used = JobTask(BOUNDS)
     folder = str(jobs.folder(job.id))
     for _ in range(2):  # and once more, as after a start in the middle
@@ -384,5 +384,5 @@ def test_a_recording_is_imported_with_what_is_said_of_it(tmp_path: Path) -> None
         one = made.value
         assert one is not None and one.error is None, one
         assert one.serial == "A9" and one.levels["lot"] == "7"
-        assert jobs.documents(job.id) == sorted(openapi.DOCUMENTS)
+        assert jobs.documents(job.id) == sorted(openapi.DOCUMENT_TYPES)
         assert "acc_bias.x" in one.parameters

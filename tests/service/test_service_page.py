@@ -15,7 +15,7 @@ from test_service import BOUNDS, Held
 from fieldcal.fleet.workers import WorkerPool
 from fieldcal.history.database import Database
 from fieldcal.report.browser import find_browser
-from fieldcal.service.jobs import Jobs
+from fieldcal.service.jobs import JobStore
 from fieldcal.service.queue import JobQueue
 from fieldcal.service.server import Service
 
@@ -33,11 +33,11 @@ SEND = """(async () => {
 
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
-    jobs, task = Jobs(tmp_path / "jobs", BOUNDS), Held()
+    jobs, task = JobStore(tmp_path / "jobs", BOUNDS), Held()
     task.may.set()
     pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
     with JobQueue(jobs, Database(tmp_path / "h"), pool, task) as queue:
-        service = Service.of("127.0.0.1", 0, jobs, queue)
+        service = Service.listen("127.0.0.1", 0, jobs, queue)
         thread = threading.Thread(target=service.serve)
         thread.start()
         yield service.address

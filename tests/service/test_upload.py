@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError
-from fieldcal.service.bounds import Bounds
-from fieldcal.service.upload import members, session_members, unpack
+from fieldcal.service.bounds import ServiceBounds
+from fieldcal.service.upload import archive_members, session_members, unpack
 
 ABOUT = b"format = 1\n"
-SMALL = Bounds(upload=1 << 20, unpacked=10_000, members=8)
+SMALL = ServiceBounds(upload=1 << 20, unpacked=10_000, members=8)
 
 
 def packed(path: Path, files: dict[str, bytes], **more: int) -> Path:
@@ -30,8 +30,8 @@ def packed(path: Path, files: dict[str, bytes], **more: int) -> Path:
     return path
 
 
-def taken(path: Path, folder: Path, bounds: Bounds = SMALL) -> Path:
-    files = session_members(members(path, bounds))
+def taken(path: Path, folder: Path, bounds: ServiceBounds = SMALL) -> Path:
+    files = session_members(archive_members(path, bounds))
     assert files is not None
     unpack(path, files, folder, bounds)
     return folder
@@ -50,9 +50,9 @@ def test_a_session_comes_out_with_its_files_alone(tmp_path: Path, top: str) -> N
 def test_what_is_no_session_is_left_to_import(tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.write_bytes(b"t,ax\n")
-    assert members(plain, SMALL) == [] and session_members([]) is None
+    assert archive_members(plain, SMALL) == [] and session_members([]) is None
     phone = packed(tmp_path / "phone.zip", {"Accelerometer.csv": b"t,x\n"})
-    assert session_members(members(phone, SMALL)) is None
+    assert session_members(archive_members(phone, SMALL)) is None
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_what_is_no_session_is_left_to_import(tmp_path: Path) -> None:
 def test_names_lead_nowhere_else(tmp_path: Path, name: str) -> None:
     bad = packed(tmp_path / "z", {"session.toml": ABOUT, name: b"x"})
     with pytest.raises(InputError, match="does not lie beside"):
-        session_members(members(bad, SMALL))
+        session_members(archive_members(bad, SMALL))
 
 
 @given(st.lists(st.text(min_size=1, max_size=20), max_size=5, unique=True))
@@ -90,14 +90,14 @@ def test_links_and_encrypted_files_are_none(tmp_path: Path) -> None:
     link = packed(tmp_path / "l", {"session.toml": b"/etc/passwd"},
                   external_attr=(stat.S_IFLNK | 0o777) << 16)  # fmt: skip
     with pytest.raises(InputError, match="link, encrypted"):
-        members(link, SMALL)
+        archive_members(link, SMALL)
     path = packed(tmp_path / "e", {"session.toml": ABOUT})
     data = bytearray(path.read_bytes())
     at = data.index(b"PK\x01\x02")
     data[at + 8] |= 1
     path.write_bytes(bytes(data))
     with pytest.raises(InputError, match="link, encrypted"):
-        members(path, SMALL)
+        archive_members(path, SMALL)
 
 
 def test_bombs_are_refused_by_what_they_say_and_by_what_they_are(
@@ -105,10 +105,10 @@ def test_bombs_are_refused_by_what_they_say_and_by_what_they_are(
 ) -> None:
     said = packed(tmp_path / "s", {"session.toml": ABOUT, "samples.csv": bytes(20_000)})
     with pytest.raises(InputError, match="MiB unpacked"):
-        members(said, SMALL)
+        archive_members(said, SMALL)
     many = {f"{i}": b"" for i in range(9)}
     with pytest.raises(InputError, match="9 files, 8 are taken"):
-        members(packed(tmp_path / "m", many), SMALL)
+        archive_members(packed(tmp_path / "m", many), SMALL)
     data = bytearray(said.read_bytes())
     at = data.index(b"PK\x01\x02", data.index(b"PK\x01\x02") + 4)
     data[at + 24 : at + 28] = struct.pack("<I", 100)  # a lie about the size
@@ -124,7 +124,7 @@ def test_two_sessions_a_broken_one_and_files_of_the_service_are_refused(
 ) -> None:
     two = packed(tmp_path / "2", {"a/session.toml": ABOUT, "b/session.toml": ABOUT})
     with pytest.raises(InputError, match="several sessions"):
-        session_members(members(two, SMALL))
+        session_members(archive_members(two, SMALL))
     path = packed(tmp_path / "b", {"session.toml": ABOUT * 40, "x": bytes(2000)})
     data = bytearray(path.read_bytes())
     data[50] ^= 0xFF

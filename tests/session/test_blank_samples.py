@@ -10,7 +10,7 @@ import pyarrow.parquet
 import pytest
 
 from fieldcal.core.samples import Block
-from fieldcal.session.blank_samples import without_blanks
+from fieldcal.session.blank_samples import remove_blank_samples
 from fieldcal.session.folder import Session
 
 BLANK = [7, 8, 40]
@@ -29,7 +29,7 @@ def samples(gyroscopes: bool = True) -> Block:
 @pytest.mark.parametrize("gyroscopes", [True, False])
 def test_rows_of_zeros_are_left_out(gyroscopes: bool) -> None:
     block = samples(gyroscopes)
-    kept, count = without_blanks(block)
+    kept, count = remove_blank_samples(block)
     assert count == len(BLANK)
     np.testing.assert_array_equal(kept.t, np.delete(block.t, BLANK))
     np.testing.assert_array_equal(kept.six, np.delete(block.six, BLANK, axis=0))
@@ -39,11 +39,11 @@ def test_outputs_of_which_some_are_zero_are_a_device_s() -> None:
     """Gyroscopes with a dead band, one axis that is level, and nothing else at all."""
     block = samples()
     still = Block.of(block.t, block.acc - [0, 9.8, 0], np.zeros((100, 3)))
-    assert without_blanks(still) == (still, 0)
+    assert remove_blank_samples(still) == (still, 0)
     level = Block.of(block.t, np.where([1, 0, 1], 0.0, still.acc), block.gyr + 1e-3)
-    assert without_blanks(level) == (level, 0)
+    assert remove_blank_samples(level) == (level, 0)
     nothing = Block.of(block.t, np.zeros((100, 3)), np.zeros((100, 3)))
-    assert without_blanks(nothing) == (nothing, 0)
+    assert remove_blank_samples(nothing) == (nothing, 0)
 
 
 def test_a_session_says_so_and_reads_on(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from laid_about import turned
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.importing.session.validation import SampleWriter
-from fieldcal.session.clock import SteadyClock, steadied
+from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.folder import Session
 
 JUMP = 1.7e9
@@ -66,8 +66,8 @@ def test_times_in_nanoseconds_are_no_clock_that_was_set() -> None:
     """Windows in seconds hold none of them: said with the times as they are."""
     t = 1e9 * np.arange(200) / 100
     block = Block.of(t, np.zeros((200, 3)), np.zeros((200, 3)))
-    assert steadied(block) is None
-    clock = SteadyClock()
-    parts = [clock.add(block[:100]), clock.add(block[100:]), clock.rest()]
+    assert remove_clock_steps(block) is None
+    clock = ClockStepRemover()
+    parts = [clock.add(block[:100]), clock.add(block[100:]), clock.flush()]
     np.testing.assert_array_equal(np.concatenate([p.t for p in parts]), t)
     assert not clock.steps

@@ -20,9 +20,9 @@ from fieldcal.cli import main
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.session import sample_files
-from fieldcal.session.arrow_stream import decode
+from fieldcal.session.arrow_stream import decode_stream
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import findings
+from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
 
 BATCHES, ROWS = 4, 3
@@ -44,7 +44,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def sizes(session: Path) -> list[int]:
     data = (session / "samples.arrows").read_bytes()
-    whole = [len(decode(data[:end]).batches) for end in range(len(data) + 1)]
+    whole = [len(decode_stream(data[:end]).batches) for end in range(len(data) + 1)]
     return [whole.index(i + 1) for i in range(BATCHES)]
 
 
@@ -63,7 +63,7 @@ def test_samples_cut_at_every_byte_keep_every_whole_batch(
         os.truncate(cut, end)  # a file written anew waits for the disk each time
         whole = sum(end >= size for size in sizes)
         try:
-            found, says = sample_files.read(cut)
+            found, says = sample_files.read_samples(cut)
         except SessionError as error:
             assert not whole and str(cut) in str(error)
             continue
@@ -94,7 +94,7 @@ def test_a_description_cut_at_every_byte_is_read_or_refused_in_words(
     shutil.copytree(session, tmp_path / "s")
     for end in range(len(data)):
         (tmp_path / "s" / "session.toml").write_bytes(data[:end])
-        for finding in findings(tmp_path / "s"):
+        for finding in file_faults(tmp_path / "s"):
             assert finding.text
 
 
@@ -107,7 +107,7 @@ def test_changed_bytes_cost_their_batch_and_invent_nothing(
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(whole) - 1))
         whole[at] ^= data.draw(st.integers(1, 255))
-    found = decode(bytes(whole), sample_files.schema())
+    found = decode_stream(bytes(whole), sample_files.samples_schema())
     rows = [r for b in found.batches for r in b.column("seq").to_pylist()]
     assert set(rows) <= set(range(BATCHES * ROWS)) and len(set(rows)) == len(rows)
     for batch in found.batches:
@@ -115,7 +115,7 @@ def test_changed_bytes_cost_their_batch_and_invent_nothing(
         np.testing.assert_array_equal(batch.column("t").to_numpy(), k / 1000)
         np.testing.assert_array_equal(batch.column("az").to_numpy(), k * k)
     if len(rows) < BATCHES * ROWS:
-        assert found.says
+        assert found.faults
 
 
 @pytest.mark.parametrize("name", [b"crc32", b"number"])
@@ -123,9 +123,11 @@ def test_a_batch_whose_checksum_lost_its_name_is_damaged(
     name: bytes, session: Path
 ) -> None:
     whole = (session / "samples.arrows").read_bytes()
-    found = decode(whole.replace(name, b"x" + name[1:], 1), sample_files.schema())
+    found = decode_stream(
+        whole.replace(name, b"x" + name[1:], 1), sample_files.samples_schema()
+    )
     assert len(found.batches) == BATCHES - 1
-    assert "is damaged and left out" in found.says[0]
+    assert "is damaged and left out" in found.faults[0]
 
 
 def test_what_stands_behind_a_damaged_batch_is_read(
@@ -135,15 +137,15 @@ def test_what_stands_behind_a_damaged_batch_is_read(
     path = tmp_path / "samples.arrows"
     data[sizes[1] - 3] ^= 1
     path.write_bytes(data)
-    found, (says,) = sample_files.read(path)
+    found, (says,) = sample_files.read_samples(path)
     np.testing.assert_array_equal(found.seq, [0, 1, 2, 6, 7, 8, 9, 10, 11])
     assert "batch 2, 3 rows from row 4 on, is damaged" in says
     lost = data[: sizes[0]] + data[sizes[1] :]
     path.write_bytes(lost)
-    found, (says,) = sample_files.read(path)
+    found, (says,) = sample_files.read_samples(path)
     assert len(found) == 9 and "batches 2 to 2 are missing, rows 4 to 6" in says
     path.write_bytes(data[: sizes[0]] + data[sizes[2] - 40 :])
-    found, says_of_hole = sample_files.read(path)
+    found, says_of_hole = sample_files.read_samples(path)
     np.testing.assert_array_equal(found.seq, [0, 1, 2, 9, 10, 11])
     assert any("damaged" in text for text in says_of_hole)
 
@@ -154,7 +156,7 @@ def test_a_doubled_batch_counts_once(
     data = (session / "samples.arrows").read_bytes()
     path = tmp_path / "samples.arrows"
     path.write_bytes(data[: sizes[1]] + data[sizes[0] :])
-    found, (says,) = sample_files.read(path)
+    found, (says,) = sample_files.read_samples(path)
     assert len(found) == BATCHES * ROWS and "twice" in says
 
 
@@ -183,7 +185,7 @@ def test_a_full_disk_is_said_and_what_was_recorded_is_kept(tmp_path: Path) -> No
     os.dup2(disk, recorder._samples.fd)
     recorder.close()
     assert len(Session.open(tmp_path / "s").block) == 100
-    assert not list(findings(tmp_path / "s"))
+    assert not list(file_faults(tmp_path / "s"))
     os.close(disk)
     os.close(full)
 
@@ -239,7 +241,7 @@ def test_a_recording_that_broke_off_is_gone_on_with(tmp_path: Path, cut: int) ->
     expected = [*range(there), *range(5000, 5100)]
     np.testing.assert_array_equal(found.block.seq, expected)
     assert [m["text"] for m in found.marks()] == ["a", "b"]
-    assert not found.warnings and not list(findings(folder))
+    assert not found.warnings and not list(file_faults(folder))
     with Recorder(folder, None) as recorder:
         # its clock has begun anew, and goes on behind a break
         shifted = recorder.append(block(0))

@@ -14,7 +14,7 @@ from recorded import block
 
 from fieldcal.cli import main
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import findings
+from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
 
 SIZE = 300_000
@@ -59,7 +59,7 @@ def assert_refused(
     assert {path.name for path in stick.iterdir()} - there == (
         {left} if left else set()
     )
-    assert not list(findings(stick / "before"))
+    assert not list(file_faults(stick / "before"))
     assert len(Session.open(stick / "before").block) == 300
 
 
@@ -109,5 +109,5 @@ def test_a_run_keeps_what_found_room(
     assert_refused(stick, capsys, *call, str(stick / "run"), left="run")
     kept = Session.open(stick / "run").block
     assert len(kept) > 300 and (np.diff(kept.t) > 0).all()
-    says = [finding for finding in findings(stick / "run")]
+    says = [finding for finding in file_faults(stick / "run")]
     assert len(says) == 1 and "whole rows are used" in str(says[0])

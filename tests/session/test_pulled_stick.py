@@ -21,7 +21,7 @@ from recorded import block, same
 
 from fieldcal.cli import main
 from fieldcal.session.folder import Session
-from fieldcal.session.integrity import findings
+from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
 
 fcntl = pytest.importorskip("fcntl", reason="shutting a file system down takes Linux")
@@ -115,7 +115,7 @@ def test_what_was_on_the_disk_is_there_when_it_is_plugged_in_again(
     told = [m["text"] for m in session.marks()]
     assert f"{on_disk} samples" in told
     assert told == [f"{MARKED * (i + 1)} samples" for i in range(len(told))]
-    assert all("cut off" in finding.text for finding in findings(folder))
+    assert all("cut off" in finding.text for finding in file_faults(folder))
     with Recorder(folder, None) as recorder:
         recorder.append(block(kept + 5000))
     assert len(Session.open(folder).block) == kept + 50
@@ -131,5 +131,5 @@ def test_what_was_imported_is_on_the_disk(stick: Stick, tmp_path: Path) -> None:
     stick.put_away()
     assert stick.plug()
     assert {path.name for path in stick.folder.iterdir()} == {"lost+found", "x"}
-    assert not list(findings(folder))
+    assert not list(file_faults(folder))
     assert len(Session.open(folder).block) == 20_000

@@ -50,7 +50,7 @@ def test_units_become_si_and_missing_values_stay_missing(tmp_path: Path) -> None
 
 def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
     wanted = block()
-    table = pa.Table.from_batches([sample_files.to_batch(wanted)])
+    table = pa.Table.from_batches([sample_files.to_record_batch(wanted)])
     csv = tmp_path / "a.csv"
     pa.csv.write_csv(table, csv)
     (tmp_path / "b.csv.gz").write_bytes(gzip.compress(csv.read_bytes()))
@@ -58,7 +58,7 @@ def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:
     with Recorder(tmp_path / "d", {"format": 1}) as recorder:
         recorder.append(wanted)
     for name in ("a.csv", "b.csv.gz", "c.parquet", "d/samples.arrows"):
-        got, warnings = sample_files.read(tmp_path / name)
+        got, warnings = sample_files.read_samples(tmp_path / name)
         assert not warnings, name
         np.testing.assert_array_equal(got.six, wanted.six)
         np.testing.assert_array_equal(got.t, wanted.t)
@@ -104,7 +104,7 @@ def test_a_csv_cut_off_anywhere_keeps_its_whole_rows(tmp_path: Path) -> None:
     first_row = text.index("\n", text.index("\n") + 1)
     for end in range(first_row, len(text)):
         (tmp_path / "samples.csv").write_text(text[:end])
-        got, _ = sample_files.read(tmp_path / "samples.csv")
+        got, _ = sample_files.read_samples(tmp_path / "samples.csv")
         whole = text[:end].count("\n") - 1
         assert whole <= len(got) <= whole + 1
 
@@ -114,11 +114,11 @@ def test_a_gz_cut_off_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> N
     packed = gzip.compress(f"{HEAD}\n{rows}".encode())
     path = tmp_path / "samples.csv.gz"
     path.write_bytes(packed[: len(packed) // 2])
-    got, warnings = sample_files.read(path)
+    got, warnings = sample_files.read_samples(path)
     assert 100 < len(got) < 5000 and "cut off" in warnings[0]
     path.write_bytes(b"no gzip at all")
     with pytest.raises(SessionError, match="not a gzip file"):
-        sample_files.read(path)
+        sample_files.read_samples(path)
 
 
 def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path: Path) -> Non
         cut.write_bytes(data[:end])
         whole = sum(end >= size for size in sizes)
         try:
-            got, warnings = sample_files.read(cut)
+            got, warnings = sample_files.read_samples(cut)
         except SessionError as error:
             assert whole == 0 and str(cut) in str(error)
             continue
@@ -236,7 +236,7 @@ names = st.sampled_from(["site", "frame", "nominal", "model", "position", "units
 @given(st.dictionaries(names, json_values | tables | st.lists(tables, max_size=3)))
 def test_any_table_is_read_or_refused_in_words(raw: dict[str, Any]) -> None:
     try:
-        about = description.parse(raw)
+        about = description.parse_description(raw)
     except InputError as error:
         assert str(error)
     else:
@@ -264,7 +264,7 @@ def test_what_is_no_part_of_a_window_is_missing(tmp_path: Path) -> None:
     session = Session.open(folder(tmp_path, toml, f"{HEAD}\n{rows}"))
     left_out = np.isnan(session.block.six).all(axis=1)
     assert np.flatnonzero(left_out).tolist() == [10, 11, 20, 21, 22, 23, 24]
-    assert session.about.without == ((1.0, 1.2), (2.0, 2.5))
+    assert session.about.excluded_spans == ((1.0, 1.2), (2.0, 2.5))
     parts = [np.isnan(part.acc[:, 0]) for part in session.blocks()]
     np.testing.assert_array_equal(np.concatenate(parts), left_out)
 
@@ -286,7 +286,7 @@ def test_a_long_parquet_file_is_not_held_in_memory(tmp_path: Path) -> None:
     path = tmp_path / "samples.parquet"
     pa.parquet.write_table(pa.table(columns), path, row_group_size=20_000)
     before, most, rows = pa.total_allocated_bytes(), 0, 0
-    for part in sample_files.blocks(path):
+    for part in sample_files.iterate_samples(path):
         rows += len(part)
         most = max(most, pa.total_allocated_bytes() - before)
     assert rows == 400_000

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
-from fieldcal.drivers.can_map import SHIPPED, load
+from fieldcal.drivers.can_map import VIRTUAL_DBC, load_database
 from fieldcal.sim_device import Profile, VirtualDevice
 from fieldcal.sim_device.adapter import Adapter
 from fieldcal.sim_device.can_packing import frames
 
-DATABASE = load(SHIPPED)
+DATABASE = load_database(VIRTUAL_DBC)
 
 six = st.lists(
     st.tuples(*[st.floats(-60, 60)] * 3, *[st.floats(-40, 40)] * 3), min_size=1

@@ -156,25 +156,29 @@ def test_what_is_added_to_a_steady_rate(text: str, expected: list[float]) -> Non
 
 
 def test_the_base_is_tilted_before_the_joints_turn() -> None:
-    tilt = frames.turn(np.deg2rad(-3), np.deg2rad(2))
-    expected = frames.turn(A, A) @ tilt @ frames.force_home(10.0)
+    tilt = frames.direction_cosines(np.deg2rad(-3), np.deg2rad(2))
+    expected = (
+        frames.direction_cosines(A, A) @ tilt @ frames.specific_force_at_home(10.0)
+    )
     np.testing.assert_allclose(
         at_rest(told("base_tilt:about_x_deg=2,about_z_deg=-3")).acc[-1], expected
     )
 
 
 def test_offsets_and_scales_of_the_joints_move_their_angles() -> None:
-    offset = frames.force(A + np.deg2rad(1), A - np.deg2rad(2), 10.0)
+    offset = frames.specific_force_at_rest(A + np.deg2rad(1), A - np.deg2rad(2), 10.0)
     np.testing.assert_allclose(
         at_rest(told("angle_offset:alpha0_deg=1,beta0_deg=-2")).acc[-1], offset
     )
-    scaled = frames.force(A * 1.01, A * 0.98, 10.0)
+    scaled = frames.specific_force_at_rest(A * 1.01, A * 0.98, 10.0)
     np.testing.assert_allclose(
         at_rest(told("angle_scale:alpha=0.01,beta=-0.02")).acc[-1], scaled
     )
     home = VirtualDevice(told("angle_offset:alpha0_deg=1,beta0_deg=-2")).take(1).acc[0]
     np.testing.assert_allclose(
-        home, frames.force(np.deg2rad(1), np.deg2rad(-2), 10.0), atol=1e-12
+        home,
+        frames.specific_force_at_rest(np.deg2rad(1), np.deg2rad(-2), 10.0),
+        atol=1e-12,
     )
 
 
@@ -184,7 +188,7 @@ def test_angles_are_set_a_little_off_every_time() -> None:
     for _ in range(300):
         device.turn(A, A, 0.02)
         device.take(3)
-        found.append(frames.angles_of(device.take(1).acc[0]))
+        found.append(frames.angles_of_force_direction(device.take(1).acc[0]))
     off = np.rad2deg(np.array(found) - A)
     assert np.abs(off.mean(axis=0)).max() < 4 * 0.3 / np.sqrt(300)
     np.testing.assert_allclose(off.std(axis=0), 0.3, rtol=0.15)
@@ -192,7 +196,7 @@ def test_angles_are_set_a_little_off_every_time() -> None:
 
 def test_the_earth_rate_and_a_heading_error() -> None:
     latitude = np.deg2rad(PLAIN.site.latitude_deg)
-    felt = frames.turn(A, A) @ frames.earth_rate_home(latitude)
+    felt = frames.direction_cosines(A, A) @ frames.earth_rate_at_home(latitude)
     np.testing.assert_allclose(added("earth_rate:")[3:], felt, atol=1e-15)
     psi = np.deg2rad(30)
     base = frames.EARTH_RATE * np.array(
@@ -204,7 +208,9 @@ def test_the_earth_rate_and_a_heading_error() -> None:
     )
     plain = replace(PLAIN, device=Identity(grade="navigation"))
     turned = at_rest(plain.having(parse("heading_error:psi_deg=30")))
-    np.testing.assert_allclose(turned.gyr[-1], frames.turn(A, A) @ base, atol=1e-15)
+    np.testing.assert_allclose(
+        turned.gyr[-1], frames.direction_cosines(A, A) @ base, atol=1e-15
+    )
     np.testing.assert_allclose(turned.acc[-1], F)
 
 
@@ -255,7 +261,7 @@ def test_a_base_that_is_knocked_stays_as_it_then_stands() -> None:
     tilt = np.deg2rad(0.5) * np.array([0.6, 0.0, -0.8])
     # the base turns by the tilt: what does not move in space goes by the other way
     up = np.array([0.0, -10.0, 0.0])
-    held = frames.turn(np.array([A]), np.array([A]))[0]
+    held = frames.direction_cosines(np.array([A]), np.array([A]))[0]
     goes = held @ (up - np.cross(tilt, up)) - held @ up
     after = more[6100:, :3]
     np.testing.assert_allclose(after, np.tile(goes, (len(after), 1)), atol=5e-4)
@@ -282,7 +288,7 @@ def test_joints_that_creep_go_too_far_and_come_back() -> None:
             there = (far[: k + 1] * np.exp(-since / 5.0)[:, None]).sum(axis=0)
             up = np.array([0.0, -10.0, 0.0])
             held, goes = (
-                frames.turn(alpha + s * there[0], beta + s * there[1]) @ up
+                frames.direction_cosines(alpha + s * there[0], beta + s * there[1]) @ up
                 for s in (0, 1)
             )
             np.testing.assert_allclose(more[k][at, :3], goes - held, atol=1e-6)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from fieldcal.core.shown import ShownStream
+from fieldcal.core.escaping import EscapingStream
 from fieldcal.sim_device import VirtualDevice
 from fieldcal.sim_device.keys import SteeringKeys
 from fieldcal.sim_device.line_faults import LineFaults
@@ -71,7 +71,7 @@ def test_the_line_is_written_over_where_text_of_others_is_only_shown(
 ) -> None:
     """As the command runs: control characters of names are shown, not carried out."""
     screen = io.StringIO()
-    monkeypatch.setattr("sys.stderr", ShownStream(screen))
+    monkeypatch.setattr("sys.stderr", EscapingStream(screen))
     with SteeringKeys(stream, (22.5, 2.5), terminal[1]) as keys:
         keys.serve()
     assert "\r     0.0 s   at α = 0°" in screen.getvalue()

@@ -70,13 +70,13 @@ def test_at_rest_it_feels_gravity_where_the_turns_have_put_it(
     virtual = device()
     virtual.turn(a, b, 0.01)
     virtual.take(20)
-    expected = frames.force(a, b, virtual.profile.gravity)
+    expected = frames.specific_force_at_rest(a, b, virtual.profile.gravity)
     np.testing.assert_allclose(virtual.take(2).acc[0], expected, atol=1e-12)
 
 
 def test_the_rate_felt_in_a_turn_adds_up_to_the_turn() -> None:
     moving, _ = turned()
-    there = frames.turn(ALPHA, BETA)
+    there = frames.direction_cosines(ALPHA, BETA)
     assert np.abs(moving.gyr).max() > 0.2
     np.testing.assert_allclose(
         followed(moving.gyr, 1000.0).as_matrix().T, there, atol=1e-7
@@ -156,7 +156,7 @@ def test_a_turn_between_two_samples_is_a_jump() -> None:
     block = virtual.take(10)
     assert not block.gyr.any()
     np.testing.assert_allclose(block.acc[2], [0, -PERFECT.gravity, 0], atol=1e-12)
-    expected = frames.force(ALPHA, BETA, PERFECT.gravity)
+    expected = frames.specific_force_at_rest(ALPHA, BETA, PERFECT.gravity)
     np.testing.assert_allclose(block.acc[3], expected, atol=1e-12)
 
 
@@ -200,7 +200,7 @@ def test_mounting_shows_the_axis_that_was_named() -> None:
     )
     _, still = turned(profile=profile)
     axes = frames.mounting_matrix(["+x", "-z", "+y"])
-    expected = frames.force(ALPHA, BETA, profile.gravity) @ axes
+    expected = frames.specific_force_at_rest(ALPHA, BETA, profile.gravity) @ axes
     np.testing.assert_allclose(still.acc[0], expected, atol=1e-12)
     home = VirtualDevice(profile).take(1).acc[0]
     np.testing.assert_allclose(home, [0, 0, profile.gravity], atol=1e-12)
@@ -212,7 +212,9 @@ def test_a_navigation_device_feels_the_earth_turn_in_any_position() -> None:
     )
     _, still = turned(profile=profile)
     latitude = np.deg2rad(profile.site.latitude_deg)
-    expected = frames.turn(ALPHA, BETA) @ frames.earth_rate_home(latitude)
+    expected = frames.direction_cosines(ALPHA, BETA) @ frames.earth_rate_at_home(
+        latitude
+    )
     np.testing.assert_allclose(still.gyr[0], expected, atol=1e-15)
     _, tactical = turned()
     assert not tactical.gyr[0].any()
@@ -253,7 +255,7 @@ def test_gravity_agrees_with_the_series_of_the_core(
     latitude: float, height: float
 ) -> None:
     assert earth.gravity(latitude, height) == pytest.approx(
-        gravity.gravity(latitude, height), abs=1e-6
+        gravity.normal_gravity(latitude, height), abs=1e-6
     )
 
 

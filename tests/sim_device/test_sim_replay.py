@@ -38,7 +38,7 @@ def test_every_window_has_its_position() -> None:
     assert block.t[-1] == pytest.approx(42.99)
     for alpha, beta, start, end in PLACES:
         held = block.between(start, end)
-        expected = frames.force(alpha, beta, PLAIN.gravity)
+        expected = frames.specific_force_at_rest(alpha, beta, PLAIN.gravity)
         np.testing.assert_allclose(held.acc, np.tile(expected, (len(held), 1)))
         np.testing.assert_allclose(held.gyr, 0, atol=1e-12)
 
@@ -83,7 +83,9 @@ def test_windows_at_constant_rate() -> None:
         held = block.between(w.start, w.end)
         np.testing.assert_allclose(held.gyr, np.tile(w.rate, (len(held), 1)), atol=1e-9)
     last = block.between(22, 25).acc
-    np.testing.assert_allclose(last[0], frames.force(0.3, 0, PLAIN.gravity), atol=1e-9)
+    np.testing.assert_allclose(
+        last[0], frames.specific_force_at_rest(0.3, 0, PLAIN.gravity), atol=1e-9
+    )
 
 
 def test_times_with_jitter_and_gaps_are_kept() -> None:
@@ -93,7 +95,7 @@ def test_times_with_jitter_and_gaps_are_kept() -> None:
     windows = [HeldWindow(0.5, 0.0, 0.0, 4000.0)]
     block = simulate(replace(PLAIN, noise=NoiseFigures(acc_walk=ONE)), windows, t)
     np.testing.assert_array_equal(block.t, t)
-    walked = block.acc - frames.force(0.5, 0.0, PLAIN.gravity)
+    walked = block.acc - frames.specific_force_at_rest(0.5, 0.0, PLAIN.gravity)
     jump = np.abs(walked[1000] - walked[999])
     assert jump.max() > 5 * np.abs(np.diff(walked, axis=0)[:900]).max()
 

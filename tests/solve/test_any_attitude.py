@@ -14,10 +14,10 @@ from session_folders import SITE, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
-from fieldcal.core.frames import turns_of
-from fieldcal.core.gravity import gravity
+from fieldcal.core.frames import angles_of_direction_cosines
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.samples import Block
-from fieldcal.session.attitude import held
+from fieldcal.session.attitude import parse_attitude
 from fieldcal.solve import Observations, solve
 
 G = 9.80665
@@ -43,7 +43,7 @@ def table_of(form: str, r: Rotation, error: float = 0.0) -> dict[str, Any]:
         x, y, z, w = r.as_quat().tolist()
         out["quaternion"] = [w, x, y, z]
     else:
-        angles = np.rad2deg(turns_of(r.as_matrix().T)).tolist()
+        angles = np.rad2deg(angles_of_direction_cosines(r.as_matrix().T)).tolist()
         names = ("alpha_deg", "beta_deg", "gamma_deg")
         out |= dict(zip(names, angles, strict=True))
     return {**out, "attitude_sigma_deg": error} if error else out
@@ -60,7 +60,9 @@ def solved(form: str, seed: int, error: float = 0.0) -> Calibration:
     rng, said = np.random.default_rng([seed, 7]), attitudes(seed)
     off = Rotation.from_rotvec(np.deg2rad(error) * rng.normal(size=(len(said), 3)))
     mean = means(off * said, rng)
-    places = tuple(held(i, table_of(form, r, error), "") for i, r in enumerate(said, 1))
+    places = tuple(
+        parse_attitude(i, table_of(form, r, error), "") for i, r in enumerate(said, 1)
+    )
     covariance = np.tile(np.diag(NOISE**2), (len(places), 1, 1))
     return solve(Observations(places, mean, covariance, G), angle_sigma_deg=0.001)
 
@@ -94,7 +96,9 @@ def test_attitudes_that_are_off_and_said_to_be_exact_are_not_believed() -> None:
     rng, said = np.random.default_rng(4), attitudes(4)
     off = Rotation.from_rotvec(np.deg2rad(0.5) * rng.normal(size=(len(said), 3)))
     mean = means(off * said, rng)
-    places = tuple(held(i, table_of("vector", r), "") for i, r in enumerate(said, 1))
+    places = tuple(
+        parse_attitude(i, table_of("vector", r), "") for i, r in enumerate(said, 1)
+    )
     covariance = np.tile(np.diag(NOISE**2), (len(places), 1, 1))
     found = solve(Observations(places, mean, covariance, G), angle_sigma_deg=0.001)
     assert not found.good
@@ -106,7 +110,7 @@ def test_example_1_of_the_earlier_paper() -> None:
     angles = np.arange(0.0, 400.0, 10.0)
     names = ("alpha_deg", "beta_deg", "gamma_deg")
     tables = [dict.fromkeys(names, float(angle)) for angle in angles]
-    places = tuple(held(i, table, "") for i, table in enumerate(tables, 1))
+    places = tuple(parse_attitude(i, table, "") for i, table in enumerate(tables, 1))
     stood = Rotation.from_euler("ZXY", np.repeat(angles[:, None], 3, 1), degrees=True)
     force = stood.inv().apply([0.0, -G, 0.0])
     mean = np.hstack([0.25 + force @ matrix.T, np.zeros((40, 3))])
@@ -122,10 +126,10 @@ def test_example_1_of_the_earlier_paper() -> None:
 
 
 def test_the_print_is_for_two_angles() -> None:
-    place = held(1, {"alpha_deg": 45, "beta_deg": 5, "gamma_deg": 20}, "")
+    place = parse_attitude(1, {"alpha_deg": 45, "beta_deg": 5, "gamma_deg": 20}, "")
     mean, cov = np.ones((2, 6)), np.tile(np.eye(6), (2, 1, 1))
     seen = Observations(
-        (held(2, {"alpha_deg": 0, "beta_deg": 0}, ""), place), mean, cov, G
+        (parse_attitude(2, {"alpha_deg": 0, "beta_deg": 0}, ""), place), mean, cov, G
     )
     with pytest.raises(InputError, match="two angles, and α = 45°, β = 5°, γ = 20°"):
         solve(seen, as_printed=True)
@@ -137,7 +141,7 @@ def test_a_recorded_session_goes_to_a_verdict(
     """Put there by an arm between recordings: nothing is known of the ways."""
     rng, said = np.random.default_rng(9), attitudes(9, 7)
     there = Rotation.from_rotvec(np.deg2rad(0.3) * rng.normal(size=(len(said), 3)))
-    stood, local = there * said, gravity(**SITE)
+    stood, local = there * said, normal_gravity(**SITE)
     tables, blocks = [], []
     for i, r in enumerate(said):
         start, n = 300.0 * i, 400

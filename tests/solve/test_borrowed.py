@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.core.errors import InputError
-from fieldcal.core.positions import TWO, Position
+from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 
@@ -89,7 +89,7 @@ def test_a_tilt_that_the_lot_knows_nothing_of_is_known_better_with_it() -> None:
 
 def test_what_two_positions_leave_open_is_as_the_lot_has_it() -> None:
     known = lot(odd=SURE)
-    one = observe(TWO[:1], outputs(TWO[:1]), sigma=1e-3)
+    one = observe(TWO_POSITIONS[:1], outputs(TWO_POSITIONS[:1]), sigma=1e-3)
     found = solve(one, method="joint", tilt="none", lot=known)
     for name, sigma in zip(NAMES, WIDE, strict=True):
         assert found.uncertainty(name) <= 1.01 * sigma

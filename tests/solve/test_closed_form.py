@@ -22,7 +22,7 @@ from observed import (
 
 from fieldcal.calibration.names import Tilt
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 from fieldcal.solve.closed_form import two_position
@@ -48,7 +48,7 @@ def test_two_positions_give_back_what_was_put_in() -> None:
     np.testing.assert_allclose(found.values, [*BIAS, *SCALE], rtol=1e-12)
 
 
-@pytest.mark.parametrize("places", [TWO, FIVE])
+@pytest.mark.parametrize("places", [TWO_POSITIONS, FIVE_POSITIONS])
 def test_an_axis_the_other_way_round_does_not_pass(
     places: tuple[Position, ...],
 ) -> None:
@@ -101,13 +101,13 @@ def test_two_positions_in_any_mounting_and_order(
 
 def test_covariance_is_that_of_the_windows_carried_through() -> None:
     rng = np.random.default_rng(3)
-    truth = outputs(TWO)
+    truth = outputs(TWO_POSITIONS)
     half = rng.standard_normal((2, 3, 3))
     cov = 1e-6 * (half @ half.transpose(0, 2, 1) + np.eye(3))
     drawn = []
     for _ in range(1500):
         noise = (np.linalg.cholesky(cov) @ rng.standard_normal((2, 3, 1)))[..., 0]
-        seen = observe(TWO, truth + noise)
+        seen = observe(TWO_POSITIONS, truth + noise)
         seen.covariance[:, :3, :3] = cov
         found = two_position(seen)
         drawn.append(found.values)
@@ -122,9 +122,9 @@ def test_table_2_is_one_degree_of_tilt() -> None:
     tables = tomllib.loads(path.read_text())
     # the experiment's device reads +g on y at home, which turns y and z over
     flipped = np.diag([1.0, -1.0, -1.0])
-    u = outputs(TWO, offset_deg=(1, 1), mounting=flipped, bias=np.zeros(3),
+    u = outputs(TWO_POSITIONS, offset_deg=(1, 1), mounting=flipped, bias=np.zeros(3),
                 scale=np.ones(3), g=9.80665)  # fmt: skip
-    seen = observe(TWO, u, mounting=flipped, gravity=9.80665)
+    seen = observe(TWO_POSITIONS, u, mounting=flipped, gravity=9.80665)
     found = two_position(seen)
     keys = ["dUx0", "dUy0", "dUz0", "dK11", "dK22", "dK33"]
     published = np.array(
@@ -137,9 +137,9 @@ def test_table_2_is_one_degree_of_tilt() -> None:
         errors, [-0.171, -0.443, -0.171, -0.0074, 0.0449, -0.105], atol=6e-4
     )
     # a base that is itself tilted would not have given this
-    u = outputs(TWO, base_deg=(1, 1), mounting=flipped, bias=np.zeros(3),
+    u = outputs(TWO_POSITIONS, base_deg=(1, 1), mounting=flipped, bias=np.zeros(3),
                 scale=np.ones(3), g=9.80665)  # fmt: skip
-    rigid = two_position(observe(TWO, u, mounting=flipped, gravity=9.80665))
+    rigid = two_position(observe(TWO_POSITIONS, u, mounting=flipped, gravity=9.80665))
     assert abs(rigid.values[5] - 1) < 0.025
 
 
@@ -160,7 +160,14 @@ def test_a_turn_that_loads_z_alike_leaves_z_out_and_says_what_would_help(
     assert "acc_scale.z is not determined" in text and "β = 5°" in text
 
 
-@pytest.mark.parametrize("places", [(TWO[0], TWO[0]), (TWO[1], TWO[1]), TWO[:1]])
+@pytest.mark.parametrize(
+    "places",
+    [
+        (TWO_POSITIONS[0], TWO_POSITIONS[0]),
+        (TWO_POSITIONS[1], TWO_POSITIONS[1]),
+        TWO_POSITIONS[:1],
+    ],
+)
 def test_positions_that_hold_no_scale_factor_are_refused(
     places: tuple[Position, ...],
 ) -> None:
@@ -171,7 +178,7 @@ def test_positions_that_hold_no_scale_factor_are_refused(
 @pytest.mark.parametrize("g", [0.0, -9.81, float("nan")])
 def test_gravity_that_is_none_is_refused(g: float) -> None:
     with pytest.raises(InputError, match="gravity"):
-        observe(TWO, outputs(TWO), gravity=g)
+        observe(TWO_POSITIONS, outputs(TWO_POSITIONS), gravity=g)
 
 
 @pytest.mark.thorough
@@ -181,8 +188,10 @@ def test_how_level_the_base_is_enters_the_uncertainty() -> None:
     pulls = []
     for _ in range(100):
         tilt = np.rad2deg(level * rng.standard_normal(2))
-        u = outputs(TWO, base_deg=tilt.tolist()) + 1e-3 * rng.standard_normal((2, 3))
-        found = solve(observe(TWO, u), level_sigma_deg=0.5)
+        u = outputs(TWO_POSITIONS, base_deg=tilt.tolist()) + 1e-3 * rng.standard_normal(
+            (2, 3)
+        )
+        found = solve(observe(TWO_POSITIONS, u), level_sigma_deg=0.5)
         value = np.concatenate([found.vector(g)[0] for g in ("acc_bias", "acc_scale")])
         sigma = np.concatenate([found.vector(g)[1] for g in ("acc_bias", "acc_scale")])
         pulls.append((value - [*BIAS, *SCALE]) / sigma)
@@ -196,7 +205,7 @@ TILTED: dict[Tilt, dict[str, tuple[float, float]]] = {
 }
 
 
-@pytest.mark.parametrize("places", [FIVE, SPREAD_OUT])
+@pytest.mark.parametrize("places", [FIVE_POSITIONS, SPREAD_OUT])
 def test_five_positions_give_back_what_was_put_in(places: tuple[Position, ...]) -> None:
     u = outputs(places, offset_deg=OFFSET)
     found = five_position(observe(places, u, sigma=1e-5))
@@ -254,7 +263,7 @@ def test_axes_that_few_positions_leave_open_are_left_out() -> None:
     found = five_position(observe(places, outputs(places, offset_deg=(1, 0))))
     assert found.names == ("acc_bias.x", "acc_scale.x", "angle_offset.alpha0_deg")
     with pytest.raises(NotObservable, match="three different"):
-        five_position(observe(TWO, outputs(TWO)))
+        five_position(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)))
 
 
 def earth(a: float, b: float) -> Array:
@@ -322,21 +331,24 @@ def test_tactical_bias_is_the_mean_less_what_is_known_of_the_earth() -> None:
             [np.cos(LATITUDE) * np.sin(psi), -np.sin(LATITUDE),
              np.cos(LATITUDE) * np.cos(psi)]
         )  # fmt: skip
-        turning = [carried(p.alpha or 0, p.beta or 0, base.tolist()) for p in FIVE]
+        turning = [
+            carried(p.alpha or 0, p.beta or 0, base.tolist()) for p in FIVE_POSITIONS
+        ]
         gyr = GYR_BIAS + np.array(turning) + 2e-5 * rng.standard_normal((5, 3))
-        seen = observe(FIVE, nothing, gyr=gyr, latitude=LATITUDE)
+        seen = observe(FIVE_POSITIONS, nothing, gyr=gyr, latitude=LATITUDE)
         found = solve(seen, tilt="none")
         assert found.groups == ("gyr_bias",)
         pulls.append((found.values - GYR_BIAS) / found.sigma)
     assert 0.82 < np.std(pulls) < 1.08
     np.testing.assert_allclose(np.mean(pulls, axis=0), 0, atol=0.3)
-    printed = solve(observe(FIVE, nothing, gyr=gyr), as_printed=True)
+    printed = solve(observe(FIVE_POSITIONS, nothing, gyr=gyr), as_printed=True)
     np.testing.assert_allclose(printed.values, np.mean(gyr, axis=0))
 
 
 def test_a_scale_factor_beyond_the_gyroscopes_is_not_offered() -> None:
-    seen = observe(TWO, outputs(TWO), gyr=gyro_means(TWO, np.ones(3)),
-                   sigma_gyr=2e-5, latitude=LATITUDE, grade="navigation")  # fmt: skip
+    seen = observe(TWO_POSITIONS, outputs(TWO_POSITIONS),
+                   gyr=gyro_means(TWO_POSITIONS, np.ones(3)), sigma_gyr=2e-5,
+                   latitude=LATITUDE, grade="navigation")  # fmt: skip
     found = solve(seen)
     assert not any(n.startswith("gyr_scale") for n in found.names)
     assert any("record the turns" in w for w in found.warnings)

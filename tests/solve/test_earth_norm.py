@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from session_folders import write_session
 
-from fieldcal.core.factory import FACTORY
+from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import observe, usable_windows
@@ -61,7 +61,7 @@ def test_the_length_of_the_earths_rate_gives_the_bias(
         session = held(tmp_path / str(seed), seed)
         if recorded:
             found = solve_session(
-                session, usable_windows(session), "no", dict.fromkeys(FACTORY, 0.0)
+                session, usable_windows(session), "no", dict.fromkeys(FACTORY_KEYS, 0.0)
             )
         else:
             found = solve(observe(session)[0])

@@ -19,7 +19,7 @@ from session_folders import SITE, write_session
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.gravity import gravity
+from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession
@@ -28,7 +28,7 @@ from fieldcal.solve import solve
 
 RATE, REST, TURN = 100.0, 800, 200
 LEFT = 0.01
-UP = gravity(SITE["latitude_deg"], SITE["height_m"])
+UP = normal_gravity(SITE["latitude_deg"], SITE["height_m"])
 LATITUDE = float(np.deg2rad(SITE["latitude_deg"]))
 EARTH = OMEGA * np.array([0.0, -np.sin(LATITUDE), np.cos(LATITUDE)])
 

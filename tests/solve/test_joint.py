@@ -20,7 +20,13 @@ import fieldcal
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.names import Tilt
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.core.positions import FIVE, SIX_FACES, TWO, WIDE, Position
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    SIX_FACES,
+    TWO_POSITIONS,
+    WIDE_POSITIONS,
+    Position,
+)
 from fieldcal.core.samples import Array
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.solve import Observations, choose, rank, solve
@@ -98,10 +104,10 @@ def whitened(found: Sequence[Calibration], error: Array) -> Array:
 
 
 CASES = [
-    (Model(), TWO, 100),
-    (Model("angle_offset"), FIVE, 40),
-    pytest.param(Model("angle_offset"), WIDE, 60, marks=pytest.mark.thorough),
-    pytest.param(Model("base_tilt"), WIDE, 60, marks=pytest.mark.thorough),
+    (Model(), TWO_POSITIONS, 100),
+    (Model("angle_offset"), FIVE_POSITIONS, 40),
+    pytest.param(Model("angle_offset"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
+    pytest.param(Model("base_tilt"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     (Model("base_tilt"), NINE, 25),
     (Model(cross=True), SIX_FACES, 50),
 ]
@@ -209,9 +215,9 @@ def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() ->
     for k in range(40):
         small = (0.05 * rng.standard_normal(2)).tolist()
         tilt = {"base_deg": small} if k % 2 else {"offset_deg": small}
-        u = outputs(FIVE, **tilt)
+        u = outputs(FIVE_POSITIONS, **tilt)
         u = u + SIGMA * rng.standard_normal((5, 3))
-        result = solve(observe(FIVE, u))
+        result = solve(observe(FIVE_POSITIONS, u))
         pulls.append((result.values[:6] - [*BIAS, *SCALE]) / result.sigma[:6])
     rms = np.sqrt((np.array(pulls) ** 2).mean(axis=0))
     assert (rms < 1.2).all() and rms.mean() > 0.7
@@ -222,8 +228,10 @@ def test_the_other_model_is_covered_by_its_weight() -> None:
 
     w = 1 / (1 + e^ahead).
     """
-    u = outputs(FIVE, offset_deg=(0.02, -0.03))
-    seen = observe(FIVE, u + 3e-4 * np.random.default_rng(2).standard_normal((5, 3)))
+    u = outputs(FIVE_POSITIONS, offset_deg=(0.02, -0.03))
+    seen = observe(
+        FIVE_POSITIONS, u + 3e-4 * np.random.default_rng(2).standard_normal((5, 3))
+    )
     both = solve(seen)
     (note,) = [w for w in both.warnings if "cannot tell it from" in w]
     ahead = float(note.partition("chi2 differs by ")[2].partition(")")[0]) / 2
@@ -335,14 +343,14 @@ def by_hand(rng: np.random.Generator, n: int) -> Array:
 
 def test_positions_without_angles_among_others_are_used_by_their_length() -> None:
     rng = np.random.default_rng(21)
-    places = (*FIVE, *[Position("somewhere")] * 4)
+    places = (*FIVE_POSITIONS, *[Position("somewhere")] * 4)
     found, error, narrower = [], [], []
     for _ in range(30):
-        u = np.vstack([outputs(FIVE), by_hand(rng, 4)])
+        u = np.vstack([outputs(FIVE_POSITIONS), by_hand(rng, 4)])
         u += SIGMA * rng.standard_normal(u.shape)
         found.append(solve(observe(places, u), tilt="none"))
         error.append(found[-1].values - [*BIAS, *SCALE])
-        known = solve(observe(FIVE, u[:5]), tilt="none")
+        known = solve(observe(FIVE_POSITIONS, u[:5]), tilt="none")
         narrower.append(found[-1].sigma / known.sigma)
     assert found[0].method == "joint" and found[0].dof == 3 * 5 + 4 - 6
     assert 0.88 < whitened(found, np.array(error)).std() < 1.08
@@ -366,7 +374,7 @@ def test_a_position_without_angles_that_is_disturbed_does_no_harm() -> None:
 
 
 def test_what_is_no_method_is_refused() -> None:
-    seen = observe(TWO, outputs(TWO))
+    seen = observe(TWO_POSITIONS, outputs(TWO_POSITIONS))
     with pytest.raises(InputError, match="methods are"):
         solve(seen, method="guess")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="0 to 90°"):
@@ -405,12 +413,12 @@ def test_the_practice_session_with_a_stuck_axis_loses_that_position_only() -> No
 
 def test_a_window_too_short_to_know_its_correlations_is_still_used() -> None:
     rng = np.random.default_rng(2)
-    u = outputs(WIDE)
+    u = outputs(WIDE_POSITIONS)
     averages = []
     for row in u:
         few = np.hstack([row, np.zeros(3)]) + SIGMA * rng.standard_normal((3, 6))
         averages.append(Average(few.mean(axis=0), np.cov(few.T) / 3, 20.0, 3, 0.0, 1.0))
-    result = solve(Observations.of(WIDE, averages, G), tilt="none")
+    result = solve(Observations.of(WIDE_POSITIONS, averages, G), tilt="none")
     assert np.isfinite(result.sigma).all()
 
 

@@ -22,8 +22,10 @@ def turned_about_three_axes() -> tuple[tuple[Position, ...], Array]:
     places, directions = [], []
     for t in np.deg2rad(np.arange(0, 400, 10)):
         c, s = np.cos(t), np.sin(t)
-        f = frames.force(t, t, 1.0) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-        a, b = frames.angles_of(f)
+        f = frames.specific_force_at_rest(t, t, 1.0) @ np.array(
+            [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+        )
+        a, b = frames.angles_of_force_direction(f)
         places.append(Position("", a, b))
         directions.append(f)
     return tuple(places), np.array(directions)

@@ -8,7 +8,7 @@ from observed import BIAS, SCALE, G, observe
 from scipy.optimize import least_squares
 
 from fieldcal.core.positions import SIX_FACES, Position
-from fieldcal.core.positions import forces as held
+from fieldcal.core.positions import specific_forces as held
 from fieldcal.core.samples import Array
 from fieldcal.solve import solve
 

@@ -8,7 +8,12 @@ from observed import GYR_BIAS, OMEGA, carried, observe, outputs
 from small_sessions import nominal
 
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.positions import FIVE, SIX_FACES, Position, angles
+from fieldcal.core.positions import (
+    FIVE_POSITIONS,
+    SIX_FACES,
+    Position,
+    alpha_beta_angles,
+)
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
@@ -31,7 +36,7 @@ GYR = [f"gyr_{g}.{x}" for g in ("bias", "scale") for x in "xyz"]
 
 
 def seen(places: tuple[Position, ...], gyr: bool = False) -> Observations:
-    acc = outputs([p if p.oriented else FIVE[3] for p in places])
+    acc = outputs([p if p.oriented else FIVE_POSITIONS[3] for p in places])
     return observe(
         places, acc, gyr=np.tile(GYR_BIAS, (len(places), 1)) if gyr else None
     )
@@ -46,7 +51,9 @@ def given(
 
 
 def experience(places: tuple[Position, ...]) -> Experience:
-    return Experience.at_rest(*angles(places), 9.81, position=np.arange(len(places)))
+    return Experience.at_rest(
+        *alpha_beta_angles(places), 9.81, position=np.arange(len(places))
+    )
 
 
 # --- detents
@@ -144,11 +151,12 @@ def test_what_is_known_of_the_earth_is_in_the_gyroscopes_bias(
 ) -> None:
     phi = 0.8
     home = [0.0, -OMEGA * np.sin(phi), OMEGA * np.cos(phi)]
-    rates = np.array([carried(p.alpha or 0, p.beta or 0, home) for p in FIVE])
+    rates = np.array([carried(p.alpha or 0, p.beta or 0, home) for p in FIVE_POSITIONS])
     nothing = np.full((5, 3), np.nan)
     noise = 1e-4 if heading_deg is None else 1e-7
     found = solve(
-        observe(FIVE, nothing, gyr=GYR_BIAS + rates, sigma_gyr=noise, latitude=phi),
+        observe(FIVE_POSITIONS, nothing, gyr=GYR_BIAS + rates, sigma_gyr=noise,
+                latitude=phi),
         tilt="none", heading_sigma_deg=heading_deg,
     )  # fmt: skip
     bias, sigma = found.vector("gyr_bias")
@@ -188,10 +196,12 @@ def test_names_are_in_the_order_of_results(
 
 
 def test_gyroscopes_have_a_scale_factor_if_it_is_wanted() -> None:
-    plain = given(FIVE, ParameterSetOptions(), gyr=True)
+    plain = given(FIVE_POSITIONS, ParameterSetOptions(), gyr=True)
     assert list(plain.names) == [*ACC, *GYR[:3]]
     assert len(plain.columns_for("gyr_scale.x")) == 0
-    scaled = given(FIVE, ParameterSetOptions(gyr_scale=True, gyro_cross=True), gyr=True)
+    scaled = given(
+        FIVE_POSITIONS, ParameterSetOptions(gyr_scale=True, gyro_cross=True), gyr=True
+    )
     assert list(scaled.names[:12]) == [*ACC, *GYR]
     assert [n[-3:] for n in scaled.names[12:]] == [
         "s12", "s13", "s21", "s23", "s31", "s32",
@@ -210,7 +220,7 @@ def test_where_nobody_knows_an_orientation_a_common_rotation_is_left_out() -> No
 
 @pytest.mark.parametrize("name", ["acc_bias.x", "acc_scale.z", "gyr_bias.y"])
 def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
-    d = given(FIVE, ParameterSetOptions(), gyr=True)
+    d = given(FIVE_POSITIONS, ParameterSetOptions(), gyr=True)
     (at,) = d.columns_for(name)
     start = d.bias if "bias" in name else d.scale
     channel = "xyz".index(name[-1]) + 3 * name.startswith("gyr")
@@ -218,11 +228,11 @@ def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
 
 
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
-    free = given(FIVE, ParameterSetOptions("base_tilt"))
+    free = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
     assert all(g.fixed_size == priors.FREE for g in free.always)
     (tilt,) = [g for c, g in free.members if c.name == "base_tilt"]
     assert tilt.fixed_size == priors.FREE
-    level = given(FIVE, ParameterSetOptions("base_tilt", level_deg=0.2))
+    level = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt", level_deg=0.2))
     (tilt,) = [g for c, g in level.members if c.name == "base_tilt"]
     sizes: Array = tilt.prior_sigma(tilt.fixed_size or 0.0)
     np.testing.assert_allclose(sizes, [0.2, 0.2])
@@ -231,7 +241,7 @@ def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
 def test_turns_are_followed_with_what_the_factory_left() -> None:
     """A cross-coupling of 2 % to first order alone moved a bias by 7 sigma."""
     left = FactoryErrors(1e-2, 2.5e-4, 9e-5)
-    d = given(FIVE, ParameterSetOptions(factory=left, turned=True), gyr=True)
+    d = given(FIVE_POSITIONS, ParameterSetOptions(factory=left, turned=True), gyr=True)
     groups = [g for c, g in d.members if c.name == "factory"]
     assert [g.part for g in groups] == list(left.by_effect)
     assert all(g.in_state and g.effect is catalogue()[g.part] for g in groups)
@@ -240,7 +250,9 @@ def test_turns_are_followed_with_what_the_factory_left() -> None:
 
 
 def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
-    d = given(FIVE, ParameterSetOptions("base_tilt", cross=True, angles_deg=0.1))
+    d = given(
+        FIVE_POSITIONS, ParameterSetOptions("base_tilt", cross=True, angles_deg=0.1)
+    )
     assert {c.kind for c in d.causes} == {"given"}
     assert {c.name for c in d.causes} - {"detents"} == {
         "base_tilt", "cross_coupling", "angle_setting",
@@ -252,7 +264,7 @@ def test_no_unknown_function_and_no_cause_is_searched_for() -> None:
 
 def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     """Toward zero from either side; of values of both signs by less."""
-    recorded = rows_of_means(seen(FIVE))
+    recorded = rows_of_means(seen(FIVE_POSITIONS))
     y = recorded.rows.y.copy()
     y[:, 0] = [0.5, -0.5, 0.005, -0.02, np.nan]
     rows = with_base_rate(replace(recorded.rows, y=y), np.zeros(3))
@@ -269,7 +281,7 @@ def test_outputs_that_are_cut_are_shorter_than_they_are() -> None:
     np.testing.assert_allclose(d.sign[:5, 0], [1.0, -1.0, 0.5, -1.0, 0.0])
     assert not d.sign[:, 1].any() and not d.sign[-1].any(), "none on the way"
     basis = next(b for first, b in d.bases if first <= one.columns[0] < first + 3)
-    view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE)))
+    view = RowView.of(rows.x, recorded.since_turn, nominal(len(FIVE_POSITIONS)))
     table = basis.evaluate(view)
     np.testing.assert_allclose(np.abs(table[:, 0, 0]), np.abs(d.sign[:5, 0]))
     np.testing.assert_allclose(table[:, 0, 0], -d.sign[:5, 0])

@@ -7,7 +7,7 @@ import pytest
 from observed import GYR_BIAS, OMEGA, observe, outputs
 
 from fieldcal.core.errors import InputError, NotObservable
-from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.solve import solve
 from fieldcal.solve.printed import printed_earth_rate
 
@@ -66,14 +66,16 @@ def test_the_mean_is_the_bias_of_tactical_gyroscopes() -> None:
         assert found.names == ("gyr_bias.x", "gyr_bias.y", "gyr_bias.z")
         np.testing.assert_allclose(found.values, gyr.mean(axis=0))
         np.testing.assert_allclose(found.sigma, 2e-5 / 2)
-    alone = observe(TWO[:1], NOWHERE[:1], gyr=gyr[:1], grade="navigation",
+    alone = observe(TWO_POSITIONS[:1], NOWHERE[:1], gyr=gyr[:1], grade="navigation",
                     latitude=LATITUDE)  # fmt: skip
     np.testing.assert_allclose(solve(alone, as_printed=True).values, gyr[0])
 
 
 def test_what_is_printed_says_so_and_keeps_both_triads_apart() -> None:
     gyr = np.tile(GYR_BIAS, (5, 1))
-    five = solve(observe(FIVE, outputs(FIVE), gyr=gyr), as_printed=True)
+    five = solve(
+        observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS), gyr=gyr), as_printed=True
+    )
     assert five.method == "five_position"
     assert five.warnings == (
         "as printed: (23) is inverted, (22), (30), (34) lose the sign",
@@ -82,33 +84,49 @@ def test_what_is_printed_says_so_and_keeps_both_triads_apart() -> None:
     assert not five.covariance[np.ix_(np.array(acc), ~np.array(acc))].any()
     assert five.units[-1] == "rad/s" and five.units[0] == "m/s^2"
     assert (five.chi2, five.dof) == (0.0, 0) and np.isnan(five.rms)
-    two = solve(observe(TWO, outputs(TWO)), as_printed=True)
+    two = solve(observe(TWO_POSITIONS, outputs(TWO_POSITIONS)), as_printed=True)
     assert two.method == "two_position"
     assert two.warnings == (
         "as printed: the sign of (5) makes the scale factor of z negative",
     )
     assert two.value("acc_scale.z") == pytest.approx(-1.006, abs=1e-6)
-    asked = solve(observe(TWO, outputs(TWO)), as_printed=True, method="two_position")
+    asked = solve(
+        observe(TWO_POSITIONS, outputs(TWO_POSITIONS)),
+        as_printed=True,
+        method="two_position",
+    )
     assert asked.names == two.names
 
 
 def test_the_method_that_is_asked_for_is_taken() -> None:
     with pytest.raises(NotObservable, match="two positions with known angles are need"):
-        solve(observe(FIVE, outputs(FIVE)), as_printed=True, method="two_position")
+        solve(
+            observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS)),
+            as_printed=True,
+            method="two_position",
+        )
     with pytest.raises(NotObservable, match="separate bias, scale factor and tilt on"):
-        solve(observe(TWO, outputs(TWO)), as_printed=True, method="five_position")
+        solve(
+            observe(TWO_POSITIONS, outputs(TWO_POSITIONS)),
+            as_printed=True,
+            method="five_position",
+        )
 
 
 def test_what_the_print_has_not_is_refused() -> None:
     with pytest.raises(InputError) as error:
-        solve(observe(FIVE, outputs(FIVE)), as_printed=True, method="joint")
+        solve(
+            observe(FIVE_POSITIONS, outputs(FIVE_POSITIONS)),
+            as_printed=True,
+            method="joint",
+        )
     assert str(error.value) == (
         "the paper prints no joint method: as printed are two_position and"
         " five_position"
     )
     with pytest.raises(NotObservable, match="^no sensor was measured; the print gives"):
         solve(observe(PLACES, NOWHERE), as_printed=True)
-    laid = (*FIVE, Position("on its side", None, None))
-    seen = np.vstack([outputs(FIVE), [9.81, 0.0, 0.0]])
+    laid = (*FIVE_POSITIONS, Position("on its side", None, None))
+    seen = np.vstack([outputs(FIVE_POSITIONS), [9.81, 0.0, 0.0]])
     with pytest.raises(InputError, match="those of on its side are not stated"):
         solve(observe(laid, seen), as_printed=True)

@@ -11,7 +11,7 @@ from scipy.signal import butter, lfilter
 from session_folders import write_session
 
 from fieldcal.cli import main
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.core.samples import Block
 
 ANGLES = [(0.0, 0.0), (22.5, 0.0), (22.5, 2.5), (45.0, 2.5), (45.0, 5.0)]
@@ -35,7 +35,7 @@ def quick(
         beta += part * np.deg2rad(b - before[1])
         held = {"start_s": i * EACH + 3, "end_s": i * EACH + 3 + HOLD}
         where.append({"alpha_deg": a, "beta_deg": b, **held})
-    attitude = turn(alpha, beta)
+    attitude = direction_cosines(alpha, beta)
     step = attitude[1:] @ np.swapaxes(attitude[:-1], 1, 2)  # exp(-[w dt]x)
     pairs = [(1, 2), (2, 0), (0, 1)]
     w = np.stack([(step[:, i, j] - step[:, j, i]) / 2 * at for i, j in pairs], axis=1)

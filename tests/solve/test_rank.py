@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from observed import BIAS, SCALE, G, observe, outputs
 
-from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.solve import solve
@@ -48,7 +48,9 @@ def test_what_is_left_of_a_sine_by_rounding_is_nothing() -> None:
     assert known.tolist() == [True, False, True] and rank == 2
 
 
-@pytest.mark.parametrize("taken", [TWO, TWO[:1], (*TWO, TWO[1])])
+@pytest.mark.parametrize(
+    "taken", [TWO_POSITIONS, TWO_POSITIONS[:1], (*TWO_POSITIONS, TWO_POSITIONS[1])]
+)
 def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
     taken: tuple[Position, ...],
 ) -> None:
@@ -67,8 +69,11 @@ def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None
     def rows(places: Sequence[Position]) -> Array:
         return np.ones((len(places), 1, 2))
 
-    assert positions_to_add(lambda p: design_matrix(TILTED, p, G), FIVE, LADDER) == []
-    assert positions_to_add(rows, TWO, LADDER) == []
+    assert (
+        positions_to_add(lambda p: design_matrix(TILTED, p, G), FIVE_POSITIONS, LADDER)
+        == []
+    )
+    assert positions_to_add(rows, TWO_POSITIONS, LADDER) == []
 
 
 def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
@@ -85,6 +90,6 @@ def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
 def test_positions_without_angles_are_no_part_of_what_a_ladder_determines() -> None:
     names = parameters("angle_offset")
     mean = np.tile([0.1, -9.8, 0.2], (5, 1))
-    mixed = observe([*FIVE[:2], Position("face")], mean[:3])
-    alone = observe(FIVE[:2], mean[:2])
+    mixed = observe([*FIVE_POSITIONS[:2], Position("face")], mean[:3])
+    alone = observe(FIVE_POSITIONS[:2], mean[:2])
     assert ladder_remedy(mixed, names) == ladder_remedy(alone, names)

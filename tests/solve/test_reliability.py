@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from observed import observe
 
-from fieldcal.core.positions import FIVE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model.priors import GAUGE, REPEATED_DEG
 from fieldcal.solve import solve
@@ -43,25 +43,25 @@ def listed(found: Any) -> list[WrongAngles]:
 
 def test_what_is_foretold_of_a_gauge_is_what_it_does() -> None:
     straight = np.zeros((5, 2))
-    found = solved(FIVE, straight)
+    found = solved(FIVE_POSITIONS, straight)
     part = 0.02  # of the size that is foretold: linear, and nothing is thrown out
     for wrong in listed(found):
         if wrong.position is not None or wrong.angle_deg is not None:
             continue
         off = straight.copy()
-        stated = [(p.alpha, p.beta)[wrong.joint] or 0.0 for p in FIVE]
+        stated = [(p.alpha, p.beta)[wrong.joint] or 0.0 for p in FIVE_POSITIONS]
         off[:, wrong.joint] = part * GAUGE * np.array(stated)
-        moved = solved(FIVE, off)
+        moved = solved(FIVE_POSITIONS, off)
         for name, by in wrong.moves.items():
             there = moved.value(name) - found.value(name)
             assert there == pytest.approx(part * by, abs=0.1 * found.uncertainty(name))
 
 
 def test_five_small_turns_have_no_witness_of_a_gauge_and_six_faces_need_none() -> None:
-    five = listed(solved(FIVE, np.zeros((5, 2))))
+    five = listed(solved(FIVE_POSITIONS, np.zeros((5, 2))))
     gauges = [w for w in five if w.position is None and w.angle_deg is None]
     assert {w.joint for w in gauges} == {0, 1}
-    sigma = solved(FIVE, np.zeros((5, 2))).uncertainty
+    sigma = solved(FIVE_POSITIONS, np.zeros((5, 2))).uncertainty
     assert any(
         abs(w.moves["acc_scale.z"]) > w.shows * sigma("acc_scale.z") for w in gauges
     )

@@ -12,7 +12,7 @@ from observed import GYR_BIAS, observe, outputs
 
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.solve import observations, result, solve
 from fieldcal.solve.estimation import ParameterEstimate
 from fieldcal.solve.observations import Observations
@@ -46,9 +46,9 @@ def estimated(**known: Any) -> ParameterEstimate:
 
 
 def observed(
-    places: Sequence[Position] = FIVE, gyr: bool = True, **known: Any
+    places: Sequence[Position] = FIVE_POSITIONS, gyr: bool = True, **known: Any
 ) -> Observations:
-    still = [p if p.oriented else FIVE[0] for p in places]
+    still = [p if p.oriented else FIVE_POSITIONS[0] for p in places]
     rates = np.tile(GYR_BIAS, (len(places), 1)) if gyr else None
     return observe(places, outputs(still), gyr=rates, **known)
 
@@ -68,7 +68,7 @@ def test_what_nothing_determines_is_an_error_with_the_reason() -> None:
     vars(none).update(carried | {"values": np.zeros(0), "covariance": np.zeros((0, 0))})
     with pytest.raises(NotObservable) as error:
         result.build_calibration(
-            "joint", observed(TWO, False), SolveOptions(), none, ["a note"]
+            "joint", observed(TWO_POSITIONS, False), SolveOptions(), none, ["a note"]
         )
     text = str(error.value)
     assert text.startswith("these positions determine nothing: acc_bias.x and")
@@ -137,22 +137,30 @@ def test_conditions_are_those_that_were_given() -> None:
     said = result._info("joint", observed(), SolveOptions(), unknown)
     assert said["gyroscopes"]["rms"] is None, "JSON has no nan"
     assert "level_sigma_deg" not in plain
-    two = solve(observed(TWO, gyr=False), level_sigma_deg=0.3).info
+    two = solve(observed(TWO_POSITIONS, gyr=False), level_sigma_deg=0.3).info
     assert two["level_sigma_deg"] == 0.3
     more = solve(observed(), level_sigma_deg=0.3).info
     assert more["level_sigma_deg"] == 0.3, "what is stated counts whatever the method"
 
 
 def test_a_window_that_is_off_for_certain_has_no_weight_and_is_named() -> None:
-    places = (*FIVE, Position.deg(-30, 10), Position.deg(60, -20), Position.deg(90, 0))
+    places = (
+        *FIVE_POSITIONS,
+        Position.deg(-30, 10),
+        Position.deg(60, -20),
+        Position.deg(90, 0),
+    )
     acc = outputs(places)
     acc[3] += [0.5, -0.4, 0.6]
     noise = 1e-3 * np.random.default_rng(2).standard_normal(acc.shape)
     found = solve(observe(places, acc + noise), tilt="none")
     bad = found.info["bad_position"]
     assert bad[3] == 1.0 and max(bad[:3] + bad[4:]) < 0.1
-    assert found.info["doubtful_position"] == {"name": FIVE[3].name, "probability": 1.0}
-    assert any(FIVE[3].name in w and "no weight" in w for w in found.warnings)
+    assert found.info["doubtful_position"] == {
+        "name": FIVE_POSITIONS[3].name,
+        "probability": 1.0,
+    }
+    assert any(FIVE_POSITIONS[3].name in w and "no weight" in w for w in found.warnings)
     others = [i for i in range(len(places)) if i != 3]
     left = solve(observe(places, acc + noise)[others], tilt="none")
     np.testing.assert_allclose(found.values, left.values, atol=0.3 * left.sigma.max())
@@ -212,8 +220,8 @@ def test_a_mean_that_is_missing_is_named() -> None:
     with pytest.raises(InputError) as error:
         Observations(seen.positions, mean, seen.covariance, 9.8)
     assert str(error.value) == (
-        f"position 4 ({FIVE[3].name}) has no mean of gy: take its window again or leave"
-        " it out"
+        f"position 4 ({FIVE_POSITIONS[3].name}) has no mean of gy: take its window"
+        " again or leave it out"
     )
     with pytest.raises(InputError, match="there is no position with a window: take at"):
         Observations.of((), (), 9.8)
@@ -225,7 +233,10 @@ def test_a_mean_that_is_missing_is_named() -> None:
 def test_of_some_positions_everything_is_theirs() -> None:
     seen = observed(temperature=np.arange(5.0), time=10 * np.arange(5.0))
     some = seen[[3, 1]]
-    assert [p.name for p in some.positions] == [FIVE[3].name, FIVE[1].name]
+    assert [p.name for p in some.positions] == [
+        FIVE_POSITIONS[3].name,
+        FIVE_POSITIONS[1].name,
+    ]
     np.testing.assert_array_equal(some.mean, seen.mean[[3, 1]])
     np.testing.assert_array_equal(some.temperature, [3.0, 1.0])
     np.testing.assert_array_equal(some.time, [30.0, 10.0])

@@ -9,14 +9,14 @@ import pytest
 from closed_circle import a_third
 from observed import BIAS, GYR_BIAS, OMEGA, carried, observe, outputs
 
-from fieldcal.core.positions import FIVE, SIX_FACES, Position
+from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, Position
 from fieldcal.core.samples import Array
 from fieldcal.solve import Observations, solve
 
 LATITUDE = np.deg2rad(50)
 EARTH = [0.0, -OMEGA * np.sin(LATITUDE), OMEGA * np.cos(LATITUDE)]
 NINE = (
-    *FIVE,
+    *FIVE_POSITIONS,
     *(Position.deg(a, b) for a, b in [(-45, 5), (-22, -5), (0, 5), (30, -4)]),
 )
 TILTS = {"angle_offset": [0.8, -0.6], "base_tilt": [0.7, -0.9]}
@@ -59,7 +59,7 @@ def navigation(
 
 @pytest.mark.parametrize(
     ("places", "tilt"),
-    a_third([(places, tilt) for places in (FIVE, NINE) for tilt in TILTS]),
+    a_third([(places, tilt) for places in (FIVE_POSITIONS, NINE) for tilt in TILTS]),
 )
 def test_navigation_gyroscopes_on_a_tilted_base(
     places: Sequence[Position], tilt: str

@@ -23,9 +23,9 @@ from session_folders import SITE, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import NotObservable
-from fieldcal.core.gravity import gravity
-from fieldcal.core.positions import FIVE, TWO, Position
-from fieldcal.core.rotation import exponential
+from fieldcal.core.gravity import normal_gravity
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession
@@ -45,7 +45,7 @@ NAMES = (
     *(f"gyro_cross_coupling.s{i}{j}" for i in "123" for j in "123" if i != j),
 )
 TRUTH = np.array([*BIAS, *np.diag(S), *S[~np.eye(3, dtype=bool)]])
-UP = gravity(SITE["latitude_deg"], SITE["height_m"])
+UP = normal_gravity(SITE["latitude_deg"], SITE["height_m"])
 LATITUDE = float(np.deg2rad(SITE["latitude_deg"]))
 EARTH = OMEGA * np.array([0.0, -np.sin(LATITUDE), np.cos(LATITUDE)])
 vectors = st.tuples(*[st.floats(-3, 3)] * 3).map(np.array)
@@ -59,7 +59,7 @@ def test_examples_in_the_text() -> None:
 @given(vectors)
 def test_exponential_is_a_rotation(v: Array) -> None:
     np.testing.assert_allclose(
-        exponential(v), Rotation.from_rotvec(v).as_matrix(), atol=1e-12
+        rotation_matrices(v), Rotation.from_rotvec(v).as_matrix(), atol=1e-12
     )
 
 
@@ -229,7 +229,7 @@ def test_pulls_of_turns_by_hand() -> None:
     assert 0.3 < ratio < 1.5
 
 
-@pytest.mark.parametrize("places", [TWO, FIVE])
+@pytest.mark.parametrize("places", [TWO_POSITIONS, FIVE_POSITIONS])
 def test_the_turns_of_the_paper_s_own_procedure(
     places: tuple[Position, ...], tmp_path: Path
 ) -> None:

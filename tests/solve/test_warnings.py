@@ -7,7 +7,7 @@ import pytest
 from test_result import estimated, fit, observed
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.positions import FIVE, TWO, Position
+from fieldcal.core.positions import FIVE_POSITIONS, TWO_POSITIONS, Position
 from fieldcal.solve import warnings, words
 from fieldcal.solve.options import SolveOptions
 
@@ -37,7 +37,7 @@ def test_what_turns_or_rates_leave_open(
     found.parameter_set.options.turned = turned  # type: ignore[misc]
     seen = observed()
     if rates:
-        seen = observed((FIVE[0], Position("", rate=(0.1, 0.0, 0.0))))
+        seen = observed((FIVE_POSITIONS[0], Position("", rate=(0.1, 0.0, 0.0))))
     assert warnings._gyroscope_warning(gyr, cross, seen, found) == says
 
 
@@ -74,7 +74,7 @@ def test_what_lengths_leave_open(
 def test_a_force_that_no_parameter_explains_is_said(
     stretched: float, says: str
 ) -> None:
-    seen = observed((FIVE[0],) * 3, gravity=G0)
+    seen = observed((FIVE_POSITIONS[0],) * 3, gravity=G0)
     force = np.array([3.0, 4.0, np.sqrt(G0**2 - 25)])
     seen.mean[:, :3] = stretched * force
     told = warnings._force_length_warning(seen)
@@ -98,7 +98,7 @@ def test_of_so_few_windows_the_residual_says_nothing() -> None:
 
 
 def test_a_base_that_two_positions_take_for_level_is_said() -> None:
-    seen = observed(TWO, gravity=10.0)
+    seen = observed(TWO_POSITIONS, gravity=10.0)
     (text,) = warnings.level_warnings("two_position", SolveOptions(), seen)
     assert text == (
         "the base is assumed exactly level: a tilt of 0.1° would change a bias by up to"

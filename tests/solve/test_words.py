@@ -7,13 +7,13 @@ from scipy.stats import chi2 as chi_square
 
 from fieldcal.calibration import Nominal
 from fieldcal.calibration.plausible import implausible_values
-from fieldcal.core.positions import FIVE, WIDE, Position
+from fieldcal.core.positions import FIVE_POSITIONS, WIDE_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.solve import solve, words
 from fieldcal.solve.doubt import DoubtfulPosition
 
-NINE = (*WIDE, *FIVE[1:])
+NINE = (*WIDE_POSITIONS, *FIVE_POSITIONS[1:])
 
 
 def noisy(seed: int = 1, size: float = 1e-3, **known: Array) -> Array:

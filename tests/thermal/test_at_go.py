@@ -16,7 +16,7 @@ from fieldcal.acceptance.family_at_temperature import family_at_temperature
 from fieldcal.calibration import Calibration, limits
 from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
 from fieldcal.history.store import History, HistoryRun
-from fieldcal.history.trend import trend
+from fieldcal.history.trend import parameter_trend
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile, Truth
 from fieldcal.sim_device.replay import simulate
@@ -145,8 +145,9 @@ def test_what_the_history_knows_of_temperature_is_taken_off() -> None:
 def test_the_history_knows_a_cold_day_as_well() -> None:
     of = steady(1.2e-3)
     every = runs(of, [20.0] * 30 + [-30.0])
-    *_, last = trend(every, "acc_bias.x", BOUNDS)
-    assert not last.odd
-    *_, untold = trend([replace(r, temperature=None) for r in every], "acc_bias.x",
+    *_, last = parameter_trend(every, "acc_bias.x", BOUNDS)
+    assert not last.out_of_family
+    *_, untold = parameter_trend([replace(r, temperature=None) for r in every],
+                                 "acc_bias.x",
                        BOUNDS)  # fmt: skip
-    assert untold.odd
+    assert untold.out_of_family

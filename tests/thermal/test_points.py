@@ -9,19 +9,24 @@ import pytest
 from calibrations import calibration
 
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, Installed, names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    PX4,
+    InstalledCalibration,
+    parameter_names,
+)
 from fieldcal.thermal import point
 
 WARM = {"conditions": {"temperature_degc": 21.5, "temperature_sd_k": 0.2}}
 
 
-def installed(program: int, **more: float) -> Installed:
-    known = names(program, 1)
+def installed(program: int, **more: float) -> InstalledCalibration:
+    known = parameter_names(program, 1)
     values = dict(zip(known["acc_offset"], (0.1, -0.2, 0.3), strict=True))
     values |= dict(zip(known["acc_scale"], (1.1, 0.9, 1.05), strict=True))
     values |= dict(zip(known["gyr_offset"], (0.01, 0.02, -0.03), strict=True))
     values |= dict.fromkeys(known["rotation"], 0.0)
-    return Installed(program, 1, {**values, **more})
+    return InstalledCalibration(program, 1, {**values, **more})
 
 
 @pytest.mark.parametrize("program", [ARDUPILOT, PX4])
@@ -33,8 +38,8 @@ def test_a_point_is_of_the_sensors_own_output(program: int) -> None:
     info = {**WARM, "installed": there.as_table()}
     made = point("s", replace(found, info=info)).calibration
     for sensor, o, k in (
-        ("acc", there.of("acc_offset"), there.of("acc_scale")),
-        ("gyr", there.of("gyr_offset"), np.ones(3)),
+        ("acc", there.vector("acc_offset"), there.vector("acc_scale")),
+        ("gyr", there.vector("gyr_offset"), np.ones(3)),
     ):
         which = "accelerometers" if sensor == "acc" else "gyroscopes"
         bias, matrix = getattr(found, which)()

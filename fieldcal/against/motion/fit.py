@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.followed import MotionDictionary
 from fieldcal.model.evidence.gram import Eliminated
@@ -151,7 +151,7 @@ class MotionFit:
             now,
             delay=now.delay + float(delay),
             drift=now.drift + float(drift),
-            rotation=exponential(turn) @ now.rotation,
+            rotation=rotation_matrices(turn) @ now.rotation,
             unseen_gravity=now.unseen_gravity + self._unseen(found),
         )
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from fieldcal.against.sensor_model import SensorModel, effect_with_values
-from fieldcal.core.plugins import names
-from fieldcal.session.folder import write_whole
+from fieldcal.core.plugins import module_names
+from fieldcal.session.folder import write_atomically
 
 
 class PatchFormat(Protocol):
@@ -30,7 +30,7 @@ class PatchFormat(Protocol):
 
 def formats() -> tuple[str, ...]:
     """Names of all formats."""
-    return names(__path__)
+    return module_names(__path__)
 
 
 def patch_format(name: str) -> PatchFormat:
@@ -55,5 +55,5 @@ def write(name: str, model: SensorModel, path: Path) -> list[str]:
     for one in lost:
         what = effect_with_values(one.replace("_", " "), model.effects.get(one, {}))
         says.append(f"{name} has nothing for {what}: it is not in {path.name}")
-    write_whole(path, content)
+    write_atomically(path, content)
     return says

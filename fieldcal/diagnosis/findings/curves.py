@@ -38,7 +38,7 @@ def residual_curves(
         rows = first.rows
         before, sd, position = part_means(rows, first.residual)
         after = part_means(then.rows, then.residual)[0]
-        position = np.array(source.about.numbered(position))
+        position = np.array(source.about.indices_in_file(position))
         x = _covariate_means(rows, COVARIATES[name](rows)) + (
             start if unit == "°C" else 0.0
         )

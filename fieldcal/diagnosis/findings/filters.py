@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldcal.core.chances import of_odds
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.result import FoundEffect, Quantity
@@ -28,7 +28,7 @@ def found_filters(explanation: Explanation) -> Iterator[FoundEffect]:
     chance = catalogue()[FILTERED].chance(explanation.dictionary.x)
     rise = explanation.evidence_gain(group.columns.tolist())
     odds = rise + np.log(chance) - np.log1p(-chance)
-    probability = float(of_odds(odds))
+    probability = float(probability_of_log_odds(odds))
     state = explanation.best.set.state
     at = [int(np.flatnonzero(state.columns == c)[0]) for c in group.columns[:2]]
     found = time_constants(state.estimate[at], np.sqrt(np.diag(state.inverse)[at]))

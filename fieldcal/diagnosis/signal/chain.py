@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.positions import angles, third_angles
+from fieldcal.core.positions import alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import CHANNELS, Array, Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.rows.block_means import masked
@@ -218,15 +218,15 @@ def samples_to_check(
     block: Block, usable: NDArray[np.bool_], about: Description
 ) -> CheckedSamples:
     """Samples and facts that the checks are given."""
-    windows, rate = window_bounds(block, about), rate_of(block)
+    windows, rate = window_bounds(block, about), sampling_rate(block)
     block, held = masked(block, usable), windows[windows[:, 1] > windows[:, 0]]
     unknown = np.full(6, np.nan)
     noise = ChannelNoise(unknown, unknown)
     if len(held):
         noise = quiet_window_noise(block, held, rate)
     if about.positions:
-        alpha, beta = angles(about.positions)
-        gamma = third_angles(about.positions)
+        alpha, beta = alpha_beta_angles(about.positions)
+        gamma = gamma_angles(about.positions)
     else:
         alpha = beta = np.array([np.nan])
         gamma = np.zeros(1)

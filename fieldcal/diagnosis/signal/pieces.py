@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.change_points import clear_jumps
 from fieldcal.model.rows.reduce import Rows, RowSource
@@ -93,7 +93,7 @@ def samples_of_windows(source: RowSource, rows: Rows) -> WindowSamples:
         samples.append(_detrended(t, values, usable[-1], cuts))
     return WindowSamples(
         experience_in_windows(rows, held), tuple(samples), times, rows.noise,
-        rate_of(block), tuple(usable), cuts,
+        sampling_rate(block), tuple(usable), cuts,
     )  # fmt: skip
 
 

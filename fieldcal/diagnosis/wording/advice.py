@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fieldcal.core.positions import ladder
-from fieldcal.core.sentences import join
+from fieldcal.core.positions import ladder_settings
+from fieldcal.core.sentences import join_words
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch, list_positions
 from fieldcal.diagnosis.result import FoundEffect, Mismatch
@@ -92,11 +92,11 @@ def _how_to_decide(
                 apart = f"{other} ({place.apart:.0f} σ apart there)"
                 ways.setdefault(place.text, []).append(apart)
         for way, others in ways.items():
-            told = join(others, "and")
+            told = join_words(others, "and")
             yield f"{_capital(way)}: it distinguishes {one.id} from {told}."
         if open_:
             yield (
-                f"{one.id} or {join(open_, 'or')}? {_none_in_reach(explanation)}"
+                f"{one.id} or {join_words(open_, 'or')}? {_none_in_reach(explanation)}"
                 f"{catalogue()[one.id].decided_by}."
             )
 
@@ -108,7 +108,7 @@ def _capital(text: str) -> str:
 def _none_in_reach(explanation: Explanation) -> str:
     """Beginning of a sentence: no position of the ladder decides, if any is known."""
     positions = explanation.prepared.source.about.positions
-    if not explanation.rows.x.oriented.all() or not ladder(positions):
+    if not explanation.rows.x.oriented.all() or not ladder_settings(positions):
         return "To decide: "
     return f"No position {ladder_extent(positions)} decides; what does: "
 
@@ -122,7 +122,7 @@ def advice_on_mismatches(unknown: Sequence[UnknownMismatch]) -> Iterator[str]:
         once = list(dict.fromkeys(names))
         several = len(once) > 1
         yield what + why.format(
-            channels=join(once, "and"),
+            channels=join_words(once, "and"),
             follow="follow" if several else "follows",
             be="are" if several else "is",
         )
@@ -160,7 +160,7 @@ def _remedy(unknown: UnknownMismatch) -> tuple[str, str]:
     """Remedy for a mismatch, and its reason with placeholders for the channels."""
     places = list_positions(unknown.mismatch.positions)
     if unknown.angle_errors and len(unknown.mismatch.positions) > 1:
-        joints = join([joint for joint, _ in unknown.angle_errors], "and")
+        joints = join_words([joint for joint, _ in unknown.angle_errors], "and")
         return (
             f"Set the angle {joints} of {places} again and repeat these positions",
             f": {angle_errors_text(unknown.angle_errors)} in each of them.",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.positions import Position, ladder
+from fieldcal.core.positions import Position, ladder_settings
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model import thresholds
 from fieldcal.model.causes.planned import rows_at_session_end
@@ -47,7 +47,9 @@ class DecidingPosition:
 
 def ladder_extent(positions: Sequence[Position]) -> str:
     """Largest angles of the session's ladder, for a sentence."""
-    a, b = (max(map(abs, joint)) for joint in zip(*ladder(positions), strict=True))
+    a, b = (
+        max(map(abs, joint)) for joint in zip(*ladder_settings(positions), strict=True)
+    )
     return f"within |α| ≤ {a:g}°, |β| ≤ {b:g}°"
 
 
@@ -70,13 +72,13 @@ def deciding_position(
     about = explanation.prepared.source.about
     held = [p.degrees for p in about.positions]
     best: DecidingPosition | None = None
-    for alpha, beta in ladder(about.positions):
+    for alpha, beta in ladder_settings(about.positions):
         place = rows_at_session_end(x, *np.deg2rad([[alpha], [beta]]))
         seen = [s.output(s.experienced(place), since) for s in states]
         apart = float(np.nanmax(np.abs(seen[0] - seen[1]) / sd))
         if best is None or apart > best.apart * 1.2:
             at = [i for i, angles in enumerate(held) if angles == (alpha, beta)]
-            number = about.numbered(at[:1])[0] + 1 if at else 0
+            number = about.indices_in_file(at[:1])[0] + 1 if at else 0
             best = DecidingPosition(alpha, beta, apart, number)
     return best if best is not None and best.apart > thresholds.DECIDES else None
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldcal.core.sentences import join
+from fieldcal.core.sentences import join_words
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.unknown_mismatch import UnknownMismatch, list_positions
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quality, Quantity, Verdict
@@ -76,7 +76,7 @@ def paragraph(
         out += _improvement(*quality)
     for one in effects:
         if one.aliases:
-            others = join(one.aliases, "or")
+            others = join_words(one.aliases, "or")
             out.append(f"{others} would explain it as well as {one.id}.")
     out += dict.fromkeys(_unexplained(u, unknown) for u in unknown)
     return " ".join([*filter(None, out), *notes])
@@ -198,8 +198,8 @@ def angle_errors_text(turned: Sequence[tuple[str, Quantity]], verb: str = "was")
 
 def setup_notes(explanation: Explanation) -> list[str]:
     """Sentences about turns and base that are no effects of the device."""
-    numbered = explanation.prepared.source.about.numbered
-    ways = [numbered(pair) for pair in explanation.untracked_turns]
+    indices_in_file = explanation.prepared.source.about.indices_in_file
+    ways = [indices_in_file(pair) for pair in explanation.untracked_turns]
     said = [
         f"The turn from position {start + 1} to {end + 1} is not the one that the"
         " gyroscopes measured: samples may be lost there, or an output ran against its"

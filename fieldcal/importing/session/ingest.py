@@ -13,7 +13,7 @@ from time import time
 from typing import Any
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
-from fieldcal.core.samples import Array, Block, too_quick
+from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.found_rests import find_rests
@@ -23,7 +23,7 @@ from fieldcal.importing.session.validation import (
     SampleWriter,
     file_record,
 )
-from fieldcal.session.clock import ClockStep, SteadyClock
+from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
@@ -143,7 +143,7 @@ def _write_session(
     facts, cells, clock, jumps = (
         StreamFacts(),
         CellAccumulator(),
-        SteadyClock(),
+        ClockStepRemover(),
         JumpFinder(),
     )
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
@@ -185,17 +185,17 @@ def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
             f"{recording.path}: has no number of an accelerometer or gyroscope in any"
             " row that can be used; name its columns with --columns"
         )
-    if said := too_quick(facts.rate_hz):
+    if said := impossible_rate_text(facts.rate_hz):
         raise InputError(f"{recording.path}: {said}")
 
 
 def _without_clock_steps(
-    clock: SteadyClock, blocks: Iterable[Block]
+    clock: ClockStepRemover, blocks: Iterable[Block]
 ) -> Iterator[Block]:
     """Blocks with the steps of the device's clock removed."""
     for block in blocks:
         yield clock.add(block)
-    yield clock.rest()
+    yield clock.flush()
 
 
 def _marks(

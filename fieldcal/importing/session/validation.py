@@ -186,13 +186,13 @@ class SampleWriter:
     def __init__(self, path: Path) -> None:
         import pyarrow.parquet
 
-        from fieldcal.session.sample_files import schema
+        from fieldcal.session.sample_files import samples_schema
 
         self._path = path
         # no two samples are alike: a dictionary of them only takes time
         self._writer = pyarrow.parquet.ParquetWriter(
             path,
-            schema(),
+            samples_schema(),
             compression="lz4",
             use_dictionary=False,
             use_byte_stream_split=True,
@@ -214,14 +214,16 @@ class SampleWriter:
 
     def _put(self) -> None:
         """Write the rows that wait, in groups."""
-        from fieldcal.session.sample_files import to_batch
+        from fieldcal.session.sample_files import to_record_batch
 
         one = len(self._waiting) == 1
         whole = self._waiting[0] if one else concat(self._waiting)
         self._waiting, self._many = [], 0
         for first in range(0, len(whole), GROUP):
             part = whole[first : first + GROUP]
-            self._writer.write_batch(to_batch(part, nulls=True), row_group_size=GROUP)
+            self._writer.write_batch(
+                to_record_batch(part, nulls=True), row_group_size=GROUP
+            )
             self._groups.append((float(part.t[0]), float(part.t[-1])))
 
     def close(self) -> None:
@@ -240,14 +242,14 @@ class SampleWriter:
         """One group of rows; stretches that follow each other are in one."""
         import pyarrow.parquet
 
-        from fieldcal.session.sample_files import from_table
+        from fieldcal.session.sample_files import block_from_table
 
         if self._file is None:
             self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)
         if self._read[0] != i:
             # one thread: each of several would keep memory of its own
             group = self._file.read_row_group(i, ("t", *CHANNELS), use_threads=False)
-            self._read = (i, from_table(group))
+            self._read = (i, block_from_table(group))
         return self._read[1]
 
     def __enter__(self) -> SampleWriter:

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.chances import DEVIATION
 from fieldcal.core.errors import InputError
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, concat
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.recording import MeanScatter, Recording
@@ -178,7 +178,7 @@ def _consistent_rows(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]
             _misfit, x, args=(acc, gravity), loss="cauchy", f_scale=size or 1.0
         ).x
         left = np.abs(_misfit(x, acc, gravity))
-        size = DEVIATION * few * float(np.median(left))
+        size = MAD_TO_SIGMA * few * float(np.median(left))
     all_of_them = np.ones(len(acc), dtype=bool)
     near = left <= OUT * size
     for _ in range(REPEATS):

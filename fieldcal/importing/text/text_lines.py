@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fieldcal.core.samples import Array
-from fieldcal.session.arrow_columns import numbers
+from fieldcal.session.arrow_columns import float_values
 
 MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
 """What stands in a cell that holds no value."""
@@ -71,4 +71,4 @@ def plain_numbers(
         )
     except (pa.ArrowInvalid, ValueError):
         return None
-    return [numbers(table.column(name)) for name in wanted]
+    return [float_values(table.column(name)) for name in wanted]

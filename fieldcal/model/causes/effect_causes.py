@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fieldcal.core.factory import WARM_UP_S, WARMING, FactoryErrors
+from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -101,7 +101,7 @@ def factory_groups(
     """
     if not table.x.f.any():
         return []
-    shapes = {WARMING[1]: {"tau_s": WARM_UP_S}}
+    shapes = {WARMING_EFFECTS[1]: {"tau_s": WARM_UP_TIME_CONSTANT}}
     return [
         hysteresis(table, float(size[0]))
         if name == "hysteresis"
@@ -115,7 +115,7 @@ def factory_sizes(x: Experience, left: FactoryErrors) -> dict[str, Array]:
     """Standard deviation of each effect that a factory left, SI: one value, or (6,)."""
     sizes = {name: np.array([size]) for name, size in left.by_effect.items()}
     sizes["hysteresis"] = np.array([left.hysteresis])
-    name, per_k = left.warming(x.warms)
+    name, per_k = left.warming_effect(x.warms)
     return sizes | {name: np.array(per_k)}
 
 

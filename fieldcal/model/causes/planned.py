@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldcal.calibration.names import ParameterName, group_of
-from fieldcal.core.frames import force_home, turn
-from fieldcal.core.positions import Position, angles, third_angles
+from fieldcal.core.frames import direction_cosines, specific_force_at_home
+from fieldcal.core.positions import Position, alpha_beta_angles, gamma_angles
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -62,8 +62,9 @@ def predict_outputs(
     """
     state = state_of(names, values)
     x = Experience.at_rest(
-        *angles(positions), gravity, base_force=force_home(gravity),
-        gamma=third_angles(positions),
+        *alpha_beta_angles(positions), gravity,
+        base_force=specific_force_at_home(gravity),
+        gamma=gamma_angles(positions),
         mounting=np.eye(3) if mounting is None else mounting,
     )  # fmt: skip
     view = RowView.of(x, np.zeros((1, len(x))), state)
@@ -77,7 +78,7 @@ def predict_outputs(
 def rows_at_session_end(x: Experience, alpha: Array, beta: Array) -> Experience:
     """Rows in further positions, (n,) rad, at the time of the session's last row."""
     last = np.full(len(alpha), len(x) - 1)
-    force: Array = turn(alpha, beta) @ x.base_force @ x.mounting
+    force: Array = direction_cosines(alpha, beta) @ x.base_force @ x.mounting
     return Experience.at_rest(
         alpha, beta, x.gravity, f=force, t=x.t[last], since_start=x.since_start[last],
         since_turn=x.since_turn[last], warming=x.warming[last],

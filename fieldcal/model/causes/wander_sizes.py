@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fieldcal.core.chances import of_odds
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
@@ -109,7 +109,7 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
-    return out[0], out[1], of_odds(evidence[1] - evidence[0])
+    return out[0], out[1], probability_of_log_odds(evidence[1] - evidence[0])
 
 
 class WanderHypotheses(NamedTuple):

@@ -16,8 +16,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from fieldcal.core.chances import of_odds
-from fieldcal.core.factory import WARMING, FactoryErrors
+from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
+from fieldcal.core.probability import probability_of_log_odds
 from fieldcal.core.samples import CHANNELS, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
@@ -57,7 +57,7 @@ def _kinds(groups: Sequence[Group]) -> Iterator[tuple[str, Index]]:
     for kind in (field.name for field in fields(FactoryErrors)):
         names = STRAIGHT if kind in STRAIGHT else (kind,)
         some = [g.columns for g in groups if g.part in names]
-        some += [_of_biases(g, kind) for g in groups if g.part in WARMING]
+        some += [_of_biases(g, kind) for g in groups if g.part in WARMING_EFFECTS]
         yield kind, np.concatenate([np.empty(0, dtype=np.intp), *some])
 
 
@@ -74,4 +74,4 @@ def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
         *gain_terms(state, at, 1.0), np.array([part, 1.0])
     )  # (1)
     ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
-    return float(of_odds(ahead))
+    return float(probability_of_log_odds(ahead))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.session.description import Description
 
@@ -22,7 +22,7 @@ def interruptions(block: Block, about: Description) -> list[tuple[float, float]]
     bound = window_bounds(block, about)
     held = bound[bound[:, 1] > bound[:, 0]]
     held = held[np.argsort(held[:, 0])]
-    least = max(OFF_S, PERIODS / rate_of(block))
+    least = max(OFF_S, PERIODS / sampling_rate(block))
     out = []
     for (_, end), (start, _) in zip(held[:-1], held[1:], strict=True):
         between = block.t[max(end - 1, 0) : start + 1]

@@ -38,7 +38,7 @@ def rows_of_means(source: RowSource, sigma: Array) -> Rows:
     still = np.zeros((len(held), 3))
     out = average_rows(source, windows[held], held, sigma[held], level, still)
     x = out.x
-    if not source.about.timed:
+    if not source.about.means_timed:
         same = np.zeros(len(held))
         x = replace(x, t=same, since_start=same)
     x = replace(x, since_turn=np.full(len(held), np.inf))

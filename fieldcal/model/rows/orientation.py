@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from fieldcal.core.positions import (
     Position,
-    angles,
+    alpha_beta_angles,
     attitude_sigmas,
-    speeds,
-    third_angles,
+    gamma_angles,
+    unknown_axis_speeds,
 )
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.turntable import GyroReadings
@@ -22,7 +22,7 @@ def known_angles(about: Description, position: NDArray[np.intp]) -> tuple[Array,
     if not about.positions:
         unknown = np.full(len(position), np.nan)
         return unknown, unknown
-    alpha, beta = angles(about.positions)
+    alpha, beta = alpha_beta_angles(about.positions)
     return alpha[position], beta[position]
 
 
@@ -32,10 +32,10 @@ def known_attitudes(about: Description, position: NDArray[np.intp]) -> dict[str,
         return {}
     positions = about.positions
     return {
-        "gamma": third_angles(positions)[position],
+        "gamma": gamma_angles(positions)[position],
         "attitude_sigma": attitude_sigmas(positions)[position],
-        "speed": speeds(positions)[0][position],
-        "speed_sigma": speeds(positions)[1][position],
+        "speed": unknown_axis_speeds(positions)[0][position],
+        "speed_sigma": unknown_axis_speeds(positions)[1][position],
     }
 
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import angles, attitude_sigmas, third_angles
+from fieldcal.core.positions import alpha_beta_angles, attitude_sigmas, gamma_angles
 from fieldcal.core.samples import Array, Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import block_means, masked
 from fieldcal.model.rows.bounds import block_bounds, window_bounds
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
@@ -120,7 +120,7 @@ class RowSource:
     @cached_property
     def rate(self) -> float:
         """Samples a second."""
-        return rate_of(self.block)
+        return sampling_rate(self.block)
 
     @cached_property
     def window_noise(self) -> WindowNoise:
@@ -158,7 +158,7 @@ def reduce_to_rows(
     if level is not None:
         noise, levels = level, np.tile(level, (len(held), 1))
     source = replace(source, block=shaken.block)
-    without = source.about.without
+    without = source.about.excluded_spans
     bounds = []
     for a, b in windows[held].tolist():
         each = np.zeros((0, 2), dtype=np.intp)
@@ -217,7 +217,7 @@ def average_rows(
     told = (count > 0) & (sd > 0)  # an output that never changes has no information
     sd = np.where(told, sd, np.nan)
     span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
-    length = np.diff(bound, axis=1)[:, 0] / rate_of(block)
+    length = np.diff(bound, axis=1)[:, 0] / sampling_rate(block)
     x = _experience(source, position, y, span.mean(axis=1), length, variance)
     sd[~x.force_known, :3] = np.nan
     scale = source.about.nominal["gyr_scale"]
@@ -253,7 +253,7 @@ def _experience(
         rate=gyroscopes.rates(about.mounting),
         base_force=about.base_force,
         base_rate=about.base_rate,
-        transport=about.under_way.rate,
+        transport=about.base_motion.rate,
         mounting=about.mounting,
         latitude=about.latitude,
         gravity_sigma=float(np.hypot(gravity_sigma(about), source.sway_gravity_sigma)),
@@ -272,7 +272,7 @@ def _joint_turns(source: RowSource) -> JointTurns:
     positions = source.about.positions
     if not positions:
         return JointTurns.none()
-    known = np.column_stack([*angles(positions), third_angles(positions)])
+    known = np.column_stack([*alpha_beta_angles(positions), gamma_angles(positions)])
     known[np.isfinite(attitude_sigmas(positions))] = np.nan
     return JointTurns.of(source.rest_began[: len(known)], known)
 

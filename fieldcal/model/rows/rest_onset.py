@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import block_means
 from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.reduce import RowSource
@@ -28,7 +28,7 @@ RATE, FORCE = 2e-3, 0.05
 def rest_instants(block: Block, about: Description, noise: Array) -> Array:
     """Instant from which the device was at rest in each position, (p,) s."""
     windows = window_bounds(block, about)
-    m = max(2, round(PIECE_S * rate_of(block)))
+    m = max(2, round(PIECE_S * sampling_rate(block)))
     out = np.full(len(windows), block.t[0])
     before = 0
     for p, (first, last) in enumerate(windows):

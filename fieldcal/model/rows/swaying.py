@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.positions import rates
+from fieldcal.core.positions import table_rates
 from fieldcal.core.samples import Array, Block
-from fieldcal.core.sampling import rate_of
+from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.session.description import Description
 from fieldcal.windows.sway import find_sway
@@ -115,7 +115,7 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
     return BaseSway(
         _without_sway(block, windows, found, scale),
         left,
-        np.sqrt(np.mean(noise, axis=0) * rate_of(block)),
+        np.sqrt(np.mean(noise, axis=0) * sampling_rate(block)),
         float(np.sqrt((amplitude**2).mean())),
         float(hz.mean()),
         (float(amplitude.std() / root), float(hz.std() / root)),
@@ -138,7 +138,7 @@ def _on_known_positions(about: Description) -> bool:
     """Whether the device is held in positions that are known, and on no rate table."""
     positions = about.positions
     known = all(p.oriented for p in positions)
-    return bool(positions) and known and not rates(positions).any()
+    return bool(positions) and known and not table_rates(positions).any()
 
 
 def _without_sway(
@@ -148,7 +148,7 @@ def _without_sway(
     scale: Array,
 ) -> Block:
     """Samples corrected to a base at rest."""
-    six, rate = block.six, rate_of(block)
+    six, rate = block.six, sampling_rate(block)
     for p, some in found.items():
         a, b = (int(i) for i in windows[p])
         middles = [(u.span[1] + v.span[0]) / 2 for u, v in pairwise(some)]

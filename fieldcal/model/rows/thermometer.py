@@ -13,7 +13,7 @@ from math import comb
 
 import numpy as np
 
-from fieldcal.core.chances import DEVIATION
+from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block
 
 VALUES_S = (12.0, 8.0, 5.0, 3.0)
@@ -132,7 +132,7 @@ def _rate(t: Array, mean: Array, count: Array, noise: float) -> Array:
             error = noise * float(np.sqrt(12 * step / (2 * half) ** 3))
             allowed = ALIKE * error if error < PLAIN * float(np.std(slope)) else 0.0
             continue
-        if DEVIATION * float(np.median(np.abs(slope - measure))) > allowed:
+        if MAD_TO_SIGMA * float(np.median(np.abs(slope - measure))) > allowed:
             break
         best = slope
     return best

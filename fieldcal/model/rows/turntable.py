@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.positions import Position, rates, speeds
+from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array
 
 TURNS = 1.0
@@ -89,8 +89,8 @@ class GyroReadings:
         If its axis is not known, the direction is that measured in each position.
         `mounting` (3, 3) is P, procedure = P device.
         """
-        out: Array = rates(self.positions)[self.position]
-        speed, _ = speeds(self.positions)
+        out: Array = table_rates(self.positions)[self.position]
+        speed, _ = unknown_axis_speeds(self.positions)
         if speed.any():
             mean, _ = self._pointing(speed)
             for p in np.flatnonzero(speed):
@@ -106,11 +106,11 @@ class GyroReadings:
         free = [
             p
             for p in np.unique(self.position)
-            if not (self.positions[p].oriented or self.positions[p].turning)
+            if not (self.positions[p].oriented or self.positions[p].on_turning_table)
         ]
         if not (self.earth and len(free) >= ENOUGH):
             return out
-        speed, _ = speeds(self.positions)
+        speed, _ = unknown_axis_speeds(self.positions)
         mean, known = self._pointing(speed)
         length = np.linalg.norm(mean[free], axis=1) / self.earth
         if known and np.abs(length - 1).max() < STRAIGHT:

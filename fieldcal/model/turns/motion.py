@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.core.sampling import unbroken
+from fieldcal.core.sampling import has_no_pause
 from fieldcal.model.rows.reduce import Rows, RowSource
 
 MARGIN_S = 0.6
@@ -41,7 +41,7 @@ def motion_bounds(
     gap, m = slice(first, last), max(2, round(0.1 * rate))
     if last - first < 4 * m or not source.usable[gap].all():
         return None
-    if not unbroken(block.t, first, last, rate):
+    if not has_no_pause(block.t, first, last, rate):
         return None
     whole = (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
     seen = [rows.y[rows.x.position == p, 3:] for p in pair]

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
 
@@ -53,7 +53,7 @@ def attitudes_from_rotations(angle: Array) -> Array:
     >>> np.round(quarter[-1] @ [1.0, 0.0, 0.0], 6) + 0.0
     array([ 0., -1.,  0.])
     """
-    return np.concatenate([np.eye(3)[None], products(exponential(-angle))])
+    return np.concatenate([np.eye(3)[None], products(rotation_matrices(-angle))])
 
 
 def products(steps: Array) -> Array:

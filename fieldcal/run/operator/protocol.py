@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from fieldcal.core.samples import Array, Block
-from fieldcal.drivers.driver import Driver, Health
+from fieldcal.drivers.driver import Driver, LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
@@ -55,7 +55,7 @@ class OperatorView:
     reason: WaitReason
     rate_hz: float
     temperature: float
-    health: Health
+    health: LinkHealth
 
 
 class Operator(Protocol):

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fieldcal.core.escaping import escape_invisible
 from fieldcal.core.positions import Position
-from fieldcal.core.shown import shown
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator import widgets
 from fieldcal.run.operator.content import RunContent
@@ -65,7 +65,7 @@ class Board:
                 "words": words,
                 "detail": "",
                 "colour": "green" if good else "red",
-                "told": [shown(text) for text in sentences],
+                "told": [escape_invisible(text) for text in sentences],
             }
 
     @contextlib.contextmanager
@@ -87,14 +87,17 @@ class Board:
             run = self._shown
             now = run.instruction
             out: dict[str, Any] = {
-                "title": shown(run.title),
+                "title": escape_invisible(run.title),
                 "ended": self._ended is not None,
                 "words": now.words,
                 "detail": now.detail,
                 "colour": now.colour,
-                "told": [shown(text) for text in run.sentences],
+                "told": [escape_invisible(text) for text in run.sentences],
                 "positions": [
-                    {"name": shown(position.name), "state": run.position_state(i)}
+                    {
+                        "name": escape_invisible(position.name),
+                        "state": run.position_state(i),
+                    }
                     for i, position in enumerate(run.positions)
                 ],
                 "now": run.hold.index if run.hold else None,
@@ -122,8 +125,8 @@ def _measured(view: OperatorView) -> dict[str, Any]:
     """What is measured now."""
     out: dict[str, Any] = {
         "phase": view.phase,
-        "link": shown(widgets.link_state(view).plain),
-        "reason": "" if widgets.alert(view) else shown(view.reason.text),
+        "link": escape_invisible(widgets.link_state(view).plain),
+        "reason": "" if widgets.alert(view) else escape_invisible(view.reason.text),
         "still": bool(view.stillness < 1) if np.isfinite(view.stillness) else None,
     }
     if view.phase in ("averaging", "taken"):

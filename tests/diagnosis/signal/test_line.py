@@ -13,7 +13,7 @@ from fieldcal.effects.sway import Sway
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 RATE, SIGMA, HZ, SIZE = 100.0, 5e-3, 7.03, 6e-4
 SEEDS = range(12)
@@ -136,7 +136,7 @@ def test_what_never_changes_has_no_line_of_rounding() -> None:
     t = np.arange(0.0, 60.0, 0.01)
     acc = np.where((t < 30.0)[:, None], [0.20593965, -10.03220295, 0.1176798],
                    [9.7323951, 0.31415927, -0.2212121])  # fmt: skip
-    about = parse({"format": 1, "position": [
+    about = parse_description({"format": 1, "position": [
         {"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": 1.0, "end_s": 28.7},
         {"alpha_deg": 90.0, "beta_deg": 0.0, "start_s": 31.0, "end_s": 58.3},
     ]})  # fmt: skip

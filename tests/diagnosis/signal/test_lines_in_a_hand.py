@@ -10,7 +10,7 @@ from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.diagnosis.signal.spectrum import find_lines
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 RATE, HELD_S, REST_S, COUNT = 100.0, 6.0, 9.0, 20
 NOISE = np.repeat([3e-2, 1e-3], 3)
@@ -42,7 +42,7 @@ def lines(t: Array, six: Array) -> list[SpectralLine]:
     """What is found."""
     starts = np.arange(COUNT) * REST_S + 1.0
     said = [{"start_s": s, "end_s": s + HELD_S} for s in starts.tolist()]
-    about = parse({"format": 1, "position": said})
+    about = parse_description({"format": 1, "position": said})
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((len(t), 6), dtype=bool)
     source = RowSource(block, about, usable, starts, Thermometer.of(block))

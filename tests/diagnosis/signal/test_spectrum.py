@@ -9,7 +9,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.diagnosis.signal.spectrum import find_lines
 from fieldcal.model.rows.reduce import RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 RATE, N = 100.0, 400_000
 """More than an hour, in one window."""
@@ -32,7 +32,9 @@ def noise(seed: int, knee: float) -> Array:
 def lines(six: Array) -> list[float]:
     """Frequencies of what is found."""
     t = np.arange(N) / RATE
-    about = parse({"format": 1, "position": [{"start_s": 0.0, "end_s": N / RATE}]})
+    about = parse_description(
+        {"format": 1, "position": [{"start_s": 0.0, "end_s": N / RATE}]}
+    )
     block = Block.of(t, six[:, :3], six[:, 3:])
     usable = np.ones((N, 6), dtype=bool)
     source = RowSource(block, about, usable, np.zeros(1), Thermometer.of(block))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_sessions import LADDER, dictionary, ladder, nominal, rows_of
 
-from fieldcal.core.frames import EARTH_RATE, earth_rate_home
+from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
 from fieldcal.model.causes import columns, smooth
@@ -84,7 +84,7 @@ def test_a_table_that_turns_shows_the_scale_factors_of_gyroscopes() -> None:
 
 def test_the_earth_that_is_known_or_not_seen_is_no_cause() -> None:
     assert "earth" not in {g.cause for g in made(ladder(), (0, 1, 2)).always}
-    base = earth_rate_home(0.8)
+    base = earth_rate_at_home(0.8)
     assert "earth" not in {g.cause for g in made(ladder(base_rate=base)).always}
     acc = made(ladder(), (0, 1, 2))
     assert acc.earth == -1 and list(always(acc)) == [("bias", "acc"), ("scale", "acc")]

@@ -17,7 +17,7 @@ from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.leaning import leaning
 from fieldcal.model.causes.wander import Wander
 from fieldcal.model.rows.lean_modes import lean_modes
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 SIDES = [*np.vstack([np.eye(3), -np.eye(3)]), *np.array(
     [[1, 1, 0], [0, -1, 1], [-1, 0, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1]]
@@ -136,7 +136,7 @@ def explained(block: Block) -> Explanation:
     ]
     about = {"format": 1, "site": {"gravity": G, "latitude_deg": 50.0},
              "position": positions}  # fmt: skip
-    return explain(prepare_recording(block, parse(about)))
+    return explain(prepare_recording(block, parse_description(about)))
 
 
 @pytest.mark.thorough

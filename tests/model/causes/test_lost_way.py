@@ -21,7 +21,7 @@ from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.lost_way import lost_ways
 from fieldcal.model.turns.turn import select_rows
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session
 from fieldcal.sim_device.profile import Profile, Sampling, Truth
 
@@ -58,7 +58,7 @@ def held(way: int | None, seconds: float = LOST_S) -> list[dict[str, float]]:
 @cache
 def explained(seed: int, way: int | None) -> Explanation:
     tables = {"format": 1, **about(), "position": held(way)}
-    return explain(prepare_recording(lossy(seed, way), parse(tables)))
+    return explain(prepare_recording(lossy(seed, way), parse_description(tables)))
 
 
 @pytest.mark.parametrize(

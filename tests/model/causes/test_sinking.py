@@ -19,7 +19,7 @@ from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.model.causes.columns import General, RowView
 from fieldcal.model.causes.sinking import NAME, sinking
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 from fieldcal.session.folder import Session
 
 ANGLES = [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (180.0, 0.0), (-90.0, 0.0),
@@ -50,7 +50,7 @@ def sunk(seed: int, by: float) -> Block:
 @pytest.mark.parametrize(("seed", "by"), [(1, 4e-3), (2, 0.0)])
 def test_a_base_that_gives_way_is_told_and_is_no_effect(seed: int, by: float) -> None:
     tables = {"format": 1, "site": SITE, "position": PLACES}
-    one = explain(prepare_recording(sunk(seed, by), parse(tables)))
+    one = explain(prepare_recording(sunk(seed, by), parse_description(tables)))
     assert one.base_sinks == (by > 0)
     assert {s.name for s in one.probable_causes} == ({"base_tilt"} if by else set())
     said = [text for text in notes(one, []) if "The base turned slowly" in text]

@@ -10,7 +10,7 @@ from gram_cases import TAU, case
 from observed import observe
 
 from fieldcal.core.factory import FactoryErrors
-from fieldcal.core.positions import TWO, Position, forces
+from fieldcal.core.positions import TWO_POSITIONS, Position, specific_forces
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import Eliminated
@@ -66,7 +66,7 @@ def test_each_triad_warms_up_by_its_own() -> None:
     ("k2", "size"), [(0.0, STATED.quadratic), (3e-4, COARSER.quadratic)]
 )
 def test_many_positions_tell_how_straight_a_device_is(k2: float, size: float) -> None:
-    force = forces(MANY, G)
+    force = specific_forces(MANY, G)
     seen = observe(MANY, force + k2 * force**2, sigma=1e-4)
     found = solve(seen, cross=True, factory=COARSER, at_best=STATED)
     assert found.info["quadratic_sigma"] == size
@@ -75,7 +75,7 @@ def test_many_positions_tell_how_straight_a_device_is(k2: float, size: float) ->
 
 
 def test_two_positions_tell_nothing_and_the_coarser_grade_stays() -> None:
-    seen = observe(TWO, forces(TWO, G), sigma=1e-4)
+    seen = observe(TWO_POSITIONS, specific_forces(TWO_POSITIONS, G), sigma=1e-4)
     found = solve(seen, factory=COARSER, at_best=STATED)
     assert found.info["quadratic_sigma"] == COARSER.quadratic
     alone = solve(seen, factory=COARSER)

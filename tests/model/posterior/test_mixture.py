@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from observed import observe, outputs
 
-from fieldcal.core.positions import TWO, Position
+from fieldcal.core.positions import TWO_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.posterior.mixture import Mixing, Mixture
@@ -173,7 +173,7 @@ def test_a_window_that_is_far_off_is_bad(push: float, low: float, high: float) -
 def test_one_hypothesis_is_exact() -> None:
     """Of two windows nobody can tell instability, nor which is bad."""
     rng = np.random.default_rng(5)
-    one = case(SD * rng.standard_normal((2, 3)), TWO)
+    one = case(SD * rng.standard_normal((2, 3)), TWO_POSITIONS)
     score, mean, cov = posterior(one, np.diag(np.full(6, SD**2)))
     np.testing.assert_allclose(one.found.mean, mean, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(one.found.covariance, cov, rtol=1e-6, atol=1e-12)

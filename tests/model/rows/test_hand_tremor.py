@@ -14,7 +14,7 @@ from fieldcal.model.rows.hand_tremor import force_wander_angle, turned_force
 from fieldcal.model.rows.hand_tremor import rows_of_recording as rows_in_a_hand
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 EVERY = tuple(range(len(LADDER)))
 G = 9.81
@@ -105,7 +105,7 @@ def recording(
     force = G * (up - np.cross(turned, up)) - ARM * swung * (band is QUICKLY)
     six: Array = np.hstack([2.0 * force, rate])
     six += NOISE * rng.standard_normal(six.shape)
-    about = parse({
+    about = parse_description({
         "format": 1, "position": places, "site": {"gravity": G},
         "nominal": {"acc_scale": [2.0] * 3},
     })  # fmt: skip

@@ -11,7 +11,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.rest_onset import rest_instants, window_starts
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import Description, parse
+from fieldcal.session.description import Description, parse_description
 
 RATE = 100.0
 NOISE = np.repeat([1e-2, 1e-3], 3)
@@ -25,7 +25,7 @@ def about(*windows: tuple[float, float] | None) -> Description:
         | ({"start_s": w[0], "end_s": w[1]} if w else {})
         for w in windows
     ]
-    return parse({"format": 1, "position": places})
+    return parse_description({"format": 1, "position": places})
 
 
 KNOWN = about((4.0, 10.0), (20.0, 30.0))

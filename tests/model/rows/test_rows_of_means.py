@@ -12,7 +12,7 @@ from fieldcal.core.samples import Block
 from fieldcal.model.rows.means import median_sigma, rows_of_means
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.thermometer import Thermometer
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 G = 9.8
 MEANS = np.array([
@@ -30,7 +30,7 @@ def rows(timed: bool, known: int = 2, places: int = 3) -> Rows:
         | ({"alpha_deg": 90.0 * i, "beta_deg": 0.0} if i < known else {})
         for i in range(places)
     ]
-    about = parse({
+    about = parse_description({
         "format": 1, "site": {"gravity": G}, "position": positions,
         "means": {"timed": timed}, "nominal": {"gyr_scale": [1.0, -2.0, 1.0]},
     })  # fmt: skip

@@ -177,7 +177,7 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
     six[:, 2] -= G0 * np.sin(turned)
     six[:, 3] += rates
     block = Block.of(t, six[:, :3], six[:, 3:], np.full(len(t), np.nan))
-    about = description.parse(
+    about = description.parse_description(
         {"position": [{"alpha_deg": 0.0, "beta_deg": 0.0, "start_s": a, "end_s": b}
                       for a, b in held]}
     )  # fmt: skip
@@ -240,8 +240,10 @@ def test_a_device_in_a_hand_is_on_no_base(tmp_path: Path) -> None:
 
 
 def test_who_says_that_it_sways() -> None:
-    assert description.parse({"site": {"sways": True}, "format": 1}).sways
-    assert not description.parse({"format": 1}).sways
+    assert description.parse_description(
+        {"site": {"sways": True}, "format": 1}
+    ).base_sways
+    assert not description.parse_description({"format": 1}).base_sways
 
 
 def test_waves_take_slow_noise_with_them_and_the_rows_know_it(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 
@@ -21,7 +21,7 @@ SD = 1e-7
 def outputs(t: Array, length: float) -> tuple[Array, Array]:
     """Means over `length` s, and what of them lies across the axis and goes round."""
     fine = t[:, None] + length * (np.arange(200) + 0.5) / 200 - length / 2
-    turned = exponential(-SPEED * fine[..., None] * AXIS) @ EARTH
+    turned = rotation_matrices(-SPEED * fine[..., None] * AXIS) @ EARTH
     across = turned - (turned @ AXIS)[..., None] * AXIS
     round_: Array = SCALE * across.mean(axis=1)
     return BIAS + SCALE * (SPEED * AXIS + AXIS * (EARTH @ AXIS)) + round_, round_

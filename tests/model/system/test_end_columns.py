@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_sessions import ladder, nominal
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -33,8 +33,10 @@ def turn(x: Experience) -> Turn:
     """From one position to the other, a little wrong; halfway somewhere else."""
     known = ladder(2).to_device
     p, q = (int(np.argmax(x.position == i)) for i in PAIR)
-    whole = exponential(np.array([1e-3, -2e-3, 5e-4])) @ known[q] @ known[p].T
-    some = exponential(np.linspace(0.0, 0.3, M + 1)[:, None] * np.array([1, 2, -1]))
+    whole = rotation_matrices(np.array([1e-3, -2e-3, 5e-4])) @ known[q] @ known[p].T
+    some = rotation_matrices(
+        np.linspace(0.0, 0.3, M + 1)[:, None] * np.array([1, 2, -1])
+    )
     attitude = np.concatenate([some[:-1], whole[None]])
     t = np.linspace(0.0, 2.0, M + 1)
     edges = replace(select_rows(x, list(range(M + 1))), t=t)

@@ -9,7 +9,7 @@ import pytest
 from dense_model import Dense, shared
 from small_sessions import LADDER, dictionary, ladder, rows_of
 
-from fieldcal.core.frames import earth_rate_home
+from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model import priors
@@ -105,7 +105,7 @@ class Columns:
 
 
 SPUN = RNG.uniform(-1, 1, (1, 3)) * np.arange(2).repeat(ROWS // 2)[:, None]
-EARTH = earth_rate_home(0.88)
+EARTH = earth_rate_at_home(0.88)
 EXPERIENCES = {
     "at rest": rows(),
     "on a table": rows(rate=SPUN),

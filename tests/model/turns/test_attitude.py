@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fieldcal.core.frames import turn
+from fieldcal.core.frames import direction_cosines
 from fieldcal.core.samples import Array
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 
@@ -32,5 +32,5 @@ def test_two_joints_at_once_come_out_where_they_end(
     t = np.arange(round(SECONDS * rate_hz) + 1) / rate_hz
     edge = np.arange(0, len(t), each)
     reached = attitudes_from_rotations(small_turns(t, both_joints(t), edge))[-1]
-    apart = reached @ turn(ALPHA, BETA).T
+    apart = reached @ direction_cosines(ALPHA, BETA).T
     assert np.linalg.norm(apart - np.eye(3)) < within

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_sessions import ladder, nominal
 
-from fieldcal.core.rotation import exponential
+from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
 from fieldcal.model.causes import columns
@@ -37,7 +37,7 @@ def turn() -> Turn:
     angle = np.cumsum(RNG.uniform(0, 0.1, (M + 1, 3)), axis=0)
     done = np.linspace(0, 1, M + 1) ** 2
     return Turn(
-        (2, 3), ends, replace(edges, t=t), edges.f, exponential(-angle), done,
+        (2, 3), ends, replace(edges, t=t), edges.f, rotation_matrices(-angle), done,
         np.array([0, 4, 7, M]), np.zeros((3, 3)), np.ones((3, 3)), 0.0, INTERVAL,
     )  # fmt: skip
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldcal.core.frames import turn
-from fieldcal.core.rotation import cross_matrix, exponential
+from fieldcal.core.frames import direction_cosines
+from fieldcal.core.rotation import cross_matrix, rotation_matrices
 from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
@@ -26,7 +26,7 @@ from fieldcal.model.turns.attitude import (
 from fieldcal.model.turns.integration import Leg, divide_into_steps, integrate_turn
 from fieldcal.model.turns.rotation import mean_rates, products
 from fieldcal.physics.experience import Experience
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 MOUNTING = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 ALPHA, BETA = np.deg2rad([20.0, 70.0]), np.deg2rad([5.0, -30.0])
@@ -43,7 +43,7 @@ def ends(known: bool = True) -> Experience:
 
 def way() -> Array:
     """The turn from the first position to the second in device axes, (3, 3)."""
-    first, second = turn(ALPHA, BETA)
+    first, second = direction_cosines(ALPHA, BETA)
     turned: Array = MOUNTING.T @ second @ first.T @ MOUNTING
     return turned
 
@@ -53,7 +53,7 @@ SMALL = np.array([2e-4, -1e-4, 3e-4])
 
 def test_a_closure_is_what_the_attitude_is_off_by() -> None:
     """R (I + [phi]x) is the true attitude."""
-    x, reached = ends(), way() @ exponential(-SMALL)
+    x, reached = ends(), way() @ rotation_matrices(-SMALL)
     attitude = np.array([np.eye(3), reached])
     done = np.array([0.0, 1.0])
     f, closure, across = turn_geometry(x, (0, 1), attitude, done)
@@ -63,7 +63,7 @@ def test_a_closure_is_what_the_attitude_is_off_by() -> None:
 
 
 def test_without_angles_it_is_known_across_the_force() -> None:
-    x, reached = ends(False), way() @ exponential(-SMALL)
+    x, reached = ends(False), way() @ rotation_matrices(-SMALL)
     attitude = np.array([np.eye(3), reached])
     _, closure, across = turn_geometry(x, (0, 1), attitude, np.array([0.0, 1.0]))
     up = x.f[0] / np.linalg.norm(x.f[0])
@@ -78,8 +78,8 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
     across = np.cross(f, [0.3, -0.8, 0.5])
     across /= np.linalg.norm(across)
     assert LOST_ANGLE == 0.3
-    assert vertical_lost(x, (0, 1), way() @ exponential(off * across)) == lost
-    about = way() @ exponential(off * f)
+    assert vertical_lost(x, (0, 1), way() @ rotation_matrices(off * across)) == lost
+    about = way() @ rotation_matrices(off * f)
     assert not vertical_lost(x, (0, 1), about)
     _, closure, known = turn_geometry(
         x, (0, 1), np.array([np.eye(3), about]), np.array([0, 1])
@@ -90,7 +90,7 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
 
 
 def test_between_ends_a_vector_is_as_near_as_the_turn_is_done() -> None:
-    attitude = exponential(-np.outer(np.linspace(0, 1, 4), [0.5, -0.2, 0.9]))
+    attitude = rotation_matrices(-np.outer(np.linspace(0, 1, 4), [0.5, -0.2, 0.9]))
     done, start, end = np.array([0.0, 0.25, 0.75, 1.0]), RNG.random(3), RNG.random(3)
     found = interpolate_vectors(attitude, done, start, end)
     for k in range(4):
@@ -158,7 +158,7 @@ def test_matrices_of_vectors() -> None:
 @pytest.mark.parametrize("size", [0.0, 1e-9, 0.3, 3.0])
 def test_exponentials_are_rotations_about_their_vector(size: float) -> None:
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
-    found = exponential(size * axis)
+    found = rotation_matrices(size * axis)
     np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
     np.testing.assert_allclose(found @ axis, axis, atol=1e-14)
     assert (np.trace(found) - 1) / 2 == pytest.approx(np.cos(size))
@@ -169,7 +169,7 @@ def test_exponentials_are_rotations_about_their_vector(size: float) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 5, 16])
 def test_products_are_those_one_after_another(n: int) -> None:
-    steps = exponential(RNG.standard_normal((n, 3)))
+    steps = rotation_matrices(RNG.standard_normal((n, 3)))
     found = products(steps)
     whole = np.eye(3)
     for k in range(n):
@@ -190,7 +190,8 @@ def leg(rate_hz: float, seconds: float, w: Array, **more: Array | float) -> Leg:
     t = np.arange(round((seconds + 4.0) * rate_hz)) / rate_hz
     block = Block.of(t, np.zeros((len(t), 3)), np.tile(w, (len(t), 1)))
     source = RowSource(
-        block, parse({"format": 1}), np.ones((len(t), 6), dtype=bool), np.zeros(1),
+        block, parse_description({"format": 1}), np.ones((len(t), 6), dtype=bool),
+        np.zeros(1),
         Thermometer.of(block),
     )  # fmt: skip
     first = round(2.0 * rate_hz)
@@ -236,13 +237,13 @@ def test_integrated_rates_are_rid_of_what_is_known() -> None:
     rid = np.tile([0.0, 0.0, 0.1], (len(steps.edge), 1))
     found = integrate_turn(one, steps, rid)
     np.testing.assert_allclose(found.rate, np.tile(w, (201, 1)), atol=1e-12)
-    np.testing.assert_allclose(found.attitude[-1], exponential(np.array([0, 0, -1.0])),
-                               atol=1e-9)  # fmt: skip
+    expected = rotation_matrices(np.array([0, 0, -1.0]))
+    np.testing.assert_allclose(found.attitude[-1], expected, atol=1e-9)
     np.testing.assert_allclose(found.done, np.linspace(0, 1, 101), atol=1e-9)
     slow = replace(one, source=replace(one.source, pace=2.0))
     np.testing.assert_allclose(
         integrate_turn(slow, steps, rid).attitude[-1],
-        exponential(np.array([0, 0, -0.5])),
+        rotation_matrices(np.array([0, 0, -0.5])),
         atol=1e-9,
     )  # fmt: skip
 
@@ -250,12 +251,12 @@ def test_integrated_rates_are_rid_of_what_is_known() -> None:
 def test_the_earth_turns_with_the_device_on_the_way() -> None:
     one = leg(100.0, 2.01, np.array([0.0, 0.0, 0.5]))
     start = np.array([3e-5, 4e-5, 0.0])
-    end = exponential(np.array([0.0, 0.0, -1.0])) @ start
+    end = rotation_matrices(np.array([0.0, 0.0, -1.0])) @ start
     x = replace(one.x, w=np.array([start] * 3 + [end] * 2))
     steps = divide_into_steps(one)
     assert steps is not None
     found = integrate_turn(replace(one, x=x), steps, np.zeros((len(steps.edge), 3)))
-    turned = exponential(-found.rate * (steps.t - steps.t[0])[:, None]) @ start
+    turned = rotation_matrices(-found.rate * (steps.t - steps.t[0])[:, None]) @ start
     np.testing.assert_allclose(found.earth, turned, atol=1e-8)
 
 

@@ -13,7 +13,7 @@ from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns.motion import motion_bounds
 from fieldcal.model.turns.turn import TurnTracker
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 
 RATE, NOISE = 100.0, 1e-4
 GAP = (1000, 4000)
@@ -38,7 +38,7 @@ def recorded(
         for a, b in ((0.0, gap[0] / RATE), (gap[1] / RATE, n / RATE))
     ]
     usable = np.ones((n, 6), dtype=bool)
-    about = parse({"format": 1, "position": places})
+    about = parse_description({"format": 1, "position": places})
     source = RowSource(block, about, usable, np.zeros(2), Thermometer.of(block))
     return source, reduce_to_rows(source)
 

@@ -25,7 +25,7 @@ from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 from fieldcal.model.system.way_rows import WayRows
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.session.description import parse
+from fieldcal.session.description import parse_description
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
     ONE,
@@ -111,7 +111,7 @@ def followed(
         {"alpha_deg": a, "beta_deg": b, "start_s": w.start, "end_s": w.end}
         for (a, b), w in zip(PLACES, windows, strict=True)
     ]
-    about = parse({
+    about = parse_description({
         "format": 1, "device": {"name": "turned"}, "position": places,
         "site": {"latitude_deg": 50.45, "height_m": 170.0},
     })  # fmt: skip
@@ -240,7 +240,7 @@ def test_noise_of_gyroscopes_counts_by_their_scale_factor() -> None:
         for (a, b), w in zip(PLACES, windows, strict=True)
     ]
     about = {"format": 1, "position": places, "nominal": {"gyr_scale": [2.0] * 3}}
-    prepared = prepare_recording(block, parse(about))
+    prepared = prepare_recording(block, parse_description(about))
     inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)
@@ -345,7 +345,9 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
     """Without known angles a closure begins and ends at the forces that are seen."""
     block, windows = recorded()
     places = [{"start_s": w.start, "end_s": w.end} for w in windows]
-    prepared = prepare_recording(block, parse({"format": 1, "position": places}))
+    prepared = prepare_recording(
+        block, parse_description({"format": 1, "position": places})
+    )
     inference = build_inference(prepared.source, prepared.rows, prepared)
     d, at_rest = inference.dictionary, np.zeros(inference.dictionary.width)
     linear = inference.system.linearised(inference.nominal)

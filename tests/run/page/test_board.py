@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldcal.core.positions import FIVE, Position
-from fieldcal.drivers.driver import Health
+from fieldcal.core.positions import FIVE_POSITIONS, Position
+from fieldcal.drivers.driver import LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.page.board import Board
@@ -17,7 +17,7 @@ from fieldcal.run.page.watched import WatchedOperator
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
-HOLD = Hold(3, FIVE[3], 30.0)
+HOLD = Hold(3, FIVE_POSITIONS[3], 30.0)
 NEAR = PositionCheck(False, 20.04, -1.26, "", 2.0)
 
 
@@ -30,13 +30,13 @@ def view(phase: Phase, hold: Hold = HOLD, **changes: object) -> OperatorView:
         "reason": WaitReason(WaitState.TURNING),
         "rate_hz": 100.0,
         "temperature": 24.5,
-        "health": Health(samples=1234),
+        "health": LinkHealth(samples=1234),
     }
     return OperatorView(phase, hold, **(known | changes))  # type: ignore[arg-type]
 
 
 def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.position_asked(HOLD)
     board.view_changed(view("turning"))
     now = board.content()
@@ -48,7 +48,7 @@ def test_a_turn_is_shown_with_where_it_is_and_where_it_should_be() -> None:
 
 
 def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.sentence_told("the device was moved")
     board.position_asked(HOLD)
     board.view_changed(view("averaging"))
@@ -68,14 +68,14 @@ def test_a_window_fills_and_is_listed_when_it_is_taken() -> None:
 
 
 def test_gyroscopes_alone_have_no_error_of_a_force() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.position_asked(HOLD)
     board.view_changed(view("taken", sigma=np.array([np.nan, np.nan, np.nan, 1, 1, 1])))
     assert board.content()["positions"][3]["state"] == "taken"
 
 
 def test_what_was_said_of_the_turn_is_done_when_the_window_begins() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.position_asked(HOLD)
     board.view_changed(view("turning"))
     board.sentence_told("press s once more")
@@ -88,7 +88,7 @@ def test_what_was_said_of_the_turn_is_done_when_the_window_begins() -> None:
 
 
 def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.position_asked(HOLD)
     wrong = WaitReason(WaitState.MISPLACED, "the device is at α = 3.0°")
     board.view_changed(view("turning", reason=wrong))
@@ -99,12 +99,15 @@ def test_what_needs_the_operator_is_said_with_how_long_it_waits() -> None:
 
 
 def test_positions_that_are_found_on_the_way_are_listed() -> None:
-    board = Board("fieldcal", FIVE[:1], most=9)
-    board.position_asked(Hold(0, FIVE[0], 30.0))
-    board.position_asked(Hold(1, FIVE[4], 30.0))
+    board = Board("fieldcal", FIVE_POSITIONS[:1], most=9)
+    board.position_asked(Hold(0, FIVE_POSITIONS[0], 30.0))
+    board.position_asked(Hold(1, FIVE_POSITIONS[4], 30.0))
     now = board.content()
     assert now["detail"] == "position 2 of at most 9, then let go"
-    assert [row["name"] for row in now["positions"]] == [FIVE[0].name, FIVE[4].name]
+    assert [row["name"] for row in now["positions"]] == [
+        FIVE_POSITIONS[0].name,
+        FIVE_POSITIONS[4].name,
+    ]
 
 
 def test_what_others_wrote_is_shown_and_never_carried_out() -> None:
@@ -118,7 +121,7 @@ def test_what_others_wrote_is_shown_and_never_carried_out() -> None:
 
 
 def test_the_end_is_what_is_shown_last() -> None:
-    board = Board("fieldcal", FIVE)
+    board = Board("fieldcal", FIVE_POSITIONS)
     board.position_asked(HOLD)
     board.view_changed(view("averaging"))
     before = board.version
@@ -184,7 +187,7 @@ class Console:
 
 
 def test_the_console_is_shown_everything_and_both_may_wish() -> None:
-    console, board, buttons = Console(), Board("fieldcal", FIVE), Buttons()
+    console, board, buttons = Console(), Board("fieldcal", FIVE_POSITIONS), Buttons()
     both = WatchedOperator(console, board, buttons)
     buttons.take("a")
     buttons.press("a", "stop")

@@ -10,8 +10,8 @@ import pytest
 from browser import Screen
 from scipy.spatial.transform import Rotation
 
-from fieldcal.core.positions import FIVE, Position
-from fieldcal.drivers.driver import Health
+from fieldcal.core.positions import FIVE_POSITIONS, Position
+from fieldcal.drivers.driver import LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.report.browser import find_browser
 from fieldcal.run.operator.protocol import OperatorView
@@ -37,8 +37,8 @@ def page() -> Iterator[Screen]:
 @pytest.fixture
 def server() -> Iterator[PageServer]:
     with PageServer("127.0.0.1") as made:
-        made.board = Board("fieldcal · five_position", FIVE)
-        made.board.position_asked(Hold(1, FIVE[1], 30.0))
+        made.board = Board("fieldcal · five_position", FIVE_POSITIONS)
+        made.board.position_asked(Hold(1, FIVE_POSITIONS[1], 30.0))
         yield made
 
 
@@ -58,7 +58,7 @@ def test_it_shows_what_to_do_on_any_screen(
     server.board.sentence_told("<b>not carried out</b> " + "x" * 300)
     page.size(*size)
     opened(page, server)
-    assert page.text("angles") == FIVE[1].name
+    assert page.text("angles") == FIVE_POSITIONS[1].name
     assert page.text("detail") == "position 2 of 5, then let go"
     assert "<b>not carried out</b>" in page.text("told")
     assert page.value("location.search") == ""  # the token is not kept in sight
@@ -75,7 +75,7 @@ def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
 ) -> None:
     """East, down, south are x, y, -z; clockwise from above turns east to south."""
     position = Position.deg(20.0, 10.0, gamma=120.0)
-    hold = Hold(len(FIVE), position, 30.0)  # found on the way
+    hold = Hold(len(FIVE_POSITIONS), position, 30.0)  # found on the way
     server.board.position_asked(hold)
     opened(page, server)
     script = "turned(20, 10, 120).slice(9, -1).split(',').map(Number)"
@@ -88,7 +88,7 @@ def test_a_third_angle_turns_the_box_about_its_own_vertical_axis(
     there = PositionCheck(False, 12.0, 10.0, "", 2.0)
     server.board.view_changed(
         OperatorView("turning", hold, there, 0.4, 0.0, np.full(6, np.nan),
-                     WaitReason(WaitState.TURNING), 100.0, 24.5, Health(samples=9))
+                     WaitReason(WaitState.TURNING), 100.0, 24.5, LinkHealth(samples=9))
     )  # fmt: skip
     row = "document.querySelector('#joints tbody').rows[2]"
     page.until(f"{row}.hidden", False)
@@ -157,17 +157,17 @@ def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> Non
     page.value("source.close(), listen()")
     page.until(lost)
     assert page.value(WORDS) == "TURN TO"  # what was known last stays in sight
-    server.board.position_asked(Hold(2, FIVE[2], 30.0))
+    server.board.position_asked(Hold(2, FIVE_POSITIONS[2], 30.0))
     page.call("Network.emulateNetworkConditions", offline=False, latency=0,
              downloadThroughput=-1, uploadThroughput=-1)  # fmt: skip
     page.until(lost, False)
-    assert page.text("angles") == FIVE[2].name
+    assert page.text("angles") == FIVE_POSITIONS[2].name
 
 
 def test_the_end_stays_though_nothing_is_served_any_more(page: Screen) -> None:
     with PageServer("127.0.0.1") as server:
-        server.board = Board("fieldcal", FIVE)
-        server.board.position_asked(Hold(0, FIVE[0], 30.0))
+        server.board = Board("fieldcal", FIVE_POSITIONS)
+        server.board.position_asked(Hold(0, FIVE_POSITIONS[0], 30.0))
         opened(page, server)
         server.board.run_ended("GO", [], good=True)
     page.until(f"{WORDS} === 'GO'")

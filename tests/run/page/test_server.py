@@ -18,7 +18,7 @@ from processes import HANGS, TWO_POSITION, steady
 
 from fieldcal.commands.run_page import address_of
 from fieldcal.core.errors import InputError
-from fieldcal.core.positions import FIVE
+from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.server import PageServer
@@ -37,8 +37,8 @@ OPENER = urllib.request.build_opener(Stay, urllib.request.ProxyHandler({}))
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
     with PageServer(LOCAL) as made:
-        made.board = Board("fieldcal · five_position", FIVE)
-        made.board.position_asked(Hold(1, FIVE[1], 30.0))
+        made.board = Board("fieldcal · five_position", FIVE_POSITIONS)
+        made.board.position_asked(Hold(1, FIVE_POSITIONS[1], 30.0))
         yield made
 
 
@@ -172,9 +172,9 @@ def test_a_change_is_sent_without_being_asked_for(server: PageServer) -> None:
     with sent(server, "/events?client=c") as stream:
         assert json.loads(stream.readline()[6:])["detail"].startswith("position 2")
         stream.readline()
-        server.board.position_asked(Hold(2, FIVE[2], 30.0))
+        server.board.position_asked(Hold(2, FIVE_POSITIONS[2], 30.0))
         assert json.loads(stream.readline()[6:])["detail"].startswith("position 3")
-    server.board.position_asked(Hold(1, FIVE[1], 30.0))
+    server.board.position_asked(Hold(1, FIVE_POSITIONS[1], 30.0))
 
 
 def test_whoever_opens_the_page_as_a_run_ends_does_not_break_it() -> None:

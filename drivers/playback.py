@@ -1,4 +1,4 @@
-"""The pace at which a recording is played: its time against the clock."""
+"""Speed at which a recording is played back."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from time import monotonic, sleep
 from fieldcal.drivers.options import Options
 
 
-def speed(options: Options) -> float:
-    """Time of a recording against the clock; inf for ``speed=max``."""
+def playback_speed(options: Options) -> float:
+    """Speed from the options: device time over host time; inf for ``speed=max``."""
     if options.text("speed") == "max":
         return inf
     return options.number("speed", 1.0, 1e-3, 1e6)
 
 
-class Pace:
-    """Follows the clock from the first time it is asked.
+class PlaybackClock:
+    """Maps host time to the time of a recording, from the first call of `wait` on.
 
     Parameters
     ----------
     first : time at which the recording begins, s
-    speed : its time against the clock; inf for as fast as it is read
+    speed : its time over host time; inf for as fast as possible
 
     """
 
@@ -30,7 +30,7 @@ class Pace:
         self._began: float | None = None
 
     def wait(self, t: float, timeout: float) -> float:
-        """Wait until `t` is due, but `timeout` s at most; up to which time all is."""
+        """Wait until `t` is due, at most `timeout` s; return the time due, s."""
         if self._speed == inf:
             return inf
         if self._began is None:

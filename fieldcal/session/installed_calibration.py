@@ -1,15 +1,15 @@
-"""Samples as if the device had applied one calibration of its own to all of them.
+"""Converts samples that a device corrected with several calibrations of its own to one.
 
-A device that corrects its own samples sends  U = (r - o) k  of its sensor's output r,
-with offsets o and scales k that may change while it is recorded: an autopilot averages
-its gyroscopes at each start. From one set (o, k) to another (o', k'), axis by axis,
+A device that corrects its own samples sends  U = (r - o) k  of its sensor's output r.
+The offsets o and scales k may change during a recording: an autopilot averages its
+gyroscopes at each start. From one set (o, k) to another (o', k'), axis by axis,
 
     U' = (U / k + o - o') k'                                                        (1)
 
-A ``device`` mark of marks.jsonl tells o and k in ``in_samples``. They hold for samples
-after its ``at_s``; those before hold until its ``until_s``, when they were last read,
-or, where a run was broken off, until the last window, since a window counts only after
-they were read once more. What lies in between belongs to neither, and is left out.
+A ``device`` mark of marks.jsonl states o and k in ``in_samples``. They hold for samples
+after its ``at_s``. The earlier ones hold until its ``until_s``, when they were last
+read, or, if a run was broken off, until the last window, since a window is accepted
+only after they were read again. Samples in between belong to neither and are left out.
 
 Units m/s^2, rad/s; device axes; s of device time.
 """
@@ -24,30 +24,34 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block, concat
 
-NOTHING = {"acc_offset": [0.0] * 3, "acc_scale": [1.0] * 3, "gyr_offset": [0.0] * 3}
-"""What is in the samples of a device that corrects nothing."""
+NO_CORRECTION = {
+    "acc_offset": [0.0] * 3,
+    "acc_scale": [1.0] * 3,
+    "gyr_offset": [0.0] * 3,
+}
+"""Offsets and scales of a device that corrects nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class InstalledStretch:
-    """Samples that hold one set of offsets and scales.
+    """Stretch of samples with one set of offsets and scales.
 
     Attributes
     ----------
-    after, until : s; the samples lie after the first, up to the second
-    used : offsets and scales by name; None where they are not known
+    after, until : s; the samples lie after `after`, up to `until`
+    corrections : offsets and scales by name; None where they are not known
     taken_out : whether the device was told to correct nothing
 
     """
 
     after: float
     until: float
-    used: Mapping[str, Any] | None
+    corrections: Mapping[str, Any] | None
     taken_out: bool
 
 
-def stretches(marks: Iterable[Mapping[str, Any]]) -> list[InstalledStretch]:
-    """What was in the samples, stretch by stretch; empty where nobody said so."""
+def installed_stretches(marks: Iterable[Mapping[str, Any]]) -> list[InstalledStretch]:
+    """Stretches of samples with one set of offsets and scales; empty if not stated."""
     found: list[InstalledStretch] = []
     window_end = -np.inf
     for mark in marks:
@@ -57,7 +61,7 @@ def stretches(marks: Iterable[Mapping[str, Any]]) -> list[InstalledStretch]:
         if not isinstance(told, Mapping) or "in_samples" not in told:
             continue
         used, out = told["in_samples"], bool(told.get("taken_out"))
-        if found and found[-1].used == used:
+        if found and found[-1].corrections == used:
             continue
         after = -np.inf
         if found:
@@ -68,10 +72,10 @@ def stretches(marks: Iterable[Mapping[str, Any]]) -> list[InstalledStretch]:
     return found
 
 
-def in_one_calibration(
+def under_last_calibration(
     block: Block, marks: Iterable[Mapping[str, Any]]
 ) -> tuple[Block, tuple[str, ...]]:
-    """Samples with the offsets and scales that the last of them have, (1).
+    """Samples converted to the offsets and scales of the last stretch, (1).
 
     Parameters
     ----------
@@ -80,14 +84,14 @@ def in_one_calibration(
 
     Returns
     -------
-    The samples, without those of which it is not known, and what must be known of it.
+    The samples without those of unknown offsets and scales, and warnings.
 
     """
-    parts = stretches(marks)
+    parts = installed_stretches(marks)
     if len(parts) < 2:
         return block, ()
     last = parts[-1]
-    goal = NOTHING if last.taken_out else last.used
+    goal = NO_CORRECTION if last.taken_out else last.corrections
     kept = []
     for part in parts:
         some = block.between(
@@ -95,8 +99,8 @@ def in_one_calibration(
         )
         if part is last and not last.taken_out:
             kept.append(some)
-        elif goal is not None and part.used is not None:
-            kept.append(_from_to(some, part.used, goal))
+        elif goal is not None and part.corrections is not None:
+            kept.append(_converted(some, part.corrections, goal))
     whole = concat(kept)
     said = (
         "the device changed its own calibration while it was recorded, as autopilots"
@@ -106,22 +110,22 @@ def in_one_calibration(
     return whole, said
 
 
-def _applied(marks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Offsets and scales that the last samples hold; None if none, or not known."""
-    last = ([None, *stretches(marks)])[-1]
-    return None if last is None or last.taken_out else last.used
+def _last_corrections(marks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Offsets and scales of the last stretch; None if there are none, or not known."""
+    last = ([None, *installed_stretches(marks)])[-1]
+    return None if last is None or last.taken_out else last.corrections
 
 
-def tells_an_offset(marks: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether the device said that it subtracts an offset from its gyroscopes."""
-    used = _applied(marks)
+def subtracts_gyro_offset(marks: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether the device is known to subtract an offset from its gyroscopes."""
+    used = _last_corrections(marks)
     return used is not None and bool(np.any(used["gyr_offset"]))
 
 
-def as_sent(
+def nominal_as_sent(
     nominal: Mapping[str, Array], marks: Iterable[Mapping[str, Any]]
 ) -> dict[str, Array]:
-    """What a sensor of nominal errors would send, corrected as `in_one_calibration` is.
+    """Biases and scales in the sent samples of a sensor with the nominal ones.
 
     Parameters
     ----------
@@ -129,10 +133,10 @@ def as_sent(
     marks : of the session
 
     """
-    used = _applied(marks)
+    used = _last_corrections(marks)
     if used is None:
         return dict(nominal)
-    o, k, w = (np.array(used[n], float) for n in NOTHING)
+    o, k, w = (np.array(used[n], float) for n in NO_CORRECTION)
     return {
         **nominal,
         "acc_bias": (nominal["acc_bias"] - o) * k,  # U = (r - o) k
@@ -141,8 +145,8 @@ def as_sent(
     }
 
 
-def _from_to(block: Block, used: Mapping[str, Any], goal: Mapping[str, Any]) -> Block:
-    o, k, w = (np.array(used[n], float) for n in NOTHING)
-    to, scale, rate = (np.array(goal[n], float) for n in NOTHING)
+def _converted(block: Block, used: Mapping[str, Any], goal: Mapping[str, Any]) -> Block:
+    o, k, w = (np.array(used[n], float) for n in NO_CORRECTION)
+    to, scale, rate = (np.array(goal[n], float) for n in NO_CORRECTION)
     acc: Array = (block.acc / k + o - to) * scale  # (1)
     return replace(block, acc=acc, gyr=block.gyr + w - rate)

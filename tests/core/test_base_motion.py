@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from session_folders import recorded, write_session
 
-from fieldcal.core import under_way
-from fieldcal.core.under_way import UnderWay
+from fieldcal.core import base_motion
+from fieldcal.core.base_motion import BaseMotion
 from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
@@ -29,7 +29,7 @@ FACES = ((0, 0), (180, 0), (90, 0), (-90, 0), (0, 90), (0, -90))
 
 
 def test_examples_in_the_text() -> None:
-    failed, tried = doctest.testmod(under_way, extraglobs={"np": np})
+    failed, tried = doctest.testmod(base_motion, extraglobs={"np": np})
     assert tried and not failed
 
 
@@ -40,15 +40,15 @@ def test_it_is_the_path_of_a_point_in_space(
     north: float, east: float, latitude: float, height: float
 ) -> None:
     """Second differences of places, and first ones of axes, in inertial space."""
-    found = UnderWay.at(north, east, latitude, height)
+    found = BaseMotion.from_velocity(north, east, latitude, height)
     rate, pull = earth.moving_base_terms(latitude, height, north, east)
     np.testing.assert_allclose(found.rate, rate[:, 0], atol=2e-10)
     np.testing.assert_allclose(found.force, pull[:, 0], atol=1e-6)
 
 
 def test_a_base_that_stands_adds_nothing() -> None:
-    found = UnderWay.at(0.0, 0.0, 0.9)
-    assert not found.rate.any() and not found.force.any() and found.lean == 0.0
+    found = BaseMotion.from_velocity(0.0, 0.0, 0.9)
+    assert not found.rate.any() and not found.force.any() and found.force_tilt == 0.0
     rate, pull = earth.moving_base_terms(0.9, 0.0, 0.0, 0.0)
     assert not rate.any() and not pull.any()
 
@@ -56,16 +56,18 @@ def test_a_base_that_stands_adds_nothing() -> None:
 def test_what_a_session_says() -> None:
     """Gravity is less by what sailing east takes; tactical grade knows no north."""
     still, moving = (
-        description.parse({"format": 1, "site": {"latitude_deg": 55.0} | v})
+        description.parse_description({"format": 1, "site": {"latitude_deg": 55.0} | v})
         for v in ({}, {"east_m_s": 20.0, "north_m_s": 10.0, "level_deg": 0.01})
     )  # fmt: skip
-    adds = UnderWay.at(10.0, 20.0, np.deg2rad(55.0))
+    adds = BaseMotion.from_velocity(10.0, 20.0, np.deg2rad(55.0))
     assert moving.gravity == pytest.approx(still.gravity - adds.force[1])
     assert moving.velocity == (10.0, 20.0)
-    assert moving.under_way.force[[0, 2]].tolist() == [0.0, 0.0]
-    assert moving.level_deg == pytest.approx(np.hypot(0.01, np.rad2deg(adds.lean)))
+    assert moving.base_motion.force[[0, 2]].tolist() == [0.0, 0.0]
+    assert moving.level_deg == pytest.approx(
+        np.hypot(0.01, np.rad2deg(adds.force_tilt))
+    )
     with pytest.raises(Exception, match="north_m_s"):
-        description.parse({"format": 1, "site": {"north_m_s": "fast"}})
+        description.parse_description({"format": 1, "site": {"north_m_s": "fast"}})
 
 
 def session(folder: Path, **said: Any) -> Session:

@@ -24,21 +24,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fieldcal.drivers.framing import Bytes, Index, rows
+from fieldcal.drivers.framing import Bytes, Index, byte_rows
 
-FEW = 32
-"""Stretches of one length for which tables do not pay."""
+FEW_STRETCHES = 32
+"""Number of stretches of one length below which no tables are used."""
 
-MOST = 1 << 18
-"""Bytes looked up at a time: strange bytes may be in hundreds of stretches each."""
+BYTES_AT_ONCE = 1 << 18
+"""Bytes processed at once; limits the memory, since stretches may overlap."""
 
 Words = NDArray[np.uint16]
 
 
-def sums(data: Bytes, starts: Index, ends: Index) -> Bytes:
+def byte_sums(data: Bytes, starts: Index, ends: Index) -> Bytes:
     """Sum of the bytes of each stretch modulo 256, (m,), (1).
 
-    >>> sums(np.array([1, 2, 255, 3], np.uint8), np.array([0, 1]), np.array([3, 4]))
+    >>> data = np.array([1, 2, 255, 3], np.uint8)
+    >>> byte_sums(data, np.array([0, 1]), np.array([3, 4]))
     array([2, 4], dtype=uint8)
     """
     edges = np.column_stack([starts, ends]).ravel()
@@ -49,10 +50,11 @@ def sums(data: Bytes, starts: Index, ends: Index) -> Bytes:
     return total
 
 
-def sums16(data: Bytes, starts: Index, ends: Index) -> Words:
+def word_sums(data: Bytes, starts: Index, ends: Index) -> Words:
     """Sum of the bytes of each stretch modulo 65536, (m,), (1).
 
-    >>> sums16(np.array([1, 2, 255, 3], np.uint8), np.array([0, 1]), np.array([3, 4]))
+    >>> data = np.array([1, 2, 255, 3], np.uint8)
+    >>> word_sums(data, np.array([0, 1]), np.array([3, 4]))
     array([258, 260], dtype=uint16)
     """
     if not len(starts):
@@ -64,15 +66,15 @@ def sums16(data: Bytes, starts: Index, ends: Index) -> Words:
     return total
 
 
-def fletcher(data: Bytes, starts: Index, ends: Index) -> tuple[Bytes, Bytes]:
+def fletcher_sums(data: Bytes, starts: Index, ends: Index) -> tuple[Bytes, Bytes]:
     """Fletcher's two sums of each stretch modulo 256, (m,) each, (1), (2).
 
-    >>> fletcher(np.array([9, 1, 2, 3], np.uint8), np.array([1]), np.array([4]))
+    >>> fletcher_sums(np.array([9, 1, 2, 3], np.uint8), np.array([1]), np.array([4]))
     (array([6], dtype=uint8), array([10], dtype=uint8))
     """
     weighed = np.arange(len(data), dtype=np.uint8) * data
-    first = sums(data, starts, ends)
-    second = ends.astype(np.uint8) * first - sums(weighed, starts, ends)  # (2)
+    first = byte_sums(data, starts, ends)
+    second = ends.astype(np.uint8) * first - byte_sums(weighed, starts, ends)  # (2)
     return first, second
 
 
@@ -91,13 +93,13 @@ def crc16(data: Bytes, starts: Index, ends: Index) -> Words:
         zip(sizes.tolist(), counts.tolist(), strict=True)
     ):
         which = np.flatnonzero(group == i)
-        if count < FEW:
+        if count < FEW_STRETCHES:
             each = (data[starts[k] : ends[k]] for k in which.tolist())
             found[which] = [crc_hqx(stretch.tobytes(), 0) for stretch in each]
             continue
         table, at = _remainders(size), 256 * np.arange(size)[::-1]
-        for some in np.array_split(which, 1 + count * size // MOST):
-            parts = table.take(rows(data, starts[some], size) + at)
+        for some in np.array_split(which, 1 + count * size // BYTES_AT_ONCE):
+            parts = table.take(byte_rows(data, starts[some], size) + at)
             found[some] = np.bitwise_xor.reduce(parts, axis=1)  # (3)
     return found
 

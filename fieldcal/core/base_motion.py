@@ -1,4 +1,4 @@
-"""What a base that moves over the Earth at a constant velocity adds to references.
+"""Rate and specific force due to a base that moves over the Earth at constant velocity.
 
 Base axes x East, y down, z north, with the latitude phi, the height h, the radii of
 curvature M (of the meridian) and N, and the Earth's rate U:
@@ -7,11 +7,12 @@ curvature M (of the meridian) and N, and the Earth's rate U:
     f = (-S v_N,  v_N^2 / (M + h) + v_E^2 / (N + h) + 2 U v_E cos(phi),  S v_E)   (1)
     S = 2 U sin(phi) + v_E tan(phi) / (N + h)
 
-w is the rate of the axes themselves beside the Earth's, rad/s; f the specific force
-beside gravity, m/s^2: Coriolis across, which a spirit level under way hangs along, and
-down what makes a ship that sails east lighter (Eoetvoes). In (37) R stands for both
-radii; its third axis is printed upwards. Source: Avrutov and Pozniak 2023, (37);
-Groves, Principles of GNSS, Inertial, and Multisensor Navigation, 2013, chapter 5.
+w is the rate of the axes in addition to the Earth's rate, rad/s (transport rate). f is
+the specific force in addition to gravity, m/s^2: the horizontal part is the Coriolis
+force, to which a moving spirit level adjusts; the vertical part is the Eoetvoes effect.
+The print of (37) has R for both radii, and its third axis points up. Source: Avrutov
+and Pozniak 2023, (37); Groves, Principles of GNSS, Inertial, and Multisensor
+Navigation, 2013, chapter 5.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ SEMI_MAJOR, FLATTENING = 6_378_137.0, 1 / 298.257223563
 
 
 @dataclass(frozen=True, slots=True)
-class UnderWay:
-    """What the motion of the base adds, in base axes; nothing if it stands.
+class BaseMotion:
+    """Additional rate and specific force of a moving base, in base axes; 0 at rest.
 
     Attributes
     ----------
-    rate : (3,) rad/s, of the level axes beside the Earth's rate
-    force : (3,) m/s^2, specific force beside gravity
+    rate : (3,) rad/s, of the level axes in addition to the Earth's rate
+    force : (3,) m/s^2, specific force in addition to gravity
 
     """
 
@@ -42,12 +43,12 @@ class UnderWay:
     force: Array = field(default_factory=lambda: np.zeros(3))
 
     @classmethod
-    def at(
+    def from_velocity(
         cls, north: float, east: float, latitude: float, height: float = 0.0
-    ) -> UnderWay:
-        """A base with a velocity in m/s, at a latitude in rad and a height in m.
+    ) -> BaseMotion:
+        """Motion of a base from its velocity, m/s, latitude, rad, and height, m.
 
-        >>> UnderWay.at(0.0, 10.0, np.deg2rad(60.0)).force.round(5) + 0.0
+        >>> BaseMotion.from_velocity(0.0, 10.0, np.deg2rad(60.0)).force.round(5) + 0.0
         array([0.     , 0.00074, 0.00129])
         """
         if not (north or east):
@@ -65,12 +66,12 @@ class UnderWay:
         return cls(rate, force)
 
     @property
-    def level(self) -> UnderWay:
-        """What is left where nobody knows north: about and along the vertical."""
+    def vertical_part(self) -> BaseMotion:
+        """Parts about and along the vertical; these do not depend on the heading."""
         vertical = np.array([0.0, 1.0, 0.0])
-        return UnderWay(self.rate * vertical, self.force * vertical)
+        return BaseMotion(self.rate * vertical, self.force * vertical)
 
     @property
-    def lean(self) -> float:
-        """By how much Coriolis turns the force, for a gravity of 9.8 m/s^2, rad."""
+    def force_tilt(self) -> float:
+        """Angle by which the Coriolis force tilts a gravity of 9.8 m/s^2, rad."""
         return float(np.hypot(self.force[0], self.force[2]) / 9.8)

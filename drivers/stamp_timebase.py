@@ -1,16 +1,16 @@
-"""The time of each sample from the device's own stamps.
+"""Timebase from the device's own stamps.
 
 A stamp s_k is the device's time cut to a resolution q, so the true time lies in
-[s_k, s_k + q). With T the mean interval so far, renewed now and then, and k counted
-from there,
+[s_k, s_k + q). With the mean interval T so far, updated at times, and k counted from
+the last update,
 
     t_k = u + k T,  u = min(max(u, s_k - k T), s_k + q - k T)               (1)
 
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
 counter is unwrapped first: where it falls by more than half its span, a span is added.
-A clock that falls by more than `BACK`, or leaps by more than `LEAP` where the host saw
-hardly any time go by, has begun anew: time goes on from the last sample by what the
-host saw.
+A clock that falls by more than `RESTART_BACKWARD`, or leaps by more than
+`RESTART_FORWARD` where the host saw hardly any time go by, has begun anew: time goes on
+from the last sample by what the host saw.
 
 All in s. Symbols: k sample number, T period, q resolution, u phase.
 """
@@ -20,42 +20,42 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 
-BACK = 1.0
-"""A stamp older by more than this is no late sample but a clock begun anew, s."""
+RESTART_BACKWARD = 1.0
+"""Step back of the stamps beyond which the clock has restarted, s."""
 
-LEAP = 60.0
-"""A leap forward by more than this needs the host as a witness, s."""
+RESTART_FORWARD = 60.0
+"""Step forward of the stamps beyond which the host's time is compared, s."""
 
-WITNESS = 0.005
-"""Least share of a leap that the host must have seen: devices run up to 200 x fast."""
+LEAST_HOST_SHARE = 0.005
+"""Least share of that step that must pass on the host: devices run up to 200 x fast."""
 
-EARLY = 16
-"""Intervals from which the period is first told."""
+FIRST_INTERVALS = 16
+"""Intervals from which the period is first estimated."""
 
-RENEW = 1024
-"""Most samples after which the period is told anew."""
+RENEWAL_SAMPLES = 1024
+"""Most samples after which the period is estimated again."""
 
-CREEP = 0.01
-"""Share of the resolution that time goes on by where many samples share a stamp."""
+CREEP_SHARE = 0.01
+"""Share of the resolution by which times increase where samples share a stamp."""
 
 _NAN = float("nan")
 
 
-class Stamps:
+class StampTimebase:
     """Times from the device's own stamps, (1).
 
     Parameters
     ----------
     health : where gaps, missing and repeated samples and restarts are counted
     resolution : of the stamps, s
-    span : of the counter, s, where it wraps
+    span : time after which the counter wraps, s
 
     """
 
     def __init__(
-        self, health: Health, resolution: float = 0.0, span: float = float("inf")
+        self, health: LinkHealth, resolution: float = 0.0, span: float = float("inf")
     ) -> None:
         self._health = health
         self._resolution, self._span = resolution, span
@@ -63,31 +63,31 @@ class Stamps:
         self._t = self._stamp = self._host = self._period = _NAN
         self._first, self._count = 0.0, 0
         self._early: list[float] = []
-        self._phase, self._k0, self._renewal = _NAN, 0, EARLY
+        self._phase, self._k0, self._renewal = _NAN, 0, FIRST_INTERVALS
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,), nan for a sample to drop; `stamps` nan where unknown."""
         parts: list[Array] = [np.empty(0)]
         i = 0
         while i < len(stamps):
-            quiet = self._glide(stamps[i : i + RENEW])
+            quiet = self._glide(stamps[i : i + RENEWAL_SAMPLES])
             if len(quiet):
                 i += len(quiet)
                 self._stamp, self._host = float(stamps[i - 1]), float(t_host[i - 1])
                 parts.append(quiet)
                 continue
-            few = slice(i, i + EARLY)
+            few = slice(i, i + FIRST_INTERVALS)
             pairs = zip(stamps[few].tolist(), t_host[few].tolist(), strict=True)
             parts.append(np.array([self._step(stamp, host) for stamp, host in pairs]))
-            i += EARLY
+            i += FIRST_INTERVALS
         return np.concatenate(parts)
 
-    def broken(self) -> None:
+    def link_broken(self) -> None:
         """Do nothing: the stamps show the gap."""
 
     def _glide(self, stamps: Array) -> Array:
-        """Place at once the first stamps, as many as nothing happens among."""
-        if self._count < EARLY:
+        """Times of the first stamps up to the first irregular one, all at once."""
+        if self._count < FIRST_INTERVALS:
             return stamps[:0]
         stamps = stamps[: self._renewal - self._count]
         d = np.empty(len(stamps))
@@ -147,7 +147,7 @@ class Stamps:
 
     def _begin(self, stamp: float, host: float) -> None:
         self._t = self._first = stamp + self._offset
-        self._count, self._renewal, self._early = 0, EARLY, []
+        self._count, self._renewal, self._early = 0, FIRST_INTERVALS, []
         self._stamp, self._host = stamp, host
         self._anchor()
 
@@ -161,19 +161,19 @@ class Stamps:
         return self._later(self._phase + k * self._period)
 
     def _later(self, t: float) -> float:
-        """Return `t`, or a time just behind the last if it is none."""
-        return t if not t <= self._t else self._t + CREEP * self._resolution
+        """Return `t`, but at least a little more than the last time."""
+        return t if not t <= self._t else self._t + CREEP_SHARE * self._resolution
 
     def _advance(self, t: float) -> float:
         if t != t:
             return t
         d, self._t = t - self._t, t
         self._count += 1
-        if self._count <= EARLY:
+        if self._count <= FIRST_INTERVALS:
             self._early.append(d)
             self._period = float(np.median(self._early))
             self._anchor()
-            if self._count == EARLY:
+            if self._count == FIRST_INTERVALS:
                 self._count = sum(max(1, round(d / self._period)) for d in self._early)
                 self._renewal = self._count
         elif d > 1.5 * self._period + self._resolution:
@@ -186,10 +186,10 @@ class Stamps:
         return t
 
     def _renew(self) -> None:
-        """Tell the period anew when it is time."""
-        if self._count >= max(EARLY, self._renewal):
+        """Estimate the period again when it is due."""
+        if self._count >= max(FIRST_INTERVALS, self._renewal):
             self._period = (self._t - self._first) / self._count
-            self._renewal = self._count + min(self._count, RENEW)
+            self._renewal = self._count + min(self._count, RENEWAL_SAMPLES)
             self._anchor()
 
     def _anchor(self) -> None:
@@ -197,8 +197,8 @@ class Stamps:
 
     def _restarted(self, s: float, host: float) -> bool:
         leap = s - self._t
-        witnessed = not host - self._host < WITNESS * leap
-        return leap < -BACK or (leap > LEAP and not witnessed)
+        witnessed = not host - self._host < LEAST_HOST_SHARE * leap
+        return leap < -RESTART_BACKWARD or (leap > RESTART_FORWARD and not witnessed)
 
     def _restart(self, stamp: float, host: float) -> float:
         self._health.restarts += 1

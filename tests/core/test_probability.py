@@ -7,7 +7,7 @@ import pytest
 from scipy.special import gammaincc
 from scipy.stats import norm
 
-from fieldcal.core.chances import DEVIATION, chi2_tail
+from fieldcal.core.probability import MAD_TO_SIGMA, chi2_tail
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 4, 5, 10, 33, 100, 1001, 20000])
@@ -23,4 +23,4 @@ def test_what_has_no_end_has_no_chance() -> None:
 
 
 def test_a_median_of_deviations_is_that_of_a_normal_spread() -> None:
-    assert DEVIATION == pytest.approx(1 / norm.ppf(0.75), rel=1e-4)
+    assert MAD_TO_SIGMA == pytest.approx(1 / norm.ppf(0.75), rel=1e-4)

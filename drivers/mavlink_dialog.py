@@ -1,12 +1,12 @@
-"""What is said to an autopilot, and what it answers; no I/O and no clock.
+"""Dialog with an autopilot: requests and answers, without I/O and clock.
 
 Once a heartbeat tells who is there, the rate of the message is asked for
 (SET_MESSAGE_INTERVAL, and where that is denied or not answered the raw sensor stream,
 REQUEST_DATA_STREAM), then the parameters of the installed calibration are read, and
 where that is wanted set to no calibration until they are given back. They are read
-again every `AGAIN` s, whenever that is asked for, and after a restart until they are
-stable. Our own heartbeat goes out every second, since some send nothing to who is
-silent.
+again every `REREAD_INTERVAL` s, whenever that is asked for, and after a restart until
+they are stable. Our own heartbeat goes out every second, since some send nothing to who
+is silent.
 """
 
 from __future__ import annotations
@@ -19,54 +19,54 @@ from typing import Any
 from fieldcal.core.errors import DeviceError
 from fieldcal.drivers.mavlink_installed import (
     PX4,
-    Installed,
-    identity,
-    other_processing,
+    InstalledCalibration,
+    identity_parameters,
+    other_processing_parameters,
 )
-from fieldcal.drivers.mavlink_watch import STABLE, InstalledWatch, close
+from fieldcal.drivers.mavlink_watch import STABLE_ROUNDS, InstalledWatch, is_unchanged
 
-EVERY = 1.0
-"""Between two heartbeats, s."""
+HEARTBEAT_INTERVAL = 1.0
+"""Time between two heartbeats, s."""
 
 PATIENCE = 0.7
-"""How long an answer may take before the question is put again, s."""
+"""Time without an answer after which a request is repeated, s."""
 
 TRIES = 3
-"""How often a question is put."""
+"""How often a request is sent."""
 
-AGAIN = 10.0
-"""Between two readings of the installed calibration, s."""
+REREAD_INTERVAL = 10.0
+"""Time between two readings of the installed calibration, s."""
 
-SILENT = 40
-"""Heartbeats without an answer after which one who used to answer is given up: while it
-starts an autopilot may hear nobody."""
+MOST_UNANSWERED = 40
+"""Heartbeats without an answer after which an autopilot that answered before is given
+up; while starting, it may not answer."""
 
-STATION = (255, 190)
-"""System and component that ground stations call themselves."""
+GROUND_STATION = (255, 190)
+"""System and component numbers of ground stations."""
 
-NO_AUTOPILOT, NO_RATE = 8, 511
-"""In a heartbeat, somebody who flies nothing; SET_MESSAGE_INTERVAL."""
+NO_AUTOPILOT, SET_MESSAGE_INTERVAL = 8, 511
+"""Autopilot number of a sender that is none; number of command SET_MESSAGE_INTERVAL."""
 
 ACCEPTED, IN_PROGRESS = 0, 5
 RAW_SENSORS = 1
 INT32, REAL32 = 6, 9
 
 
-class Talk:
-    """A conversation with one autopilot.
+class AutopilotDialog:
+    """Dialog with one autopilot.
 
     Parameters
     ----------
-    message : name and number of what is asked for
+    message : name and number of the requested message
     rate : Hz; 0 to leave it as it is
     instance : which sensor's parameters are read
-    wants : says of a system and a component whether they are meant
-    take_out : whether the installed calibration is to be set to none meanwhile
+    wants : whether a system and component are the ones to talk to
+    take_out : whether to remove the installed calibration during the recording
 
     Attributes
     ----------
     vehicle : system and component of the autopilot
-    installed : what its parameters say; None before there is a heartbeat
+    installed : its installed calibration; None before the first heartbeat
     others : further autopilots that were heard
     says : sentences for the operator
 
@@ -83,11 +83,11 @@ class Talk:
         from pymavlink.dialects.v20 import all as dialect
 
         self._dialect = dialect
-        self._out = dialect.MAVLink(None, *STATION)
+        self._out = dialect.MAVLink(None, *GROUND_STATION)
         self._message, self._rate = message, rate
         self._instance, self._wants = instance, wants
         self.vehicle: tuple[int, int] | None = None
-        self.installed: Installed | None = None
+        self.installed: InstalledCalibration | None = None
         self.others: set[tuple[int, int]] = set()
         self.says: list[str] = []
         self._beat = self._asked = -inf
@@ -99,77 +99,81 @@ class Talk:
 
     @property
     def settled(self) -> bool:
-        """Whether all that is asked has been answered, or given up."""
-        answered = self.vehicle is not None and self._rated and not self.reads
-        return answered and not self._take_out and not self.unset
+        """Whether all requests were answered or given up."""
+        answered = self.vehicle is not None and self._rated and not self.is_reading
+        return answered and not self._take_out and not self.pending
 
     @property
-    def reads(self) -> bool:
+    def is_reading(self) -> bool:
         """Whether the installed calibration is being read."""
-        return self._watch is not None and self._watch.waits
+        return self._watch is not None and self._watch.is_reading
 
     @property
-    def rereads(self) -> bool:
-        """Whether it is being read once more, from one who has answered before."""
-        return self._watch is not None and self._watch.answers and self._watch.waits
+    def is_rereading(self) -> bool:
+        """Whether it is being read again, after it was read before."""
+        return (
+            self._watch is not None
+            and self._watch.has_answered
+            and self._watch.is_reading
+        )
 
     @property
     def readings(self) -> tuple[int, int]:
-        """How many readings said the same as before, and how many something else."""
+        """Number of readings without and with a change."""
         return (self._watch.readings, self._watch.changes) if self._watch else (0, 0)
 
     @property
-    def unset(self) -> dict[str, float]:
-        """Parameters that were to be set, and are not yet."""
-        now = self.installed.used if self.installed else {}
-        return {n: v for n, v in self._goal.items() if not close(now.get(n), v)}
+    def pending(self) -> dict[str, float]:
+        """Parameters that are still to be set, with their values."""
+        now = self.installed.in_samples if self.installed else {}
+        return {n: v for n, v in self._goal.items() if not is_unchanged(now.get(n), v)}
 
     def give_back(self) -> None:
-        """Set the parameters to what they were, if they were changed at all."""
+        """Restore the parameters, if they were changed."""
         self._take_out, self._tries, self._asked = False, -TRIES, -inf
         if self._goal and self.installed is not None:
             self._goal = {name: self.installed.values[name] for name in self._goal}
 
-    def again(self) -> None:
-        """Ask for all of it again: the link was away, or the autopilot started anew."""
+    def start_over(self) -> None:
+        """Repeat all requests: the link was interrupted, or the autopilot restarted."""
         self._rated, self._tries = self._rate == 0, 0
-        self.read(STABLE)
+        self.read_again(STABLE_ROUNDS)
 
-    def read(self, rounds: int = 1) -> None:
-        """Read the installed calibration again, if it was ever told."""
-        if self._watch is not None and self._watch.answers:
-            self._watch.again(rounds)
+    def read_again(self, rounds: int = 1) -> None:
+        """Read the installed calibration again, if it was read before."""
+        if self._watch is not None and self._watch.has_answered:
+            self._watch.start_over(rounds)
             self._unanswered, self._asked = 0, -inf
 
     def hear(self, message: Any) -> None:
-        """Take note of a message, as pymavlink makes it."""
+        """Process a message, as pymavlink decodes it."""
         kind = message.get_type()
         source = (message.get_srcSystem(), message.get_srcComponent())
         if kind == "HEARTBEAT":
             self._heartbeat(message, source)
         elif source != self.vehicle:
             return
-        elif kind == "COMMAND_ACK" and message.command == NO_RATE:
+        elif kind == "COMMAND_ACK" and message.command == SET_MESSAGE_INTERVAL:
             self._answered(message.result)
         elif kind == "PARAM_VALUE" and self.installed is not None:
             self._value(message)
 
-    def due(self, now: float) -> bytes:
-        """Bytes to send at `now`, s of any clock."""
+    def bytes_due(self, now: float) -> bytes:
+        """Bytes that are due to be sent at `now`, s of any clock."""
         out = b""
-        if now - self._beat >= EVERY:
+        if now - self._beat >= HEARTBEAT_INTERVAL:
             self._beat = now
             out += self._packed(self._out.heartbeat_encode(6, NO_AUTOPILOT, 0, 0, 4))
-        if self.reads:
+        if self.is_reading:
             self._read_at = now
-        elif now - self._read_at >= AGAIN:
-            self.read()
+        elif now - self._read_at >= REREAD_INTERVAL:
+            self.read_again()
         if self.vehicle is None or self.settled or now - self._asked < PATIENCE:
             return out
         self._asked = now
         if not self._rated:
             return out + self._ask_rate()
-        return out + (self._ask_parameters() if self.reads else self._set())
+        return out + (self._ask_parameters() if self.is_reading else self._set())
 
     def _packed(self, message: Any) -> bytes:
         packed: bytes = message.pack(self._out)
@@ -182,7 +186,7 @@ class Talk:
         self._unanswered += 1
         if self.vehicle is None:
             self.vehicle = source
-            self.installed = Installed(message.autopilot, self._instance)
+            self.installed = InstalledCalibration(message.autopilot, self._instance)
             self._watch = InstalledWatch(self.installed)
         elif source != self.vehicle:
             self.others.add(source)
@@ -195,7 +199,9 @@ class Talk:
             return self._fall_back("does not answer SET_MESSAGE_INTERVAL")
         interval = round(1e6 / self._rate)
         values = (number, interval, 0, 0, 0, 0, 0)
-        return self._packed(self._out.command_long_encode(*target, NO_RATE, 0, *values))
+        return self._packed(
+            self._out.command_long_encode(*target, SET_MESSAGE_INTERVAL, 0, *values)
+        )
 
     def _answered(self, result: int) -> None:
         if self._rated or result == IN_PROGRESS:
@@ -210,7 +216,7 @@ class Talk:
         self._asked = -inf
 
     def _fall_back(self, why: str) -> bytes:
-        """Ask for the stream that the message is part of, as older programs know it."""
+        """Request the stream that contains the message, for older programs."""
         name, _ = self._message
         says = (
             f"{self._rate:g} Hz of {name} asked for: the autopilot "
@@ -233,12 +239,12 @@ class Talk:
         if installed is None or watch is None:
             return b""
         self._tries += 1
-        if watch.answers and self._unanswered > SILENT:
+        if watch.has_answered and self._unanswered > MOST_UNANSWERED:
             raise DeviceError(
                 "the autopilot answers no more for its parameters, so nobody knows"
-                f" what is in its samples: {', '.join(watch.open)}; check the link"
+                f" what is in its samples: {', '.join(watch.unheard)}; check the link"
             )
-        if not watch.answers and self._tries > TRIES:
+        if not watch.has_answered and self._tries > TRIES:
             watch.give_up()
             self.says.append(
                 "parameters that the autopilot did not answer: "
@@ -246,20 +252,20 @@ class Talk:
             )
             return b""
         target = self.vehicle or (0, 0)
-        more = other_processing(installed.autopilot, self._instance)
+        more = other_processing_parameters(installed.autopilot, self._instance)
         unheard = [name for name in more if name not in installed.values]
         return b"".join(
             self._packed(
                 self._out.param_request_read_encode(*target, name.encode(), -1)
             )
-            for name in (*unheard, *watch.open)
+            for name in (*unheard, *watch.unheard)
         )
 
     def _set(self) -> bytes:
-        """Set the parameters that are not yet what they should be."""
+        """Bytes that set the pending parameters."""
         if self._take_out and self.installed is not None:
             self._take_out, self._tries = False, 0
-            self._goal = identity(self.installed)
+            self._goal = identity_parameters(self.installed)
             self.installed.taken_out = bool(self._goal)
             if not self._goal:
                 self.says.append(
@@ -268,15 +274,16 @@ class Talk:
         self._tries += 1
         if self._tries > TRIES:
             raise DeviceError(
-                f"the autopilot does not take parameters: {listed(self.unset)}; set "
-                "them by hand, or leave out installed=identity"
+                f"the autopilot does not take parameters:"
+                f" {parameter_list(self.pending)}; set them by hand, or"
+                " leave out installed=identity"
             )
         target = self.vehicle or (0, 0)
         return b"".join(
             self._packed(
                 self._out.param_set_encode(*target, name.encode(), value, REAL32)
             )
-            for name, value in self.unset.items()
+            for name, value in self.pending.items()
         )
 
     def _value(self, message: Any) -> None:
@@ -287,15 +294,17 @@ class Talk:
         if installed.autopilot == PX4 and message.param_type == INT32:
             # PX4 sends the bits of a whole number, others its value
             (value,) = struct.unpack("<i", struct.pack("<f", message.param_value))
-        if message.param_id in other_processing(installed.autopilot, self._instance):
+        if message.param_id in other_processing_parameters(
+            installed.autopilot, self._instance
+        ):
             installed.values[message.param_id] = float(value)
             return
-        self._unanswered, waited = 0, watch.waits
+        self._unanswered, waited = 0, watch.is_reading
         ended = watch.hear(message.param_id, float(value))
-        at_once = ended or watch.waits != waited
+        at_once = ended or watch.is_reading != waited
         self._asked, self._tries = (-inf, 0) if at_once else (self._asked, 1)
 
 
-def listed(parameters: Mapping[str, float]) -> str:
-    """Write parameters as an operator types them."""
+def parameter_list(parameters: Mapping[str, float]) -> str:
+    """Parameters as text, ``name = value``."""
     return ", ".join(f"{name} = {value:.9g}" for name, value in parameters.items())

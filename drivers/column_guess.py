@@ -17,33 +17,33 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
 from fieldcal.session.units import ACC_UNITS
 
-REST = 0.1
+LARGEST_RATE_AT_REST = 0.1
 """What no gyroscope of a device at rest reads, rad/s: 6 deg/s."""
 
-LEAST = 5
+LEAST_LINES = 5
 """Lines that make a guess worth while."""
 
 SEPARATORS = {",": ",", ";": ";", "\t": "tab", " ": "space", "|": "|"}
-CHECKED = re.compile(r"\$?(.*)\*[0-9A-Fa-f]{2}")
-WORD = re.compile(r"\$?([A-Za-z]\w*)\W")
+CHECKSUM_LINE = re.compile(r"\$?(.*)\*[0-9A-Fa-f]{2}")
+FIRST_WORD = re.compile(r"\$?([A-Za-z]\w*)\W")
 UNITS_OF_TIME = ("s", "ms", "us", "ns")
 
 
-def guess(data: bytes, seconds: float) -> str | None:
+def guess_text_options(data: bytes, seconds: float) -> str | None:
     r"""Options of a text format that fit bytes, which came in so many seconds.
 
     >>> lines = b"".join(b"%d;0;0;1000;1;2;3\n" % (1000 * i) for i in range(20))
-    >>> guess(lines, 0.02)
+    >>> guess_text_options(lines, 0.02)
     'columns=t,ax,ay,az,gx,gy,gz&separator=;&t_unit=us&acc_unit=mg&gyr_unit=deg/s'
     """
     lines = [line.strip() for line in data.decode("latin-1").split("\n")[1:-1]]
-    checked = sum(CHECKED.fullmatch(line) is not None for line in lines)
+    checked = sum(CHECKSUM_LINE.fullmatch(line) is not None for line in lines)
     options = []
     if checked > len(lines) / 2:
         options.append("checksum=xor")
-        found = [CHECKED.fullmatch(line) for line in lines]
+        found = [CHECKSUM_LINE.fullmatch(line) for line in lines]
         lines = [match[1] for match in found if match]
-    words = Counter(match[1] for line in lines if (match := WORD.match(line)))
+    words = Counter(match[1] for line in lines if (match := FIRST_WORD.match(line)))
     if words and words.most_common(1)[0][1] > len(lines) / 2:
         word = words.most_common(1)[0][0]
         options.insert(0, f"prefix={quote(word)}")
@@ -69,7 +69,7 @@ def _table(lines: list[str]) -> tuple[str, Array] | None:
         if not widths:
             continue
         width, count = widths.most_common(1)[0]
-        if width >= 3 and count >= max(LEAST, 0.8 * len(lines)):
+        if width >= 3 and count >= max(LEAST_LINES, 0.8 * len(lines)):
             if best is None or width > best[1].shape[1]:
                 best = separator, np.array([r for r in rows if r and len(r) == width])
     return best
@@ -94,7 +94,7 @@ def _names(values: Array, seconds: float) -> list[str]:
             units.append(f"t_unit={_time_unit(float(np.ptp(values[:, i])), seconds)}")
         elif "seq" not in names:
             names[i] = "seq"
-    acc = _gravity(values, names)
+    acc = _gravity_columns(values, names)
     if acc is not None:
         at, unit = acc
         names[at : at + 3] = ["ax", "ay", "az"]
@@ -103,7 +103,7 @@ def _names(values: Array, seconds: float) -> list[str]:
             if beside >= 0 and names[beside : beside + 3] == ["-"] * 3:
                 names[beside : beside + 3] = ["gx", "gy", "gz"]
                 rates = values[:, beside : beside + 3]
-                if float(np.median(np.abs(rates).max(axis=1))) > REST:
+                if float(np.median(np.abs(rates).max(axis=1))) > LARGEST_RATE_AT_REST:
                     units.append("gyr_unit=deg/s")
                 break
     mean = values.mean(axis=0)
@@ -122,7 +122,7 @@ def _time_unit(span: float, seconds: float) -> str:
     return UNITS_OF_TIME[min(max(thousands, 0), 3)]
 
 
-def _gravity(values: Array, names: list[str]) -> tuple[int, str] | None:
+def _gravity_columns(values: Array, names: list[str]) -> tuple[int, str] | None:
     """First of three neighbours whose norm is one gravity, and their unit.
 
     Triads stand behind one another: where zeros beside it make several norms alike, it

@@ -1,6 +1,6 @@
-"""Channels that hold each other's numbers: read, wired or written twice.
+"""Channels with identical values: one sensor was read, wired or written twice.
 
-Two sensors have noise of their own, so their samples are never alike throughout.
+The noise of two sensors differs, so their samples are never all equal.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 
-FEW = 100
-"""Samples that are compared before all are."""
+FIRST_COMPARED = 100
+"""Samples that are compared first."""
 
 
-def refuse_copies(block: Block) -> None:
-    """Refuse samples in which one output is another, or is it with the other sign.
+def refuse_duplicate_channels(block: Block) -> None:
+    """Refuse samples in which one channel of a triad equals another, up to the sign.
 
     Raises
     ------
@@ -40,8 +40,8 @@ def refuse_copies(block: Block) -> None:
 
 
 def _same(a: Array, b: Array) -> bool:
-    """Whether all are equal; nearly always the first few say that they are not."""
-    few = slice(0, FEW)
+    """Whether all values are equal; the first few are compared first, to save time."""
+    few = slice(0, FIRST_COMPARED)
     return all(np.array_equal(a[s], b[s], equal_nan=True) for s in (few, slice(None)))
 
 

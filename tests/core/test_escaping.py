@@ -7,7 +7,7 @@ import unicodedata
 
 import pytest
 
-from fieldcal.core.shown import ShownStream, one_line, shown
+from fieldcal.core.escaping import EscapingStream, escape_invisible, escape_line
 
 
 @pytest.mark.parametrize(
@@ -24,22 +24,22 @@ from fieldcal.core.shown import ShownStream, one_line, shown
     ],
 )
 def test_what_is_not_to_be_seen_has_its_number(text: str, seen: str) -> None:
-    assert shown(text) == seen
+    assert escape_invisible(text) == seen
 
 
 def test_nothing_that_a_terminal_obeys_is_left_of_any_character() -> None:
-    text = shown("".join(map(chr, range(0x3000))))
+    text = escape_invisible("".join(map(chr, range(0x3000))))
     assert {c for c in text if unicodedata.category(c)[0] == "C"} == {"\n", "\t"}
 
 
 def test_a_name_cannot_begin_a_line_or_a_column() -> None:
-    assert one_line("left\nGO\t5\r") == r"left\x0aGO\x095\x0d"
-    assert one_line("α = 45°") == "α = 45°"
+    assert escape_line("left\nGO\t5\r") == r"left\x0aGO\x095\x0d"
+    assert escape_line("α = 45°") == "α = 45°"
 
 
 def test_a_stream_shows_what_is_written_and_is_itself_otherwise() -> None:
     below = io.StringIO()
-    stream = ShownStream(below)
+    stream = EscapingStream(below)
     assert stream.write("\x07GO\n") == len("\\x07GO\n")
     stream.writelines(["\x1b", "a"])
     assert stream.getvalue() == "\\x07GO\n\\x1ba"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import NamedTuple
 
-from fieldcal.drivers.codec import LIKELY
+from fieldcal.drivers.codec import LEAST_SCORE
 from fieldcal.drivers.options import Options
 
 HEARTBEAT = "HEARTBEAT"
@@ -31,21 +31,21 @@ def detect_autopilot(data: bytes) -> DetectedAutopilot | None:
     """Tell what an autopilot says; None if it is none, or pymavlink is not there."""
     if not all(find_spec(module) for module in ("pymavlink", "fastcrc")):
         return None
-    from fieldcal.drivers.mavlink_samples import KINDS, Decoder
+    from fieldcal.drivers.mavlink_samples import MESSAGE_KINDS, MavlinkDecoder
 
-    def decoded(name: str) -> Decoder:
+    def decoded(name: str) -> MavlinkDecoder:
         # any unit will do to count them
-        decoder = Decoder(Options("probe", f"message={name}&acc_unit=m/s^2"))
+        decoder = MavlinkDecoder(Options("probe", f"message={name}&acc_unit=m/s^2"))
         decoder.feed(data, 0.0)
         return decoder
 
-    usual = next(iter(KINDS))
+    usual = next(iter(MESSAGE_KINDS))
     first = decoded(usual)
-    beats = any(message.get_type() == HEARTBEAT for message in first.aside)
+    beats = any(message.get_type() == HEARTBEAT for message in first.other_messages)
     health = first.health
     share = 1 - health.skipped / max(1, health.received)
-    if share <= LIKELY or not (beats or first.heard):
+    if share <= LEAST_SCORE or not (beats or first.messages_heard):
         return None
-    name = next((kind for kind in KINDS if kind in first.heard), "")
+    name = next((kind for kind in MESSAGE_KINDS if kind in first.messages_heard), "")
     query = f"message={name}" if name not in ("", usual) else ""
     return DetectedAutopilot(query, name, decoded(name).health.samples if name else 0)

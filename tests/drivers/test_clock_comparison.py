@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from fieldcal.drivers.driver import Health
-from fieldcal.drivers.skew import MOST, Skew
+from fieldcal.drivers.clock_comparison import MOST_STRETCHES, ClockComparison
+from fieldcal.drivers.driver import LinkHealth
 
 
-def heard(ppm: float, seed: int, seconds: float = 300.0) -> Skew:
+def heard(ppm: float, seed: int, seconds: float = 300.0) -> ClockComparison:
     """A device 1 h up, 100 Hz, arrivals delayed at random and now and then stuck."""
     rng = np.random.default_rng(seed)
     host = 1.7e9 + np.arange(0, seconds, 0.01)
     t = 3600 + (host - host[0]) * (1 + ppm * 1e-6)
     delay = 0.002 + rng.exponential(0.003, len(t))
     delay += 0.2 * (rng.random(len(t)) < 0.01)
-    skew = Skew(Health())
+    skew = ClockComparison(LinkHealth())
     for part in np.array_split(np.arange(len(t)), 70):
         skew.add(t[part], (host + delay)[part])
     return skew
@@ -22,7 +22,7 @@ def heard(ppm: float, seed: int, seconds: float = 300.0) -> Skew:
 def test_the_error_is_what_is_stated() -> None:
     pulls = []
     for seed in range(60):
-        line = heard(35.0, seed).line()
+        line = heard(35.0, seed).fit()
         assert line is not None
         assert line.sigma_ppm < 1.0
         pulls.append((line.fast_ppm - 35.0) / line.sigma_ppm)
@@ -31,7 +31,7 @@ def test_the_error_is_what_is_stated() -> None:
 
 
 def test_the_offset_is_that_of_the_least_delay() -> None:
-    line = heard(-120.0, 1).line()
+    line = heard(-120.0, 1).fit()
     assert line is not None
     device = 3600 + 150 * (1 - 120e-6)
     host = line.offset_s + device / (1 + line.fast_ppm * 1e-6)
@@ -39,25 +39,25 @@ def test_the_offset_is_that_of_the_least_delay() -> None:
 
 
 def test_memory_is_bounded_and_hours_are_fitted() -> None:
-    skew = Skew(Health())
+    skew = ClockComparison(LinkHealth())
     t = np.arange(0, 20_000, 0.5)
     skew.add(t, t * (1 + 20e-6) + 5)
-    assert len(skew._least) <= MOST
-    line = skew.line()
+    assert len(skew._least) <= MOST_STRETCHES
+    line = skew.fit()
     assert line is not None
     assert abs(line.fast_ppm + 20) < 1e-2
 
 
 def test_too_little_says_nothing() -> None:
-    skew = Skew(Health())
+    skew = ClockComparison(LinkHealth())
     skew.add(np.arange(5.0), np.full(5, np.nan))
     skew.add(np.arange(5.0), np.arange(5.0))
-    assert skew.line() is None
+    assert skew.fit() is None
 
 
 def test_the_line_is_shown_and_begins_anew_with_the_clock() -> None:
-    health = Health()
-    skew = Skew(health)
+    health = LinkHealth()
+    skew = ClockComparison(health)
     t = np.arange(0, 30, 0.01)
     skew.add(t, t + 100)
     assert health.clock is not None
@@ -69,7 +69,7 @@ def test_the_line_is_shown_and_begins_anew_with_the_clock() -> None:
 
 
 def test_times_fitted_to_the_arrivals_show_no_clock() -> None:
-    health = Health(clocked=False)
+    health = LinkHealth(clocked=False)
     t = np.arange(0, 30, 0.01)
-    Skew(health).add(t, t)
+    ClockComparison(health).add(t, t)
     assert health.clock is None

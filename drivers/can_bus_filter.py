@@ -1,8 +1,8 @@
-"""Frames of one bus, out of a log that may be of several.
+"""Selects the frames of one bus from a log that may contain several.
 
-The same identifiers on two buses are two IMUs: their frames must not become the samples
-of one. Which bus is meant is said by ``channel``; where only one of them carries such
-frames, that is the one.
+The same identifiers on two buses belong to two IMUs, and must not be mixed. Option
+``channel`` names the bus. Without it, the bus that carries frames of the map is used,
+if there is only one.
 """
 
 from __future__ import annotations
@@ -13,48 +13,48 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.drivers.can_frames import Frames, Packed
+from fieldcal.drivers.can_frames import FrameBuffer, Frames
 
-MOST = 0xFFFF
-"""Buses that are told apart."""
+MOST_BUSES = 0xFFFF
+"""Largest number of buses that are distinguished."""
 
 
-class _Numbers(dict[Any, int]):
-    """Number of each bus, in the order in which they turn up."""
+class _BusNumbers(dict[Any, int]):
+    """Number of each bus, in order of first appearance."""
 
     def __missing__(self, channel: Any) -> int:
-        self[channel] = number = min(len(self), MOST)
+        self[channel] = number = min(len(self), MOST_BUSES)
         return number
 
 
-class Buses:
-    """Packs the messages of a log, and keeps those of one bus.
+class BusFilter:
+    """Converts the messages of a log to rows, and selects those of one bus.
 
     Parameters
     ----------
-    place : of the log, for errors
-    identifiers : of the frames that make samples
-    channel : the bus that is meant, "" if there is only one
+    place : address of the log, for error texts
+    identifiers : those of the frames in the map
+    channel : the bus to select, "" if there is only one
 
     """
 
     def __init__(self, place: str, identifiers: Iterable[int], channel: str) -> None:
         self._place, self._channel = place, channel
         self._identifiers = sorted(identifiers)
-        self._numbers = _Numbers()
+        self._numbers = _BusNumbers()
         self._with_samples: set[int] = set()
 
-    def fill(self, packed: Packed, messages: Iterable[Any]) -> None:
-        """Pack messages, up to one that cannot be read."""
+    def fill(self, packed: FrameBuffer, messages: Iterable[Any]) -> None:
+        """Convert messages, up to one that cannot be read."""
         packed.fill(messages, self._numbers)
 
-    def frames(self, packed: Packed) -> Frames:
-        """Frames of the bus that is meant.
+    def frames(self, packed: FrameBuffer) -> Frames:
+        """Frames of the selected bus.
 
         Raises
         ------
         InputError
-            If frames that make samples come from several, and none is chosen.
+            If several buses carry frames of the map, and none is chosen.
 
         """
         frames = packed.frames
@@ -75,17 +75,17 @@ class Buses:
 
     @property
     def _names(self) -> list[str]:
-        """Buses with frames that make samples."""
+        """Buses that carry frames of the map."""
         there = {str(c) for c, n in self._numbers.items() if n in self._with_samples}
         return sorted(there)
 
     def finish(self) -> None:
-        """Check at the end of the log that the bus that was meant is in it.
+        """Check at the end of the log that the selected bus occurred.
 
         Raises
         ------
         InputError
-            If it has not one frame that makes samples.
+            If it has no frame of the map.
 
         """
         if self._channel and self._channel not in self._names:

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from fieldcal.session.installed import NOTHING, tells_an_offset
+from fieldcal.session.installed_calibration import NO_CORRECTION, subtracts_gyro_offset
 
 
 def told(**changed: Any) -> dict[str, Any]:
     """A mark of a device that was asked for its calibration."""
-    return {"event": "device", "installed": {"in_samples": NOTHING | changed}}
+    return {"event": "device", "installed": {"in_samples": NO_CORRECTION | changed}}
 
 
 AVERAGED = told(gyr_offset=[0.01, -0.02, 0.0])
@@ -33,9 +33,9 @@ AVERAGED = told(gyr_offset=[0.01, -0.02, 0.0])
 def test_an_offset_of_the_gyroscopes_is_told(
     marks: list[dict[str, Any]], tells: bool
 ) -> None:
-    assert tells_an_offset(marks) is tells
+    assert subtracts_gyro_offset(marks) is tells
 
 
 def test_what_it_does_not_subtract_is_no_offset() -> None:
     out = {"in_samples": AVERAGED["installed"]["in_samples"], "taken_out": True}
-    assert not tells_an_offset([{"event": "device", "installed": out}])
+    assert not subtracts_gyro_offset([{"event": "device", "installed": out}])

@@ -1,12 +1,12 @@
-"""Frames that belong to one sample, found among many at once.
+"""Finds the frames that belong to one sample.
 
-By key: frames belong together that carry the same number, unwrapped in the order of
-arrival. A sample is whole with its last frame, and given up once a later one is whole
-or so many newer ones have begun. By turns: a sample begins with one kind of frame, and
-has each of the others once before the next one begins.
+By key: frames with the same number belong together; it is unwrapped in the order of
+arrival. A sample is complete with its last frame. It is given up once a later one is
+complete, or a limited number of newer ones have begun. By sequence: a sample begins
+with one kind of frame, and has each of the others once before the next sample begins.
 
-What comes out does not depend on how the frames were cut into batches, and what waits
-is bounded.
+The result does not depend on how the frames were divided into batches, and the number
+of waiting frames is bounded.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 
 Index = NDArray[np.int64]
 
 
 @dataclass(slots=True)
-class CanHealth(Health):
-    """How a CAN link does.
+class CanLinkHealth(LinkHealth):
+    """Counts of a CAN link.
 
     Attributes
     ----------
     errors : error frames of the bus
     incomplete : samples of which a frame was missing
-    strange : frames that the map does not know
+    strange : frames that are not in the map
 
     """
 
@@ -42,13 +42,13 @@ class CanHealth(Health):
     strange: int = 0
 
 
-class FrameGroups(NamedTuple):
-    """Frames that belong to samples, in the order of their arrival.
+class DecodedFrames(NamedTuple):
+    """Decoded frames, in the order of their arrival.
 
     Attributes
     ----------
     part : (m,) number of the kind of frame
-    key : (m,) what frames of one sample share
+    key : (m,) number that the frames of one sample share
     t, arrived : (m,) s, stamp of the bus and arrival
     values : (m, k) SI, nan where the frame has none
 
@@ -60,26 +60,26 @@ class FrameGroups(NamedTuple):
     arrived: Array
     values: Array
 
-    def take(self, which: Any) -> FrameGroups:
-        """Return some of the rows."""
-        return FrameGroups(*(column[which] for column in self))
+    def take(self, which: Any) -> DecodedFrames:
+        """Return selected rows."""
+        return DecodedFrames(*(column[which] for column in self))
 
-    def then(self, more: FrameGroups) -> FrameGroups:
-        """Return these rows and those after them."""
+    def followed_by(self, more: DecodedFrames) -> DecodedFrames:
+        """Return these rows followed by `more`."""
         if not len(self.key):
             return more
         pairs = zip(self, more, strict=True)
-        return FrameGroups(*(np.concatenate(pair) for pair in pairs))
+        return DecodedFrames(*(np.concatenate(pair) for pair in pairs))
 
 
 class CompletedSamples(NamedTuple):
-    """Samples in the order in which they got whole.
+    """Samples in the order in which they were completed.
 
     Attributes
     ----------
-    key : (n,)
-    rows : (n, parts) the row of each part
-    last : (n,) the row that came last
+    key : (n,) of each sample
+    rows : (n, parts) row of each part
+    last : (n,) last row of each sample
 
     """
 
@@ -88,41 +88,41 @@ class CompletedSamples(NamedTuple):
     last: Index
 
     def take(self, which: Any) -> CompletedSamples:
-        """Return some of the samples."""
+        """Return selected samples."""
         return CompletedSamples(self.key[which], self.rows[which], self.last[which])
 
 
-class Groups(ABC):
-    """Puts frames together, and keeps those of samples that are not whole.
+class FrameGrouper(ABC):
+    """Groups frames into samples, and keeps those of incomplete samples.
 
     Parameters
     ----------
     parts : kinds of frames that a sample has
-    health : where incomplete samples are counted
+    health : counts incomplete samples
 
     """
 
-    def __init__(self, parts: int, health: CanHealth) -> None:
+    def __init__(self, parts: int, health: CanLinkHealth) -> None:
         self._parts, self._health = parts, health
-        self._rest: FrameGroups | None = None
+        self._rest: DecodedFrames | None = None
 
     @abstractmethod
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
-        """Return rows, some kept from before, and the samples that got whole."""
+    def feed(self, new: DecodedFrames) -> tuple[DecodedFrames, CompletedSamples]:
+        """Return rows, including kept ones, and the samples completed by them."""
 
     def reset(self) -> None:
-        """Forget what is not whole."""
+        """Forget incomplete samples."""
         self._rest = None
 
-    def _after_rest(self, new: FrameGroups) -> FrameGroups:
-        return self._rest.then(new) if self._rest else new
+    def _after_rest(self, new: DecodedFrames) -> DecodedFrames:
+        return self._rest.followed_by(new) if self._rest else new
 
-    def _whole(self, rows: FrameGroups) -> tuple[CompletedSamples, Index]:
-        """Find keys that every part has, and the first row of each part and key."""
+    def _whole(self, rows: DecodedFrames) -> tuple[CompletedSamples, Index]:
+        """Find samples with all parts, and the first row of each part and key."""
         return self._regular(rows) or self._any_order(rows)
 
-    def _regular(self, rows: FrameGroups) -> tuple[CompletedSamples, Index] | None:
-        """Find them where the parts come in turn, as they nearly always do."""
+    def _regular(self, rows: DecodedFrames) -> tuple[CompletedSamples, Index] | None:
+        """As `_whole`, if the parts come in a fixed order, as they nearly always do."""
         n, left = divmod(len(rows.key), self._parts)
         if not n:
             return None
@@ -144,7 +144,7 @@ class Groups(ABC):
         whole = CompletedSamples(key[:, 0], begin[:, None] + place, last)
         return whole, np.arange(len(rows.key))
 
-    def _any_order(self, rows: FrameGroups) -> tuple[CompletedSamples, Index]:
+    def _any_order(self, rows: DecodedFrames) -> tuple[CompletedSamples, Index]:
         keys, places = [], []
         for number in range(self._parts):
             of = np.flatnonzero(rows.part == number)
@@ -160,30 +160,30 @@ class Groups(ABC):
         return whole, np.sort(np.concatenate(places))
 
 
-class ByKey(Groups):
-    """Groups of the same key.
+class KeyGrouper(FrameGrouper):
+    """Groups frames by key.
 
     Parameters
     ----------
-    parts, health : as in `Groups`
-    span : what the key counts to before it wraps
-    deep : how far a key may lie behind the newest
+    parts, health : as in `FrameGrouper`
+    span : value at which the key wraps
+    deep : largest difference of a key from the newest
 
     """
 
-    def __init__(self, parts: int, health: CanHealth, span: int, deep: int) -> None:
+    def __init__(self, parts: int, health: CanLinkHealth, span: int, deep: int) -> None:
         super().__init__(parts, health)
         self._span, self._deep = span, deep
         self.reset()
 
     def reset(self) -> None:
-        """Forget what is not whole, and begin to unwrap anew."""
+        """Forget incomplete samples, and restart the unwrapping."""
         super().reset()
         self._raw, self._key = -1, 0
         self._newest = self._done = -1
 
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
-        """Put frames of the same key together."""
+    def feed(self, new: DecodedFrames) -> tuple[DecodedFrames, CompletedSamples]:
+        """Group frames with the same key."""
         rows = self._after_rest(new._replace(key=self._unwrapped(new.key)))
         whole, firsts = self._whole(rows)
         if not len(rows.key):
@@ -213,25 +213,25 @@ class ByKey(Groups):
         return key
 
 
-class ByTurns(Groups):
-    """Groups that follow one another.
+class SequenceGrouper(FrameGrouper):
+    """Groups frames by their sequence.
 
     Parameters
     ----------
-    parts, health : as in `Groups`
+    parts, health : as in `FrameGrouper`
     first : number of the part that begins a sample
     within : longest time that a sample may take on the bus, s
 
     """
 
     def __init__(
-        self, parts: int, health: CanHealth, first: int, within: float
+        self, parts: int, health: CanLinkHealth, first: int, within: float
     ) -> None:
         super().__init__(parts, health)
         self._first, self._within = first, within
 
-    def feed(self, new: FrameGroups) -> tuple[FrameGroups, CompletedSamples]:
-        """Put frames together that follow one another; a doubled one spoils them."""
+    def feed(self, new: DecodedFrames) -> tuple[DecodedFrames, CompletedSamples]:
+        """Group successive frames; a sample with a doubled frame is given up."""
         rows = self._after_rest(new)
         rows = rows._replace(key=np.cumsum(rows.part == self._first))
         begun = rows.key > 0
@@ -258,5 +258,5 @@ class ByTurns(Groups):
         return rows, whole
 
     def _orphans(self, part: Index) -> None:
-        """Count samples of which the first frame was missing."""
+        """Count samples whose first frame was missing."""
         self._health.incomplete += int(np.bincount(part, minlength=1).max())

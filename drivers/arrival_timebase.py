@@ -1,16 +1,17 @@
-"""The time of samples of a device that has no clock and no declared rate.
+"""Timebase of a device that has no clock and no declared rate, from arrivals.
 
-Sample k is sent at a + kT and arrives some time later; batches of samples arrive
-together, and only the last of a batch tells when. The arrivals z are regressed on the
+Sample k is sent at a + kT and arrives some time later. Samples arrive in batches, and
+only the last of a batch gives a time. The arrivals z are regressed on the
 sample number, forgetting slowly:
 
     x = (a + kT, T),  F(m) = [[1, m], [0, 1]],  z = x_1 + v                 (1)
     P <- F P F' e^(mT/M);  K = P h / (h'P h + R);  x <- F x + K (z - x_1)   (2)
 
 m samples since the last batch, h = (1, 0), R the variance of the delays, M the memory.
-What comes out is x_1, so even times late by the mean delay, not the jitter of the
-arrivals. Arrivals that all stay late for `LATE` seconds mean lost samples; before that
-they are taken for a delay. The samples of the first `LEARN` seconds only teach.
+The result is x_1: evenly spaced times, late by the mean delay, without the jitter of
+the arrivals. If all arrivals are late for `LATE_TIME` seconds, samples were lost;
+before that a delay is assumed. The samples of the first `LEARNING_TIME` seconds get no
+time.
 
 Source: recursive least squares with forgetting, Haykin, Adaptive Filter Theory, ch. 10.
 All in s. It holds for a device that runs in real time.
@@ -24,25 +25,25 @@ from math import exp, sqrt
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.driver import Health
+from fieldcal.drivers.driver import LinkHealth
 
-LEARN = 1.0
-"""Time that the first regression takes, s."""
+LEARNING_TIME = 1.0
+"""Duration of the first regression, s."""
 
-LEAST = 8
-"""Batches that the first regression takes."""
+LEAST_BATCHES = 8
+"""Least number of batches in the first regression."""
 
 LEAST_NOISE = 1e-8
 """Least variance of the delays, s^2."""
 
-LATE = 0.5
+LATE_TIME = 0.5
 """Time after which late arrivals mean lost samples, s."""
 
-MEMORY = 100.0
+MEMORY_TIME = 100.0
 """Memory of the regression, s."""
 
 
-class Arrivals:
+class ArrivalTimebase:
     """Times regressed on the arrivals, (1), (2).
 
     Parameters
@@ -51,7 +52,7 @@ class Arrivals:
 
     """
 
-    def __init__(self, health: Health) -> None:
+    def __init__(self, health: LinkHealth) -> None:
         self._health = health
         self._k = 0
         self._lessons: list[tuple[int, float]] = []
@@ -65,7 +66,7 @@ class Arrivals:
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,) on the host's clock, nan while the rate is learnt."""
         parts = []
-        for batch, z in _batches(steps, t_host):
+        for batch, z in _split_by_arrival(steps, t_host):
             if np.isnan(self._t) or np.isnan(z):
                 self._learn(int(batch.sum()), z)
                 parts.append(np.full(len(batch), np.nan))
@@ -73,8 +74,8 @@ class Arrivals:
                 parts.append(self._batch(batch, z))
         return np.concatenate(parts)
 
-    def broken(self) -> None:
-        """Take the next late arrival for a gap at once."""
+    def link_broken(self) -> None:
+        """Note that a gap precedes the next sample."""
         self._broken = True
 
     def _learn(self, m: int, z: float) -> None:
@@ -85,7 +86,7 @@ class Arrivals:
             return
         self._lessons.append((self._k, z))
         k, arrival = np.array(self._lessons).T
-        if len(k) < LEAST or arrival[-1] - arrival[0] < LEARN:
+        if len(k) < LEAST_BATCHES or arrival[-1] - arrival[0] < LEARNING_TIME:
             return
         design = np.column_stack([np.ones(len(k)), k - k[-1]])
         (x, period), square, *_ = np.linalg.lstsq(design, arrival)
@@ -106,16 +107,16 @@ class Arrivals:
             behind = np.cumsum(steps[::-1])[::-1] - steps
             t: Array = self._x - behind * self._period
         else:
-            # between the two estimates, so that a correction never turns time back
+            # between the two estimates, so that times never decrease
             ahead = max(self._x - self._t, 0.1 * m * self._period)
             t = self._t + ahead * np.cumsum(steps) / m
         self._t = float(t[-1])
         return t
 
     def _predict(self, m: float) -> None:
-        """Go on by m samples, (1), and forget, (2)."""
+        """Predict by m samples, (1), with forgetting, (2)."""
         a, b, c = self._cov
-        forget = exp(m * self._period / MEMORY)
+        forget = exp(m * self._period / MEMORY_TIME)
         self._x += m * self._period
         self._cov = (
             (a + 2 * m * b + m * m * c) * forget,
@@ -129,7 +130,7 @@ class Arrivals:
         spread = a + self._noise
         if error > max(6 * sqrt(spread), 1.5 * self._period):
             self._late.append((z, error))
-            if not self._broken and z - self._late[0][0] < LATE:
+            if not self._broken and z - self._late[0][0] < LATE_TIME:
                 return 0
             lost = round(min(e for _, e in self._late) / self._period)
             self._late, self._broken = [], False
@@ -143,8 +144,8 @@ class Arrivals:
         return 0
 
 
-def _batches(steps: Array, t_host: Array) -> Iterator[tuple[Array, float]]:
-    """Split where the arrival changes."""
+def _split_by_arrival(steps: Array, t_host: Array) -> Iterator[tuple[Array, float]]:
+    """Split into batches of equal arrival time."""
     cuts = np.flatnonzero(np.diff(t_host)) + 1
     for batch, host in zip(np.split(steps, cuts), np.split(t_host, cuts), strict=True):
         yield batch, float(host[-1])

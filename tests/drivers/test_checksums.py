@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from wires import crc16_xmodem
 from wires import fletcher as by_bytes
 
-from fieldcal.drivers import checks
-from fieldcal.drivers.checks import FEW, crc16, fletcher, sums
+from fieldcal.drivers import checksums
+from fieldcal.drivers.checksums import FEW_STRETCHES, byte_sums, crc16, fletcher_sums
 
 Stretches = tuple[bytes, list[tuple[int, int]]]
 
@@ -38,8 +38,8 @@ def test_sums(some: Stretches) -> None:
     data, pairs = some
     expected = [by_bytes(data[s:e]) for s, e in pairs]
     array = arrays(some)
-    assert sums(*array).tolist() == [sum(data[s:e]) % 256 for s, e in pairs]
-    first, second = fletcher(*array)
+    assert byte_sums(*array).tolist() == [sum(data[s:e]) % 256 for s, e in pairs]
+    first, second = fletcher_sums(*array)
     got = zip(first.tolist(), second.tolist(), strict=True)
     assert [bytes(pair) for pair in got] == expected
 
@@ -52,14 +52,14 @@ def test_crc_of_stretches_of_any_length(some: Stretches) -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 57, 600])
 def test_crc_of_many_stretches_of_one_length(size: int) -> None:
-    data = np.random.default_rng(size).bytes(FEW * size + size)
+    data = np.random.default_rng(size).bytes(FEW_STRETCHES * size + size)
     # half of them in a row, the others anywhere
     for step in (size, 1):
-        pairs = [(step * i, step * i + size) for i in range(FEW)]
+        pairs = [(step * i, step * i + size) for i in range(FEW_STRETCHES)]
         found = crc16(*arrays((data, pairs)))
         assert found.tolist() == [crc16_xmodem(data[s:e]) for s, e in pairs]
 
 
 def test_the_examples_hold() -> None:
-    failed, tried = doctest.testmod(checks, extraglobs={"np": np})
+    failed, tried = doctest.testmod(checksums, extraglobs={"np": np})
     assert not failed and tried

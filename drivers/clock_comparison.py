@@ -1,4 +1,4 @@
-"""How the device's clock runs against the host's.
+"""Compares the device's clock with the host's.
 
 A sample stamped t on the device arrives at h = a + r t + delay, the delay never below
 that of an idle line. So the least h - t of each stretch of time is free of queueing,
@@ -16,30 +16,30 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.drivers.driver import ClockLine, Health
+from fieldcal.drivers.driver import ClockFit, LinkHealth
 
-STRETCH = 1.0
-"""First length of a stretch, s of device time."""
+FIRST_STRETCH = 1.0
+"""Initial length of a stretch, s of device time."""
 
-MOST = 512
-"""Stretches kept; beyond that two and two are joined."""
+MOST_STRETCHES = 512
+"""Stretches kept; with more, pairs are joined."""
 
-LEAST = 10
-"""Stretches that a line takes."""
+LEAST_STRETCHES = 10
+"""Least number of stretches for a fit."""
 
 
-class Skew:
+class ClockComparison:
     """Collects device times and arrivals in bounded memory.
 
     Parameters
     ----------
-    health : told the line whenever a stretch is over; a clock begun anew has a new line
+    health : gets the fit after each stretch; the fit restarts with the device's clock
 
     """
 
-    def __init__(self, health: Health) -> None:
+    def __init__(self, health: LinkHealth) -> None:
         self._health, self._restarts = health, health.restarts
-        self._length = STRETCH
+        self._length = FIRST_STRETCH
         self._least: dict[int, tuple[float, float, int]] = {}
 
     def add(self, t: Array, t_host: Array) -> None:
@@ -61,10 +61,10 @@ class Skew:
             n = end - begin
             self._keep(int(stretch[begin]), float(t[i]), float(late[i]), n)
         begun = len(self._least) > before
-        while len(self._least) > MOST:
+        while len(self._least) > MOST_STRETCHES:
             self._coarsen()
         if begun:
-            self._health.clock = self.line()
+            self._health.clock = self.fit()
 
     def _keep(self, stretch: int, t: float, late: float, n: int) -> None:
         before_t, before, count = self._least.get(stretch, (t, late, 0))
@@ -77,12 +77,12 @@ class Skew:
         for t, late, n in points:
             self._keep(int(np.floor(t / self._length)), t, late, n)
 
-    def line(self) -> ClockLine | None:
+    def fit(self) -> ClockFit | None:
         """Fit the line, (1); None before there is enough."""
-        if len(self._least) < LEAST:
+        if len(self._least) < LEAST_STRETCHES:
             return None
         t, late, count = np.array(list(self._least.values())).T
-        # a stretch that has hardly begun has no least delay yet
+        # a stretch with few samples has no reliable least delay
         full = count >= np.median(count) / 2
         t, late = t[full], late[full]
         middle = t.mean()
@@ -92,7 +92,7 @@ class Skew:
         spread = float(np.sum((t - middle) ** 2))
         rate = 1.0 + float(slope)  # (1)
         sigma_rate = np.sqrt(variance / spread)
-        return ClockLine(
+        return ClockFit(
             fast_ppm=(1 / rate - 1) * 1e6,
             sigma_ppm=float(sigma_rate / rate**2) * 1e6,
             offset_s=float(level - slope * middle),

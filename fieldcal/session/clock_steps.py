@@ -1,9 +1,8 @@
-"""Steps of a device's clock, taken out of the times of a recording.
+"""Removes steps of a device's clock from the times of a recording.
 
-A device counts from its start until a receiver or a host tells it the time of day: then
-its times go on some fifty years later, and the samples as before. Such a step is not
-time that passed. It is taken out, and kept as a mark: the times behind it go on one
-period after the last before it.
+A device counts time from its start until a receiver or a host sets its clock. Its times
+then jump by some fifty years while the samples continue. Such a step is removed and
+kept as a mark: the first time after it follows the last one before it by one period.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from fieldcal.core.samples import Array, Block, concat
 Index = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
-STEP = 30 * 86400.0
-"""Step that is the clock's, s: nobody lets a device run a month between two samples."""
+LEAST_STEP = 30 * 86400.0
+"""Least difference of successive times that counts as a step of the clock, s."""
 
-UNIX = 1e9
-"""Times from here on are those since 1970: as time since a start, 31 years."""
+LEAST_UNIX_TIME = 1e9
+"""Least time that is taken for seconds since 1970, s."""
 
 
 class ClockStep(NamedTuple):
@@ -33,8 +32,8 @@ class ClockStep(NamedTuple):
 
     Attributes
     ----------
-    at_s : time of the first sample behind it, s, as the session has it
-    by_s : what the clock jumped by, s
+    at_s : corrected time of the first sample after the step, s
+    by_s : size of the step, s
 
     """
 
@@ -42,10 +41,10 @@ class ClockStep(NamedTuple):
     by_s: float
 
     def sentence(self) -> str:
-        """Say it for the operator."""
+        """Sentence for the operator."""
         text = f"at {self.at_s:.3f} s the device's clock jumps by {self.by_s:+.3f} s"
         then = self.at_s + self.by_s
-        if UNIX <= then < 4 * UNIX:
+        if LEAST_UNIX_TIME <= then < 4 * LEAST_UNIX_TIME:
             text += f", to {datetime.fromtimestamp(then, UTC):%Y-%m-%d %H:%M} UTC"
         return (
             f"{text}: no time that passed, so the times behind it go on from those"
@@ -53,11 +52,11 @@ class ClockStep(NamedTuple):
         )
 
 
-class SteadyClock:
-    """Takes steps out of times, block by block.
+class ClockStepRemover:
+    """Removes steps from times, block by block.
 
-    A step lasts: where one time alone is far from those around it, that row is wrong,
-    not the clock, and is left to whoever judges rows.
+    After a step all later times are shifted. A single time far from its neighbours is
+    an error of that row and is kept.
 
     Attributes
     ----------
@@ -72,30 +71,30 @@ class SteadyClock:
         self._held = concat([])
 
     def add(self, block: Block) -> Block:
-        """Return the rows of which the times are known, in order."""
+        """Return rows with corrected times; the last row may wait for the next call."""
         block = concat([self._held, block]) if len(self._held) else block
         known = np.flatnonzero(np.isfinite(block.t))
         times = block.t[known]
-        far = np.abs(np.diff(times, prepend=self._last)) > STEP
+        far = np.abs(np.diff(times, prepend=self._last)) > LEAST_STEP
         keep = len(block)
         if len(known) and far[-1]:
-            # whether it lasts, only the row behind it can tell
+            # only the next row shows whether this is a step or a single wrong time
             keep = int(known[-1])
             times, far = times[:-1], far[:-1]
         self._held = block[keep:]
         return self._steadied(block[:keep], known[: len(times)], times, far)
 
-    def rest(self) -> Block:
-        """Return the rows that were held back: the last, of which nothing follows."""
+    def flush(self) -> Block:
+        """Return the rows that were held back, at the end of the recording."""
         held, self._held = self._held, concat([])
-        far = len(held) and abs(held.t[0] - self._last) > STEP
+        far = len(held) and abs(held.t[0] - self._last) > LEAST_STEP
         if far and np.isfinite(self._period):
             self._step_to(float(held.t[0]))
         return replace(held, t=held.t + self._offset)
 
     def _steadied(self, block: Block, known: Index, times: Array, far: Flags) -> Block:
         steps = np.diff(times)
-        usual = steps[(steps > 0) & (steps <= STEP)]
+        usual = steps[(steps > 0) & (steps <= LEAST_STEP)]
         if len(usual):
             self._period = float(np.median(usual))
         offsets = np.full(len(block), self._offset)
@@ -105,28 +104,33 @@ class SteadyClock:
                 continue
             began = times[first]
             lasts = end > first + 1 and times[first + 1] > began
-            if abs(began - self._last) > STEP and lasts and np.isfinite(self._period):
+            if (
+                abs(began - self._last) > LEAST_STEP
+                and lasts
+                and np.isfinite(self._period)
+            ):
                 self._step_to(float(began))
                 offsets[known[first] :] = self._offset
-            if not abs(began - self._last) > STEP or lasts:
+            if not abs(began - self._last) > LEAST_STEP or lasts:
                 self._last = float(times[end - 1])
         return replace(block, t=block.t + offsets) if offsets.any() else block
 
     def _step_to(self, began: float) -> None:
-        """Let the times from `began` on go on behind the last."""
+        """Shift the times from `began` on to follow the last time."""
         at = self._last + self._offset + self._period
         self.steps.append(ClockStep(at, began - self._last))
         self._offset = at - began
 
 
-class SteadyTimes(NamedTuple):
-    """Times of a recording whose clock was set while it ran.
+class StepFreeRecording(NamedTuple):
+    """A recording from which the steps of the clock were removed.
 
     Attributes
     ----------
-    block : the samples, without the steps of the clock
-    steps : those found
-    pieces : first and last time as recorded between steps, and what was added, (k, 3) s
+    block : the samples, with corrected times
+    steps : the steps found
+    pieces : for each part between steps: first and last recorded time, and what was
+        added to them, (k, 3) s
 
     """
 
@@ -134,27 +138,28 @@ class SteadyTimes(NamedTuple):
     steps: list[ClockStep]
     pieces: Array
 
-    def moved(self, t: float) -> float:
-        """What became of an instant as recorded, s."""
+    def corrected(self, t: float) -> float:
+        """Corrected time of a recorded time, s."""
         first, last, added = self.pieces.T
         away = np.maximum(np.maximum(first - t, t - last), 0.0)
         return t + float(added[int(np.argmin(away))])
 
 
-def steadied(block: Block) -> SteadyTimes | None:
-    """Take the steps of the clock out of a whole recording; None if there are none.
+def remove_clock_steps(block: Block) -> StepFreeRecording | None:
+    """Remove the steps of the clock from a whole recording; None if there are none.
 
-    Where most times are so far apart, they are in another unit than seconds.
+    If most differences are that large, the times are in another unit than s, and None
+    is returned.
     """
-    far = np.abs(np.diff(block.t)) > STEP
+    far = np.abs(np.diff(block.t)) > LEAST_STEP
     if not 0 < far.sum() < len(far) / 2:
         return None
-    clock = SteadyClock()
-    whole = concat([clock.add(block), clock.rest()])
+    clock = ClockStepRemover()
+    whole = concat([clock.add(block), clock.flush()])
     if not clock.steps:
         return None
     added = whole.t - block.t
-    edges = np.flatnonzero(np.abs(np.diff(added)) > STEP / 2) + 1
+    edges = np.flatnonzero(np.abs(np.diff(added)) > LEAST_STEP / 2) + 1
     first, last = np.r_[0, edges], np.r_[edges, len(added)] - 1
     pieces = np.column_stack([block.t[first], block.t[last], added[first]])
-    return SteadyTimes(whole, clock.steps, pieces)
+    return StepFreeRecording(whole, clock.steps, pieces)

@@ -202,7 +202,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         return done
 
     with (
-        mock.patch("fieldcal.commands.write.opened", opened),
+        mock.patch("fieldcal.commands.write.open_parameters", opened),
         mock.patch.object(transaction, "write_whole", write_whole),
     ):
         yield

@@ -115,8 +115,8 @@ class WindowTaker:
         if pieces.gaps:
             where["without_s"] = pieces.gaps
         self._recorder.mark("window", position=hold.index, **where)
-        self._noise = pieces.noise and pieces.noise.without_wander
-        self._display.taken(hold, pieces)
+        self._noise = pieces.noise and pieces.noise.spectrum_shape_only
+        self._display.show_taken(hold, pieces)
         return average
 
     def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
@@ -136,7 +136,7 @@ class WindowTaker:
             looked = now
             if moved := pieces.disturbance:
                 raise moved
-            self._display.averaging(hold, pieces)
+            self._display.show_averaging(hold, pieces)
             early = not self._about.sways and pieces.reason_to_stop(hold.sigma)
             if full or early:
                 break

@@ -43,7 +43,13 @@ from numpy.typing import NDArray
 
 from fieldcal.core.chances import chi2_tail
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.windows.cells import CELL, CellRows, CellTable, SamplesBetween, hold_last
+from fieldcal.windows.cells import (
+    CELL,
+    CellRows,
+    CellTable,
+    SamplesBetween,
+    fill_with_previous,
+)
 from fieldcal.windows.dead_axis import LiveAxisRows
 from fieldcal.windows.quiet import ENOUGH, LEVELS, estimate_quiet_noise
 from fieldcal.windows.rests import PAUSES, SPAN, cell_index, cell_table
@@ -161,12 +167,12 @@ def _gaps_to_leave_out(
 
 def _untouched(before: CellTable, way: Block, after: CellTable) -> bool:
     """Whether samples agree with `before` up to some instant, and then with `after`."""
-    noise = hold_last(
+    noise = fill_with_previous(
         np.vstack([before.short_lag_variance, after.short_lag_variance])
     ).mean(axis=0)
     noise = noise + np.maximum(before.rounding, after.rounding) ** 2
-    one = before.origin + hold_last(before.means)[-CLOSE:].mean(axis=0)
-    other = after.origin + hold_last(after.means)[:CLOSE].mean(axis=0)
+    one = before.origin + fill_with_previous(before.means)[-CLOSE:].mean(axis=0)
+    other = after.origin + fill_with_previous(after.means)[:CLOSE].mean(axis=0)
     known = np.isfinite(one + other + noise) & (noise > 0)
     six = way.six[:, known]
     if not np.isfinite(six).all():
@@ -235,7 +241,10 @@ def _compare_means(
     (6,) each, SI. The means of each channel are over the time with the least
     variance (3).
     """
-    left, right = hold_last(before.means)[::-1], hold_last(after.means)
+    left, right = (
+        fill_with_previous(before.means)[::-1],
+        fill_with_previous(after.means),
+    )
     fewest = min(len(left), len(right))
     both = np.vstack([left[::-1], right])
     longer = LONGER * (len(both) > ENOUGH * 2 ** (LEVELS + LONGER - 1))

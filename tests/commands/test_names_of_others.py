@@ -19,7 +19,7 @@ from rich.table import Table
 from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
-from fieldcal.commands.console import ShownConsole
+from fieldcal.commands.console import EscapingConsole
 from fieldcal.core.shown import UNSEEN, one_line, shown
 from fieldcal.run import junit
 from fieldcal.session import description
@@ -59,7 +59,7 @@ def test_nothing_unseen_is_left_and_what_is_shown_stays(text: str) -> None:
 
 def test_a_console_draws_and_carries_out_nothing() -> None:
     out = io.StringIO()
-    console = ShownConsole(file=out, force_terminal=True, width=200)
+    console = EscapingConsole(file=out, force_terminal=True, width=200)
     console.print(EVIL, style="bold")
     table = Table("name")
     table.add_row(EVIL)

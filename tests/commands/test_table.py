@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from calibrations import calibration
 
-from fieldcal.commands.table import concealed_values, show
+from fieldcal.commands.table import concealed_values, show_calibration
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_an_estimate_that_nothing_checks_is_not_called_good(
 ) -> None:
     found = calibration(np.random.default_rng(1), 0.0)
     out = io.StringIO()
-    show(replace(found, chi2=chi2, dof=dof, good=good), out=out)
+    show_calibration(replace(found, chi2=chi2, dof=dof, good=good), out=out)
     (verdict,) = [line for line in out.getvalue().splitlines() if "verdict" in line]
     assert says in verdict
 

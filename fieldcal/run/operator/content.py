@@ -1,4 +1,4 @@
-"""What every display shows of a run, console and page alike."""
+"""Content of the displays of a run, the same on console and page."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class RunContent:
 
     @property
     def phase(self) -> str:
-        """What the engine waits for; empty before there is a view."""
+        """Phase of the engine; empty before the first view."""
         return self.view.phase if self.view else ""
 
     @property
@@ -91,7 +91,7 @@ class RunContent:
 
     @property
     def instruction(self) -> Instruction:
-        """The one thing to do now."""
+        """The present instruction."""
         number = position_label(self.hold, len(self.positions), self.most)
         return Instruction.of(self.hold, self.view, number)
 

@@ -1,4 +1,4 @@
-"""No operator: progress as JSON lines on standard error, the mover turns the device.
+"""Run without a person: a mover turns the device, standard error gets JSON lines.
 
 Each line has its event and the host's time; the last one is "end", with the exit code.
 """
@@ -22,7 +22,7 @@ EVERY = 5.0
 
 
 class ScriptOperator:
-    """Turns the device by `mover` and reports.
+    """Operator that turns the device by a mover and reports as JSON lines.
 
     Parameters
     ----------

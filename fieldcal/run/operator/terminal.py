@@ -177,8 +177,8 @@ class ConsoleOperator:
             self._live.update(self.screen(), refresh=True)
 
     def screen(self) -> RenderableType:
-        """What is shown now."""
-        return self._screen.drawn()
+        """The present drawing."""
+        return self._screen.layout()
 
     def _has_keys(self) -> bool:
         return self._keyboard is not None and self._keyboard.has_keys

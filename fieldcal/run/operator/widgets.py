@@ -1,4 +1,4 @@
-"""What the operator's screen is made of: inclinometer, meters, list, link.
+"""Parts of the operator's screen: inclinometer, meters, list, link.
 
 All of it reads without colour, and fits into 76 columns.
 """
@@ -33,8 +33,8 @@ UNSEEN = "by its mark, gravity does not show it"
 """Notice for a third angle: accelerometers at rest show two only."""
 
 CRYSTAL = 1000.0
-"""± of a clock that says nothing, ppm: any crystal is better. So it is for a while once
-the computer was asleep, for samples that waited meanwhile came late."""
+"""Uncertainty above which a clock error is not shown, ppm, since any crystal is better.
+It is that large for a while after the computer slept, since samples arrived late."""
 
 NEAR = 1.0
 """Least error of an angle, deg, for which a turn is requested."""
@@ -62,7 +62,7 @@ def angles(view: OperatorView) -> list[tuple[str, Text]]:
 
 
 def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
-    """Where it is (o), where it should be (the middle), and which way to turn.
+    """Scale with the angle (o), the wanted angle (middle) and the direction to turn.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def sigma_at_end(view: OperatorView) -> str:
 
 
 def gauges(view: OperatorView) -> Table:
-    """Everything that is measured now."""
+    """All present measurements."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(width=9)
     grid.add_column()
@@ -146,7 +146,7 @@ def gauges(view: OperatorView) -> Table:
 
 
 def progress(taken: Mapping[int, float], now: int, number: int) -> str:
-    """Which positions are taken and which are left, in one line.
+    """Line with the positions that are taken and that are left.
 
     >>> progress({0: 1e-3, 1: 1e-3}, 2, 5)
     'taken 1 2 · now 3 · left 4 5'
@@ -159,7 +159,7 @@ def progress(taken: Mapping[int, float], now: int, number: int) -> str:
 
 
 def short_gauges(view: OperatorView) -> list[str]:
-    """What is measured now in a few short lines, for a small screen."""
+    """All present measurements in a few short lines, for a small screen."""
     if view.phase in ("averaging", "taken"):
         left = max(0.0, view.hold.seconds - view.elapsed)
         reached = f", ± {known}" if (known := sigma(view)) else ""

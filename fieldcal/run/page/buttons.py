@@ -1,4 +1,4 @@
-"""Who may press the buttons of the page: one client at a time; all may watch."""
+"""Buttons of the page. One client at a time may press them; all may watch."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ OFFERED = frozenset(get_args(Wish)) - {"wait"}
 
 
 class Buttons:
-    """The buttons, and who holds them.
+    """The buttons, and the client that holds them.
 
     Parameters
     ----------
-    clock : s
+    clock : returns the time, s
 
     """
 
@@ -47,7 +47,7 @@ class Buttons:
         return not self._holder or self._clock() - self._heard > GONE
 
     def take(self, client: str, over: bool = False) -> bool:
-        """Take the buttons; from somebody else only if they are asked for `over`."""
+        """Take the buttons; from another client only if `over`."""
         with self._lock:
             if client != self._holder and not (over or self._free()):
                 return False

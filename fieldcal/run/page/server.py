@@ -43,13 +43,13 @@ class PageServer:
     Parameters
     ----------
     host, port : where to listen; port 0 is any that is free
-    board : what there is to see, once there is a run
-    buttons : what is pressed
+    board : content of the page, replaced when the run begins
+    buttons : of the page
 
     Raises
     ------
     InputError
-        If nothing can listen there.
+        If it cannot listen there.
 
     """
 
@@ -61,7 +61,7 @@ class PageServer:
         name = f"[{host}]" if ":" in host else host
         self.access = Access((f"{name}:{port}",))
         config = uvicorn.Config(
-            Gate(_app(self), self.access), log_config=None, access_log=False,
+            Gate(_make_app(self), self.access), log_config=None, access_log=False,
             lifespan="off", timeout_graceful_shutdown=1, server_header=False,
             limit_concurrency=64,
         )  # fmt: skip
@@ -148,7 +148,7 @@ def local_address() -> str:
             return "127.0.0.1"
 
 
-def _app(server: PageServer) -> Starlette:
+def _make_app(server: PageServer) -> Starlette:
     async def page(_: Request) -> Response:
         return FileResponse(FILES / "page.html", media_type="text/html")
 
@@ -165,7 +165,7 @@ def _app(server: PageServer) -> Starlette:
         return StreamingResponse(server.views(client), media_type="text/event-stream")
 
     async def take(request: Request) -> Response:
-        given = await _object(request)
+        given = await _request_object(request)
         if given is None or type(given.get("over", False)) is not bool:
             return JSONResponse({"error": "client and over are wanted"}, 400)
         if not server.buttons.take(given["client"], given.get("over", False)):
@@ -173,7 +173,7 @@ def _app(server: PageServer) -> Starlette:
         return JSONResponse({})
 
     async def wish(request: Request) -> Response:
-        given = await _object(request)
+        given = await _request_object(request)
         wished = None if given is None else given.get("wish")
         if given is None or not isinstance(wished, str) or wished not in OFFERED:
             return JSONResponse({"error": "client and wish are wanted"}, 400)
@@ -192,8 +192,8 @@ def _app(server: PageServer) -> Starlette:
     return Starlette(routes=routes)
 
 
-async def _object(request: Request) -> dict[str, Any] | None:
-    """What a request wants, with the client's name; None where it is none."""
+async def _request_object(request: Request) -> dict[str, Any] | None:
+    """JSON object of a request, with the client's name; None if it is invalid."""
     try:
         given = json.loads(await request.body())
     except (ValueError, RecursionError):

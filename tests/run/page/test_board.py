@@ -13,7 +13,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.buttons import GONE, Buttons
-from fieldcal.run.page.watched import WatchedOperator
+from fieldcal.run.page.page_operator import PageOperator
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -185,7 +185,7 @@ class Console:
 
 def test_the_console_is_shown_everything_and_both_may_wish() -> None:
     console, board, buttons = Console(), Board("fieldcal", FIVE), Buttons()
-    both = WatchedOperator(console, board, buttons)
+    both = PageOperator(console, board, buttons)
     buttons.take("a")
     buttons.press("a", "stop")
     now, reason = view("turning"), WaitReason(WaitState.NO_SAMPLES, "no samples")

@@ -143,10 +143,10 @@ class VirtualImu:
         """
         __tracebackhide__ = True
         from fieldcal.calibration.names import group_of
-        from fieldcal.commands.table import concealed_values
+        from fieldcal.commands.table import true_values
 
         parameters = _parameters_with_sigma(found)
-        truth = concealed_values(self.truth)
+        truth = true_values(self.truth)
         wrong, compared = [], 0
         for name, (value, sigma) in parameters.items():
             limit = (within or {}).get(group_of(name), float("inf"))

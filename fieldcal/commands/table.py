@@ -48,7 +48,7 @@ def show_calibration(
     for column in columns:
         right = column in ("value", "± 1σ", "concealed", "off by")
         table.add_column(column, justify="right" if right else "left", no_wrap=True)
-    concealed = concealed_values(truth or {})
+    true_by_name = true_values(truth or {})
     before = ""
     rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
@@ -56,8 +56,8 @@ def show_calibration(
         if before and group != before:
             table.add_section()
         cells = [parameter_title(name), *format_with_sigma(value, sigma), unit]
-        if name in concealed:
-            true = concealed[name]
+        if name in true_by_name:
+            true = true_by_name[name]
             cells += [
                 format_with_sigma(true, sigma)[0],
                 f"{(value - true) / sigma:+.1f} σ",
@@ -97,7 +97,7 @@ def print_sentence(console: Console, mark: str, text: str) -> None:
     console.print(grid)
 
 
-def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
+def true_values(truth: Mapping[str, Any]) -> dict[str, float]:
     """True values of a virtual device, by the full names of a calibration."""
     flat = {
         f"{group}.{axis}": float(value)

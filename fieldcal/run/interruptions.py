@@ -52,14 +52,14 @@ def kept_notice(
     return f"{said}hold still, it goes on by itself"
 
 
-OFTEN = 3
+REMEDY_FROM = 3
 """Number of disturbed windows in a position from which the notice states a remedy."""
 
 
 def restart_notice(moved: Moved, times: int) -> str:
     """Sentence about a window that was disturbed for the n-th time, n = `times`."""
     said = f"{moved}; hold still, the window starts again"
-    if times < OFTEN:
+    if times < REMEDY_FROM:
         return said
     return (
         f"{said}, disturbed {times} times now: fix the device better, or shelter it"
@@ -70,7 +70,7 @@ def restart_notice(moved: Moved, times: int) -> str:
 GAP = 0.5
 """Longest time without samples that a window may have, s."""
 
-THIN = 2
+MOST_LOSS_RESTARTS = 2
 """Most windows of a position that begin again because of missing samples. A link that
 always loses some would lose them in the next window as well."""
 

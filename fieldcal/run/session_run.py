@@ -50,7 +50,7 @@ from fieldcal.windows import Average, average
 MOST_REMEDIES = 3
 """Most remedies of a NO-GO in one run."""
 
-RETRY = 0.5
+RETRY_S = 0.5
 """Time between two attempts to open the device again, s."""
 
 
@@ -215,7 +215,7 @@ class SessionRun:
                 return driver
             if self._operator.wish() == "stop":
                 raise Stopped("stopped by the operator")
-            sleep(RETRY)
+            sleep(RETRY_S)
         raise lost
 
 

@@ -9,7 +9,7 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold
 from fieldcal.run.incoming import IncomingSamples
 from fieldcal.run.interruptions import (
-    THIN,
+    MOST_LOSS_RESTARTS,
     DeviceChanged,
     SamplesLost,
     WindowDisturbed,
@@ -121,7 +121,11 @@ class WindowTaker:
 
     def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
         """Take samples until a window is long enough; False to begin it again."""
-        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
+        share = (
+            self._lost_share
+            if self._thin.get(hold.index, 0) < MOST_LOSS_RESTARTS
+            else np.inf
+        )
         watch = WindowWatch(self._driver, hold.seconds, share)
         looked = -np.inf
         for block in self._incoming.pieces:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from calibrations import calibration
 
-from fieldcal.commands.table import concealed_values, show_calibration
+from fieldcal.commands.table import show_calibration, true_values
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_words_of_an_effect_are_no_values() -> None:
             "cross_coupling": {"k12": 0.003},
         },
     }
-    assert concealed_values(truth) == {
+    assert true_values(truth) == {
         "acc_bias.x": 0.1, "acc_bias.y": 0.2, "acc_bias.z": 0.3,
         "decode_fault.full_scale": 0.0, "cross_coupling.k12": 0.003,
     }  # fmt: skip

@@ -13,7 +13,7 @@ from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import reminder
 
-TOLD = 2
+SENTENCES_SHOWN = 2
 """Number of sentences that are shown."""
 
 
@@ -57,7 +57,7 @@ class RunContent:
 
     def sentence_told(self, text: str) -> None:
         """A sentence was told that must not be missed."""
-        self._told = [*(t for t in self._told if t != text), text][-TOLD:]
+        self._told = [*(t for t in self._told if t != text), text][-SENTENCES_SHOWN:]
 
     def sentence_withdrawn(self, text: str) -> None:
         """A sentence no longer applies."""

@@ -17,7 +17,7 @@ from fieldcal.run.movers import Mover
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 
-EVERY = 5.0
+PROGRESS_EVERY_S = 5.0
 """Time between two lines of progress, s of device time."""
 
 
@@ -55,7 +55,7 @@ class ScriptOperator:
 
     def show(self, view: OperatorView) -> None:
         """Report progress: each change of phase, and now and then within one."""
-        step = int(view.elapsed // EVERY)
+        step = int(view.elapsed // PROGRESS_EVERY_S)
         now = (view.phase, view.hold.index, step, view.reason.state)
         if now == self._shown:
             return

@@ -14,16 +14,16 @@ from rich.text import Text
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.position_check import round_to_tenth
 
-METER = 20
+METER_WIDTH = 20
 """Width of the stillness meter, characters."""
 
-BAR = 30
+BAR_WIDTH = 30
 """Width of the bar that fills while averaging, characters."""
 
 TICKS = (0.0, 2.0, 5.0, 15.0, 45.0, 180.0)
 """Angle of each second character of half the inclinometer, deg; a fixed scale."""
 
-HALF = 2 * (len(TICKS) - 1)
+HALF_WIDTH = 2 * (len(TICKS) - 1)
 """Characters to either side of the middle, which is the wanted angle."""
 
 RULER = "  -45  -5  0   5  45  "
@@ -73,9 +73,11 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     """
     off = round_to_tenth(wanted - seen)
     away = 2 * float(np.interp(abs(off), TICKS, range(len(TICKS))))
-    place = HALF - int(np.copysign(np.ceil(away - 1e-9), off)) if off else HALF
-    cells = ["·"] * (2 * HALF + 1)
-    cells[HALF], cells[place] = "|", "o"
+    place = (
+        HALF_WIDTH - int(np.copysign(np.ceil(away - 1e-9), off)) if off else HALF_WIDTH
+    )
+    cells = ["·"] * (2 * HALF_WIDTH + 1)
+    cells[HALF_WIDTH], cells[place] = "|", "o"
     within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
     there = ok or abs(off) < NEAR
     way = "→" if off > 0 else "←"
@@ -89,9 +91,9 @@ def stillness(level: float) -> Text:
     """Meter of the motion, relative to the allowed motion."""
     if not np.isfinite(level):
         return Text("listening to the device's noise")
-    filled = int(np.clip(round(level * METER / 2), 0, METER))
-    bar = f"{'#' * filled:·<{METER}}"
-    limit = METER // 2
+    filled = int(np.clip(round(level * METER_WIDTH / 2), 0, METER_WIDTH))
+    bar = f"{'#' * filled:·<{METER_WIDTH}}"
+    limit = METER_WIDTH // 2
     word, style = ("still", "green") if level < 1 else ("MOVING", "bold yellow")
     return Text.assemble(f"[{bar[:limit]}|{bar[limit:]}] ", (word, style))
 
@@ -133,7 +135,7 @@ def gauges(view: OperatorView) -> Table:
     else:
         seconds = view.hold.seconds
         share = min(1.0, view.elapsed / seconds)
-        bar = Text(f"[{'#' * round(share * BAR):·<{BAR}}] {share:4.0%}")
+        bar = Text(f"[{'#' * round(share * BAR_WIDTH):·<{BAR_WIDTH}}] {share:4.0%}")
         left = max(0.0, seconds - view.elapsed)
         grid.add_row("averaging", bar)
         grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")

@@ -10,7 +10,7 @@ from typing import get_args
 
 from fieldcal.run.operator.protocol import Wish
 
-GONE = 15.0
+GONE_AFTER_S = 15.0
 """Time without contact after which a client loses the buttons, s."""
 
 OFFERED = frozenset(get_args(Wish)) - {"wait"}
@@ -44,7 +44,7 @@ class Buttons:
             return self._free()
 
     def _free(self) -> bool:
-        return not self._holder or self._clock() - self._heard > GONE
+        return not self._holder or self._clock() - self._heard > GONE_AFTER_S
 
     def take(self, client: str, over: bool = False) -> bool:
         """Take the buttons; from another client only if `over`."""

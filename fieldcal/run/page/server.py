@@ -24,16 +24,16 @@ from fieldcal.run.page.buttons import OFFERED, Buttons
 
 FILES = Path(__file__).parent / "files"
 
-EVERY = 0.125
+VIEW_EVERY_S = 0.125
 """Shortest time between two views that are sent, s."""
 
-ALIVE = 2.0
+MESSAGE_EVERY_S = 2.0
 """Longest time between two messages to a client, s."""
 
-LINGER = 3.0
+LINGER_S = 3.0
 """Time that the last state is offered to clients that have not seen it, s."""
 
-NAME = 64
+LONGEST_NAME = 64
 """Longest name of a client."""
 
 
@@ -85,11 +85,11 @@ class PageServer:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        until = monotonic() + LINGER
+        until = monotonic() + LINGER_S
         while monotonic() < until and any(
             seen < self.board.version for seen in tuple(self._seen.values())
         ):
-            sleep(EVERY)
+            sleep(VIEW_EVERY_S)
         self._server.should_exit = True
         self._thread.join(timeout=5.0)
         self._socket.close()
@@ -104,14 +104,14 @@ class PageServer:
 
     async def views(self, client: str) -> AsyncIterator[str]:
         """Every change, as events of server-sent events."""
-        before, sent = "", -ALIVE
+        before, sent = "", -MESSAGE_EVERY_S
         try:
             while not self._server.should_exit:
                 now = self.content_for(client)
-                if now != before or monotonic() - sent > ALIVE:
+                if now != before or monotonic() - sent > MESSAGE_EVERY_S:
                     before, sent = now, monotonic()
                     yield f"data: {now}\n\n"
-                await asyncio.sleep(EVERY)
+                await asyncio.sleep(VIEW_EVERY_S)
         finally:
             self._seen.pop(client, None)
 
@@ -202,4 +202,6 @@ async def _request_object(request: Request) -> dict[str, Any] | None:
 
 
 def _is_name(client: Any) -> bool:
-    return isinstance(client, str) and 0 < len(client) <= NAME and client.isalnum()
+    return (
+        isinstance(client, str) and 0 < len(client) <= LONGEST_NAME and client.isalnum()
+    )

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.commands.table import concealed_values
+from fieldcal.commands.table import true_values
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.marks import read_marks
@@ -105,7 +105,7 @@ class Bench:
         """How far the result is off, in its own standard uncertainties."""
         document = json.loads((session / "result.json").read_text())
         found = Calibration.from_json(document)
-        truth = concealed_values(self.device.truth)
+        truth = true_values(self.device.truth)
         return [
             (found.value(name) - truth[name]) / found.uncertainty(name)
             for name in found.names

@@ -206,7 +206,7 @@ def reached(vehicle: Vehicle) -> Iterator[None]:
         return done
 
     with (
-        mock.patch("fieldcal.commands.write.opened", opened),
+        mock.patch("fieldcal.commands.write.open_parameters", opened),
         mock.patch.object(transaction, "write_atomically", write_atomically),
     ):
         yield

@@ -1,9 +1,9 @@
-"""The command line: one command a module in `commands`, loaded when it is called.
+"""The command line. Each command is a module of `commands`, imported when it is called.
 
 Exit codes: 0 good, 1 the calibration or the verdict is bad, 2 wrong usage or input,
-3 the device failed, 70 fieldcal itself broke, 130 interrupted. What a command has to
-say goes to standard output, with --json exactly one JSON object, which has "error" and
-"exit_code" where the command failed; messages go to standard error.
+3 the device failed, 70 internal error of fieldcal, 130 interrupted. Results go to
+standard output, with --json as exactly one JSON object, which has "error" and
+"exit_code" if the command failed. Messages go to standard error.
 """
 
 from __future__ import annotations
@@ -18,16 +18,21 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from typing import Protocol, TextIO, cast
 
-from fieldcal.commands import found
-from fieldcal.commands.help import BROKEN, EXIT_CODES, INTERRUPTED, CommandParser
-from fieldcal.commands.spelling import spell_out
+from fieldcal.commands import command_modules
+from fieldcal.commands.help import (
+    EXIT_CODES,
+    EXIT_INTERNAL_ERROR,
+    EXIT_INTERRUPTED,
+    CommandParser,
+)
+from fieldcal.commands.spelling import use_spellings
 
-COMMANDS = found()
-"""Name, what it does, module."""
+COMMANDS = command_modules()
+"""Description and module of each command, by name."""
 
 
 class CommandModule(Protocol):
-    """What a module of `commands` offers."""
+    """Interface of a command module in `commands`."""
 
     EXAMPLE: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -38,7 +43,7 @@ def _load(name: str) -> CommandModule:
     return cast(CommandModule, import_module(f"fieldcal.commands.{COMMANDS[name][1]}"))
 
 
-def _top(version: str) -> argparse.ArgumentParser:
+def _top_parser(version: str) -> argparse.ArgumentParser:
     width = max(map(len, COMMANDS))
     listed = "\n".join(f"  {n:{width}}  {what}" for n, (what, _) in COMMANDS.items())
     parser = argparse.ArgumentParser(
@@ -69,14 +74,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     # small matrices by the thousand: threads would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    spell_out()
-    with _nothing_carried_out():
-        return _named(argv)
+    use_spellings()
+    with _escaped_output():
+        return _run_named_command(argv)
 
 
 @contextlib.contextmanager
-def _nothing_carried_out() -> Iterator[None]:
-    """Show what is in the text of others on both streams instead of doing it."""
+def _escaped_output() -> Iterator[None]:
+    """Make both streams show control characters in foreign text, not send them."""
     from fieldcal.core.escaping import EscapingStream
 
     before = sys.stdout, sys.stderr
@@ -88,25 +93,25 @@ def _nothing_carried_out() -> Iterator[None]:
         sys.stdout, sys.stderr = before
 
 
-def _named(argv: Sequence[str] | None) -> int:
-    """Run the command that the arguments name."""
+def _run_named_command(argv: Sequence[str] | None) -> int:
+    """Run the command whose name is the first argument."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] not in COMMANDS:
         from fieldcal.core.version import __version__
 
-        _top(__version__).parse_args(arguments or ["--help"])
-    return _guarded(arguments[0], arguments[1:])
+        _top_parser(__version__).parse_args(arguments or ["--help"])
+    return _run_guarded(arguments[0], arguments[1:])
 
 
-def _guarded(name: str, arguments: list[str]) -> int:
-    """Turn errors into one sentence and an exit code."""
+def _run_guarded(name: str, arguments: list[str]) -> int:
+    """Run a command; an error becomes one sentence and an exit code."""
     from fieldcal.core.errors import FieldcalError
     from fieldcal.core.escaping import escape_line
 
     command, printed = _load(name), False
     try:
         code = command.run(_command_parser(name, command).parse_args(arguments))
-        return _flushed(code)
+        return _flush_output(code)
     except FieldcalError as error:
         said, code, printed = (
             escape_line(str(error)),
@@ -114,12 +119,12 @@ def _guarded(name: str, arguments: list[str]) -> int:
             error.printed,
         )
     except KeyboardInterrupt:
-        said, code = "interrupted", INTERRUPTED
+        said, code = "interrupted", EXIT_INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return 0
     except Exception as error:  # the operator gets a sentence whatever it is
-        said, code = _broken(name, arguments, error), BROKEN
+        said, code = _write_crash_file(name, arguments, error), EXIT_INTERNAL_ERROR
     sys.stderr.write(f"fieldcal {name}: {said}\n")
     if "--json" in arguments and not printed:
         failed = {"error": said, "exit_code": code}
@@ -127,19 +132,19 @@ def _guarded(name: str, arguments: list[str]) -> int:
     return code
 
 
-def _flushed(code: int) -> int:
-    """An exit code, once all is printed or its reader has gone."""
+def _flush_output(code: int) -> int:
+    """Flush standard output, which may have no reader any more; return the code."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        from fieldcal.commands.console import unread
+        from fieldcal.commands.console import discard_output
 
-        unread()
+        discard_output()
     return code
 
 
-def _broken(name: str, arguments: list[str], error: Exception) -> str:
-    """Write down an error that nobody foresaw, and say where."""
+def _write_crash_file(name: str, arguments: list[str], error: Exception) -> str:
+    """Write the traceback of an unexpected error to a file; return a sentence on it."""
     import platform
     import tempfile
     import traceback

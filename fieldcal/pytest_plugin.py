@@ -1,4 +1,4 @@
-"""Fixtures for tests of your own procedure or driver: a virtual device on a link.
+"""Pytest fixtures for tests of your own procedure, driver or simulator.
 
     def test_ours(virtual_imu):
         device = virtual_imu("serial", effects=["base_tilt:about_x_deg=1"])
@@ -7,8 +7,8 @@
     def test_our_simulator(simulator_matches):
         simulator_matches("recordings/bench-7", "build/simulated.csv", acc_bias=0.02)
 
-pytest finds them by themselves once fieldcal is installed. Nothing else is loaded until
-a test asks for a device.
+pytest finds the fixtures once fieldcal is installed. Other modules are imported only
+when a test uses a fixture.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SIGMAS = 4.5
 """Standard uncertainties within which a value must agree with the truth."""
 
 LATITUDE = 50.45
-"""Where a device stands unless it is told, deg."""
+"""Latitude of a device unless an option states it, deg."""
 
 LINKS: dict[str, tuple[list[str], str, str]] = {
     "serial": (["--serial", "{format}"], "serial:{port}?format={query}", "max"),
@@ -44,15 +44,15 @@ LINKS: dict[str, tuple[list[str], str, str]] = {
         "20",
     ),
 }
-"""Options of ``fieldcal sim``, address to open and speed unless given, by link."""
+"""Options of ``fieldcal sim``, address to open and default speed, by link."""
 
 
 class VirtualImu:
-    """A virtual device that runs, and what it conceals.
+    """A running virtual device, with access to its true parameters.
 
     Attributes
     ----------
-    url : what a driver opens
+    url : address that a driver opens
     port : pseudo-terminal, or endpoint
     control : path of the control socket
 
@@ -68,30 +68,30 @@ class VirtualImu:
 
     @property
     def truth(self) -> Mapping[str, Any]:
-        """What it conceals, as ``fieldcal sim --truth`` writes it."""
+        """True parameters, as ``fieldcal sim --truth`` writes them."""
         return self._device.truth
 
     def open(self) -> Driver:
-        """Open it with the driver of its link."""
+        """Open the device with the driver of its link."""
         from fieldcal.drivers.driver import open_driver
 
         return open_driver(self.url)
 
     def turn(self, alpha_deg: float, beta_deg: float) -> float:
-        """Turn it; returns the device time at which it is there, s."""
+        """Turn the device; returns the device time of its arrival, s."""
         reply = self.ask(turn={"alpha_deg": alpha_deg, "beta_deg": beta_deg})
         return float(reply["until_s"])
 
     def bump(self, **how: float) -> None:
-        """Knock it: ``push`` m/s^2, ``tilt_deg``, ``seconds``."""
+        """Disturb the device: ``push`` m/s^2, ``tilt_deg``, ``seconds``."""
         self.ask(bump=how)
 
     def fault(self, **what: float) -> None:
-        """Spoil its link: ``silence_s``, ``hangup_s``, ``flip_bits`` and others."""
+        """Disturb the link: ``silence_s``, ``hangup_s``, ``flip_bits`` and others."""
         self.ask(fault=what)
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """Send any order of the control socket and return the reply."""
+        """Send an order to the control socket and return the reply."""
         return self._device.ask(**request)
 
     def recalibrate(
@@ -100,13 +100,13 @@ class VirtualImu:
         seconds: float = 30.0,
         tables: Mapping[str, Any] | None = None,
     ) -> Calibration:
-        """Take it through a procedure, turning it by itself.
+        """Carry out a procedure on the device, which turns itself.
 
         Parameters
         ----------
         procedure : name of a module in ``fieldcal.procedures``
         seconds : averaging time
-        tables : of session.toml, over what the device itself says
+        tables : of session.toml, which replace those of the device
 
         """
         from fieldcal.run.unattended import recalibrate
@@ -130,23 +130,23 @@ class VirtualImu:
         sigmas: float = SIGMAS,
         within: Mapping[str, float] | None = None,
     ) -> None:
-        """Fail unless a calibration agrees with what the device conceals.
+        """Fail unless a calibration agrees with the true parameters.
 
         Parameters
         ----------
-        found : a `Calibration`, the object of result.json, or what a procedure of
-            one's own has: by group, as ``{"acc_bias": {"value": [x, y, z], "sigma":
-            [x, y, z]}}``, in m/s^2 and rad/s
-        sigmas : how many standard uncertainties a value may be off
+        found : a `Calibration`, the object of result.json, or a result by group, as
+            ``{"acc_bias": {"value": [x, y, z], "sigma": [x, y, z]}}``, in m/s^2 and
+            rad/s
+        sigmas : largest error of a value, in standard uncertainties
         within : largest standard uncertainty by group, as in ``{"acc_bias": 0.02}``
 
         """
         __tracebackhide__ = True
         from fieldcal.calibration.names import group_of
-        from fieldcal.commands.table import concealed_values
+        from fieldcal.commands.table import true_values
 
-        parameters = _parameters(found)
-        truth = concealed_values(self.truth)
+        parameters = _parameters_with_sigma(found)
+        truth = true_values(self.truth)
         wrong, compared = [], 0
         for name, (value, sigma) in parameters.items():
             limit = (within or {}).get(group_of(name), float("inf"))
@@ -168,10 +168,10 @@ class VirtualImu:
             pytest.fail("the calibration is wrong: " + "; ".join(wrong))
 
 
-def _parameters(
+def _parameters_with_sigma(
     found: Calibration | Mapping[str, Any],
 ) -> dict[str, tuple[float, float]]:
-    """Value and sigma by full name, of ours or of any procedure's result."""
+    """Value and sigma by full name, of a calibration or of a result by group."""
     from fieldcal.calibration import Calibration
 
     if isinstance(found, Mapping) and "parameters" in found:
@@ -197,7 +197,7 @@ Factory = Callable[..., VirtualImu]
 
 @pytest.fixture
 def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
-    """Start virtual devices; they end with the test.
+    """Start virtual devices, which are ended after the test.
 
     ``virtual_imu(link="serial", format="witmotion", effects=(), speed=None, seed=1,
     **options)`` starts one on a pseudo-terminal (serial), behind a CAN adapter (can) or
@@ -229,7 +229,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
         for effect in effects:
             command += ["--with", effect]
         options = {"latitude": LATITUDE, **options}
-        command += [_option(name, value) for name, value in options.items()]
+        command += [_command_option(name, value) for name, value in options.items()]
         device = VirtualMover(command, once=False)
         devices.append(device)
         query = format.replace("?", "&")
@@ -241,7 +241,7 @@ def virtual_imu(tmp_path: Path) -> Iterator[Factory]:
         device.close()
 
 
-def _option(name: str, value: Any) -> str:
+def _command_option(name: str, value: Any) -> str:
     several = not isinstance(value, str) and isinstance(value, Sequence)
     text = ",".join(map(str, value)) if several else str(value)
     return f"--{name.replace('_', '-')}={text}"
@@ -249,13 +249,13 @@ def _option(name: str, value: Any) -> str:
 
 @pytest.fixture
 def simulator_matches() -> Callable[..., Any]:
-    """Fail unless a simulator still matches a recording within limits.
+    """Fail unless a simulator matches a recording within limits.
 
-    ``simulator_matches(recording, simulated, **limits)``: a session folder, and a
-    session folder or a file that ``fieldcal import`` reads. Whatever differs fails,
-    unless it has a limit: by id, a number in its unit or a text as ``"10 %"``;
-    ``chi2_per_dof`` is that of the recording as the simulator predicts it. The
-    comparison is returned, a `fieldcal.against.Match`.
+    ``simulator_matches(recording, simulated, **limits)`` takes a session folder, and a
+    session folder or a file that ``fieldcal import`` reads. Every difference fails the
+    test, unless it is within a limit: by id, a number in its unit or a text such as
+    ``"10 %"``; ``chi2_per_dof`` limits that of the recording under the simulator's
+    prediction. It returns the comparison, a `fieldcal.against.Match`.
     """
 
     def check(

@@ -20,7 +20,7 @@ LONGEST = 64
 
 
 class Adapter(Wire):
-    """Samples as the lines of an adapter, while its channel is open."""
+    """Encodes samples as lines of a CAN adapter while its channel is open."""
 
     def __init__(self) -> None:
         super().__init__({})

@@ -82,11 +82,11 @@ def parameters(kind: str) -> dict[str, float]:
 
 
 class Autopilot:
-    """What answers at the end of a MAVLink link.
+    """Simulated autopilot on a MAVLink link.
 
     Parameters
     ----------
-    query : options
+    query : options of the address
 
     Raises
     ------

@@ -38,7 +38,7 @@ class Body:
     base_motions : motions of the base, past and future
     commanded_angles : last commanded angles
     vibration_rms : rms of the vibration in each position so far, m/s^2
-    manoeuvres : given motions of the device, each from the joints' angles at its start
+    manoeuvres : prescribed motions of the device, each relative to its start
 
     """
 

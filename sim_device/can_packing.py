@@ -31,7 +31,7 @@ Integers = NDArray[np.unsignedinteger[Any]]
 
 
 class CanPacket(NamedTuple):
-    """A frame of the device: eleven bits and eight bytes."""
+    """CAN frame of the device: an identifier of 11 bits and 8 bytes."""
 
     identifier: int
     data: bytes

@@ -15,7 +15,7 @@ from fieldcal.sim_device.random_process import random_stream
 
 
 class SignalChain:
-    """The signal chain of one device; its stages remember what they have to."""
+    """Signal chain of one device, with the state of its stages."""
 
     def __init__(self, profile: Profile, seed: int) -> None:
         limits = (profile.range.acceleration, profile.range.angular_rate)

@@ -45,13 +45,13 @@ class Control:
 
     Parameters
     ----------
-    carry_out : what answers a request; may raise InputError
+    carry_out : carries out a request and returns the reply; may raise InputError
     path : of the socket; default: in a new directory
 
     Raises
     ------
     InputError
-        If the socket cannot be there.
+        If the socket cannot be created.
 
     """
 

@@ -11,11 +11,11 @@ from fieldcal.sim_device.random_process import random_stream
 
 
 class SampleDelay:
-    """Holds samples up, in their order; false while it holds none.
+    """Queue that delays samples and keeps their order; false while it is empty.
 
     Attributes
     ----------
-    mean : how long, in the mean of an exponential distribution, s of wall clock
+    mean : mean delay of an exponential distribution, s of the wall clock
 
     """
 

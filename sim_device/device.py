@@ -37,8 +37,8 @@ class VirtualDevice:
 
     Parameters
     ----------
-    profile : what it conceals
-    seed : of everything that is random
+    profile : its true parameters
+    seed : of all random numbers
 
     """
 
@@ -181,12 +181,12 @@ class VirtualDevice:
 
 
 class Sensing:
-    """From instants to outputs: motion, sensors, noise and signal chain.
+    """Calculates outputs at given instants: motion, sensors, noise, signal chain.
 
     Attributes
     ----------
-    body : how the device is held and moved
-    chain : what happens to its samples
+    body : motion of the device
+    chain : signal chain of its samples
     pace : seconds of the device's clock in a true second
 
     """

@@ -84,7 +84,7 @@ class Example:
     turntable : whether the device is turned at constant rates instead of held
     host_clock : whether the samples have the times at which the host received them
     in_motion : whether only a reference that follows the motion shows the effect
-    unmended : why no position is predicted better with the effect; empty if one is
+    unmended : why the effect improves no prediction of a position; empty if it does
 
     """
 

@@ -33,7 +33,7 @@ class PositionLike(Protocol):
 
 
 class InProcess(Driver):
-    """Samples of a device that is asked, and moved, by a call."""
+    """Driver of a device in the same process, which calls move and sample."""
 
     def __init__(self, device: VirtualDevice) -> None:
         self.device = device

@@ -59,11 +59,11 @@ class JointStates:
 
 @dataclass(frozen=True, slots=True)
 class Creep:
-    """How joints overshoot in a turn, and relax afterwards.
+    """Overshoot of joints in a turn, and their relaxation afterwards.
 
     Attributes
     ----------
-    by : (joints,) rad, of a turn in which the angle rises
+    by : (joints,) overshoot of a turn in which the angle rises, rad
     tau : time constant of the relaxation, s
 
     """

@@ -26,11 +26,11 @@ EVERY_S = 0.2
 
 
 class SteeringKeys:
-    """Keys of a terminal as orders to a stream; a context that sets the terminal back.
+    """Turns keys of a terminal into orders; a context that restores the terminal.
 
     Parameters
     ----------
-    stream : what is moved
+    stream : of the device that is moved
     steps : of alpha and beta, deg
     keyboard, screen : a terminal, and where the line about the device goes, standard
         error if it is not said

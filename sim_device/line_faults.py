@@ -20,7 +20,7 @@ OTHERS = (0x300, 0x700)
 
 
 class LineFaults:
-    """Spoils the next bytes that are sent, once for each order; seeded."""
+    """Corrupts the next bytes that are sent, once for each order; seeded."""
 
     def __init__(self, seed: int) -> None:
         self._rng = random_stream(seed, "line faults")

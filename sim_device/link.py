@@ -13,7 +13,7 @@ from fieldcal.core.samples import Block
 
 
 class Link(ABC):
-    """A way to one host."""
+    """Connection to one host."""
 
     @property
     @abstractmethod

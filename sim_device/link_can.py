@@ -71,7 +71,7 @@ class BusLink(Link):
     Parameters
     ----------
     interface, channel : as python-can calls them
-    faults : what spoils the frames
+    faults : corrupt the frames
 
     Raises
     ------

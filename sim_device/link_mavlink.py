@@ -34,8 +34,8 @@ class MavlinkLink(Link):
     Parameters
     ----------
     scheme, place : kind of the port, host and port
-    autopilot : what answers there
-    faults : what spoils the bytes
+    autopilot : at the end of the link
+    faults : corrupt the bytes
     rate : of the sensor, Hz
 
     Raises

@@ -35,8 +35,8 @@ class SerialLink(Link):
 
     Parameters
     ----------
-    wire : how samples are put into bytes
-    faults : what spoils them
+    wire : encoder of the samples
+    faults : corrupt the bytes
     port_link : symbolic link that names the port for as long as it is there
     baud : bit rate of the device; a host at another hears something else. A pty carries
         any, which is what None leaves it at
@@ -46,7 +46,7 @@ class SerialLink(Link):
     InputError
         If something else has the name of the symbolic link.
     DeviceError
-        If there is no pty to be had.
+        If no pty can be opened.
 
     """
 

@@ -21,7 +21,7 @@ HEARD = 1 << 16
 
 
 class Port(Protocol):
-    """A socket that one host talks through."""
+    """Socket for one host."""
 
     address: str
     place: tuple[str, int]
@@ -46,7 +46,7 @@ class Port(Protocol):
 
 
 class UdpPort:
-    """A socket that a host speaks to first (`waits`), or that speaks to a host."""
+    """UDP socket that waits for a host's first datagram (`waits`), or sends first."""
 
     def __init__(self, place: tuple[str, int], waits: bool) -> None:
         self._socket = _opened(socket.SOCK_DGRAM, place if waits else None)
@@ -92,7 +92,7 @@ class UdpPort:
 
 
 class TcpPort:
-    """A socket that waits for a host to call, one at a time."""
+    """TCP socket that accepts one host at a time."""
 
     def __init__(self, place: tuple[str, int]) -> None:
         self._listener = _opened(socket.SOCK_STREAM, place)

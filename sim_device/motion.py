@@ -55,7 +55,7 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class BaseMotion:
-    """The base rocks about a level axis, and may be pushed, for a while.
+    """Temporary motion of the base: oscillation about a level axis, and a push.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class MovingFrame:
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """Where and how the device is held, apart from the joints.
+    """Site and mounting of the device, without the joints.
 
     Attributes
     ----------

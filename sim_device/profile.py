@@ -96,7 +96,7 @@ class NoiseFigures:
     acc_density, gyr_density : white noise by its density, per sqrt(Hz), instead
     acc_instability, gyr_instability : standard deviation of a Gauss-Markov bias
     instability_s : its correlation time, s
-    acc_flicker, gyr_flicker : 1/f noise by the level its Allan deviation stays at
+    acc_flicker, gyr_flicker : 1/f noise, by the constant level of its Allan deviation
     acc_walk, gyr_walk : rate random walk, per sqrt(s)
     temperature : of the thermometer, K
 
@@ -118,7 +118,7 @@ class NoiseFigures:
 
 @dataclass(frozen=True, slots=True)
 class Climate:
-    """[temperature]: what the device's sensors live through.
+    """[temperature]: temperature of the device's sensors over time.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Climate:
 
 @dataclass(frozen=True, slots=True)
 class Handling:
-    """[motion]: how long a turn takes, and the angles it stands at when switched on."""
+    """[motion]: duration of a turn, and the angles when the device is switched on."""
 
     turn_s: float = 4.0
     alpha_deg: float = 0.0
@@ -149,7 +149,7 @@ class Handling:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A virtual device; `effects` is what it has beyond bias, scale and noise."""
+    """Parameters of a virtual device; `effects` come beside bias, scale and noise."""
 
     device: Identity = Identity()
     sampling: Sampling = Sampling()

@@ -23,7 +23,7 @@ def open_pty() -> tuple[int, str]:
     Raises
     ------
     DeviceError
-        If there is no pty to be had.
+        If no pty can be opened.
 
     """
     try:
@@ -45,7 +45,7 @@ def forget(path: str) -> None:
 
 
 class PtyPort:
-    """Our side of a pty.
+    """The device's side of a pty.
 
     Raises
     ------

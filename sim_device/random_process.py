@@ -26,7 +26,7 @@ def random_stream(seed: int, name: str) -> np.random.Generator:
 
 
 class RandomProcess(Protocol):
-    """What wanders, tick by tick of the sampling clock."""
+    """Random process with one step for each tick of the sampling clock."""
 
     def draw(self, n: int) -> Array:
         """Next `n` values, (6, n)."""
@@ -50,7 +50,7 @@ class Walk:
 
 
 class GaussMarkov:
-    """Bias (p1) that wanders within its standard deviation `size` (6,).
+    """Bias (p1) with the standard deviation `size` (6,).
 
     The recursion runs in blocks of `BLOCK` ticks counted from the start, side by side,
 

@@ -20,7 +20,7 @@ PPM = 1e-6
 
 
 class StampFaults:
-    """The clock and the counter of one device, and what is wrong with them."""
+    """Clock and sample counter of one device, with their faults."""
 
     def __init__(self) -> None:
         self._t0 = self._s0 = self._seq0 = self._drift = 0.0

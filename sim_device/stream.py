@@ -39,7 +39,7 @@ BEHIND_S = 0.5
 
 
 class OrderSource(Protocol):
-    """Something that hears orders: the control socket, the keys."""
+    """Source of orders: the control socket, or the keys."""
 
     def watched(self) -> tuple[list[int], list[int]]:
         """Files to watch for reading and for writing."""
@@ -53,11 +53,11 @@ class DeviceStream:
 
     Parameters
     ----------
-    device, link, faults : what runs
+    device, link, faults : of the stream
     speed : device seconds in a second; inf for as fast as the host takes it
     duration : device time at which it ends, s
-    once : whether it ends when a host that has listened goes
-    announce : told the address whenever there is a new one
+    once : whether it ends when the host disconnects
+    announce : called with each new address
 
     """
 

@@ -36,7 +36,7 @@ REST = (STILL, np.zeros((3, 1)), np.zeros((3, 1)))
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A way between two places, from rest to rest.
+    """Motion between two orientations, from rest to rest.
 
     Attributes
     ----------

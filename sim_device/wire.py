@@ -20,7 +20,7 @@ from fieldcal.core.samples import Block
 
 
 class Wire(ABC):
-    """An encoder of samples; `options` are names with their defaults."""
+    """Encoder of samples; `options` are names with their defaults."""
 
     options: ClassVar[Mapping[str, str]] = {}
 

@@ -29,7 +29,7 @@ WEEK_MS = 604_800_000
 
 
 class InertialLabsWire(Wire):
-    """Packets of an INS, of which only the sensors say something."""
+    """Packets of an INS, in which only the sensor values are filled in."""
 
     def encode(self, block: Block) -> bytes:
         """Encode each sample as one packet."""

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from fieldcal.commands import serve
-from fieldcal.commands.run_page import address_of
+from fieldcal.commands.run_page import parse_address
 
 ROOT = Path(__file__).parent.parent
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "compose.yaml").read_text())
@@ -56,14 +56,14 @@ def test_the_image_installs_what_there_is_and_serves_where_it_says() -> None:
     assert f"useradd --create-home --uid 1000 {said('USER')}" in install
     assert json.loads(said("ENTRYPOINT")) == ["fieldcal"]
     args = served(json.loads(said("CMD")))
-    assert address_of(args.listen)[1] == int(said("EXPOSE"))
+    assert parse_address(args.listen)[1] == int(said("EXPOSE"))
     assert str(args.folder) == said("VOLUME")
 
 
 def test_the_service_of_compose_is_one_that_fieldcal_understands() -> None:
     service = SERVICES["service"]
     args = served(service["command"])
-    host, port = address_of(args.listen)
+    host, port = parse_address(args.listen)
     assert host == "0.0.0.0"
     (published,) = service["ports"]
     assert published == f"127.0.0.1:{port}:{port}", "this computer alone by default"

@@ -21,7 +21,7 @@ import tomlkit
 
 from benchmarks.never_wrong.written import Written
 from fieldcal.cli import main
-from fieldcal.commands.help import INTERRUPTED
+from fieldcal.commands.help import EXIT_INTERRUPTED
 
 WRONG = 5.0
 """Standard uncertainties from which a parameter is wrong."""
@@ -105,7 +105,7 @@ def said(words: list[str]) -> tuple[int, dict[str, Any], str, int]:
         warnings.simplefilter("always")
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = main(words)
-    if code == INTERRUPTED:
+    if code == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     try:
         document = json.loads(out.getvalue())

@@ -20,7 +20,7 @@ from rich.text import Text
 from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.decision_view import show_decision
 from fieldcal.commands.run_results import first_result
-from fieldcal.commands.table import show
+from fieldcal.commands.table import show_calibration
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.history.store import History
 from fieldcal.planning.steps import Hold
@@ -127,7 +127,7 @@ def screens() -> dict[str, str]:
 def _result(found: Calibration, device: VirtualDevice) -> str:
     out = io.StringIO()
     with redirect_stdout(out):
-        show(found, device.concealed())
+        show_calibration(found, device.concealed())
         show_decision(found)
     return _picture(Text(out.getvalue().rstrip()), width=110)
 

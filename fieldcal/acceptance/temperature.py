@@ -14,8 +14,8 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.errors import InputError
 from fieldcal.history.store import HistoryRun
-from fieldcal.thermal import ThermalPoint, point, thermal_model
-from fieldcal.thermal.wording import costs, document
+from fieldcal.thermal import ThermalPoint, thermal_model, thermal_point
+from fieldcal.thermal.wording import change_document, change_sentences
 
 NEAR_K = 2.0
 """Difference up to which temperatures count as equal, K, as of a room on two days."""
@@ -65,18 +65,18 @@ def effect_of_temperature_change(
         )
         return {**out, "parameters": None, "says": [says]}
     changes = model.change(now.temperature, then.temperature)
-    told, rest = costs(changes)
+    told, rest = change_sentences(changes)
     says = f"{about}: the earlier calibration would be off by {'; '.join(told)}"
     if not told:
         says = f"{about}: no parameter changes measurably with it"
     elif rest:
         says += f"; no change is seen in {', '.join(map(parameter_title, rest))}"
-    return {**out, "parameters": document(changes), "says": [says]}
+    return {**out, "parameters": change_document(changes), "says": [says]}
 
 
 def as_thermal_point(name: str, calibration: Calibration) -> ThermalPoint | None:
     """A calibration as a point of temperature; None if it has none, or is bad."""
     try:
-        return point(name, calibration)
+        return thermal_point(name, calibration)
     except InputError:
         return None

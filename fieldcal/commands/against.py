@@ -1,4 +1,4 @@
-"""`--against` of `fieldcal diagnose`: hold a recording against a simulator."""
+"""`--against` of `fieldcal diagnose`: compare a recording with a simulator."""
 
 from __future__ import annotations
 
@@ -16,37 +16,39 @@ if TYPE_CHECKING:
     from fieldcal.against.sensor_model import SensorModel
     from fieldcal.session.folder import Session
 
-    Compared = tuple[Match, SensorModel | None, list[str]]
-    """What was found, the sensors of a patch, and what the user must know."""
+    ComparedSession = tuple[Match, SensorModel | None, list[str]]
+    """Result, sensor model for a patch, and messages for the user."""
 
-PLAIN = "json"
-"""Format of the patches of a command unless another is named."""
+DEFAULT_PATCH_FORMAT = "json"
+"""Format of the patches for a simulator command, unless another is named."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the comparison: 0 if the two agree within the limits, 1 if not."""
+    """Carry out the comparison; 0 if both agree within the limits, else 1."""
     from fieldcal.against.gate import check_match, parse_limits, write_junit
     from fieldcal.report.gather import AGAINST
     from fieldcal.session.folder import Session
 
     allowed = parse_limits(args.limit)
     session = Session.open(args.session)
-    found, model, said = _compared(args, session)
+    found, model, said = _compare_session(args, session)
     content = found.to_json() | {"against": args.against}
     written = [session.write_json(AGAINST, content)]
     if model is not None:
-        written.append(_patch(args.patch or PLAIN, session, model, said))
+        written.append(
+            _write_patch(args.patch or DEFAULT_PATCH_FORMAT, session, model, said)
+        )
     for warning in (*session.warnings, *said, *found.warnings):
         sys.stderr.write(f"fieldcal diagnose: {warning}\n")
-    _say(args, found, content)
+    _print_match(args, found, content)
     gate = check_match(found, allowed)
     if args.junit:
         write_junit(args.junit, args.session.resolve().name, found, gate)
         written.append(args.junit)
     if args.report:
-        from fieldcal.commands.report import write
+        from fieldcal.commands.report import write_report
 
-        written.append(write(args.session))
+        written.append(write_report(args.session))
     for path in written:
         (sys.stderr if args.json else sys.stdout).write(f"written: {path}\n")
     beyond = [one for one in gate if not one.ok]
@@ -55,33 +57,35 @@ def run(args: argparse.Namespace) -> int:
     return 1 if beyond else 0
 
 
-def _compared(args: argparse.Namespace, session: Session) -> Compared:
-    """Compare with a file, or with what a command writes from round to round."""
+def _compare_session(args: argparse.Namespace, session: Session) -> ComparedSession:
+    """Compare with a file, or with the output of a command over several rounds."""
     import numpy as np
 
     from fieldcal.against.rounds import is_command, run_and_patch
     from fieldcal.against.sensor_model import patch_model
 
-    compare = _comparing(args, session)
+    compare = _comparison_method(args, session)
     if not is_command(args.against):
         found, said = compare(Path(args.against))
         return found, patch_model(found) if args.patch else None, said
     step = float(np.median(np.diff(session.block.t)))
-    form = args.patch or PLAIN
-    done = run_and_patch(args.against, compare, 1 / step, form, args.rounds, _tell)
+    form = args.patch or DEFAULT_PATCH_FORMAT
+    done = run_and_patch(
+        args.against, compare, 1 / step, form, args.rounds, _report_simulator_run
+    )
     last = done[-1]
     return last.match, last.patch, list(last.says)
 
 
-def _comparing(args: argparse.Namespace, session: Session) -> CompareOutput:
-    """By positions, or by the motion where there are too few to tell."""
+def _comparison_method(args: argparse.Namespace, session: Session) -> CompareOutput:
+    """Function that compares: by positions, or by the motion if these are too few."""
     from fieldcal.against import compare_sides
     from fieldcal.against.motion.held import holds_positions
     from fieldcal.against.opening import open_simulator_output
     from fieldcal.against.side import diagnose_side
 
     if args.motion or not holds_positions(session.block, session.about):
-        return partial(_in_motion, args, session)
+        return partial(_compare_by_motion, args, session)
     real = diagnose_side(str(args.session), session.block, session.about)
 
     def by_positions(path: Path) -> tuple[Match, list[str]]:
@@ -93,10 +97,10 @@ def _comparing(args: argparse.Namespace, session: Session) -> CompareOutput:
     return by_positions
 
 
-def _in_motion(
+def _compare_by_motion(
     args: argparse.Namespace, session: Session, path: Path
 ) -> tuple[Match, list[str]]:
-    """Compare with what follows the motion."""
+    """Compare with a simulator output that follows the recorded motion."""
     from fieldcal.against.motion import compare_in_motion
     from fieldcal.against.opening import read_output
 
@@ -113,8 +117,8 @@ def _in_motion(
     return found, said
 
 
-def _tell(number: int, one: SimulatorRun) -> None:
-    """A line for each run of the simulator."""
+def _report_simulator_run(number: int, one: SimulatorRun) -> None:
+    """Print a line about a run of the simulator."""
     differ = ", ".join(d.id.replace("_", " ") for d in one.match.differences)
     sys.stderr.write(
         f"run {number}{', patched' if number else ''}: {differ or 'nothing'} differs,"
@@ -122,7 +126,9 @@ def _tell(number: int, one: SimulatorRun) -> None:
     )
 
 
-def _patch(form: str, session: Session, model: SensorModel, said: list[str]) -> Path:
+def _write_patch(
+    form: str, session: Session, model: SensorModel, said: list[str]
+) -> Path:
     """Write the patch beside the recording."""
     from fieldcal.against import patches
 
@@ -131,11 +137,13 @@ def _patch(form: str, session: Session, model: SensorModel, said: list[str]) -> 
     return path
 
 
-def _say(args: argparse.Namespace, found: Match, content: Mapping[str, Any]) -> None:
-    """Show what was found, as it was asked for."""
+def _print_match(
+    args: argparse.Namespace, found: Match, content: Mapping[str, Any]
+) -> None:
+    """Print the result, as JSON or as a view."""
     if args.json:
         sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
         return
-    from fieldcal.commands.against_view import show
+    from fieldcal.commands.against_view import show_match
 
-    show(found, details=args.details)
+    show_match(found, details=args.details)

@@ -1,4 +1,4 @@
-"""A comparison with a simulator as a person at a terminal reads it."""
+"""Terminal view of a comparison with a simulator."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ from fieldcal.diagnosis.wording.lines import format_probability, pretty_quantity
 from fieldcal.report.against import VERDICTS
 
 
-def show(
+def show_match(
     found: Match,
     out: IO[str] | None = None,
     details: bool = False,
     width: int | None = None,
 ) -> None:
-    """Print verdict, differences and prediction; where each shows, if `details`.
+    """Print verdict, differences and prediction; with `details` also their places.
 
-    `width` is that of the terminal unless it is said.
+    `width` is in characters, by default that of the terminal.
     """
     from rich.text import Text
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole(file=out, width=width)
+    console = EscapingConsole(file=out, width=width)
     verdict = VERDICTS.get(found.verdict, found.verdict)
     head = Text(verdict.upper(), style=STYLES[found.verdict])
     sure = format_probability(found.probability)
     console.print(head + Text(f"  probability {sure}"))
     if found.differences:
-        console.print(_lines(found))
+        console.print(_difference_table(found))
     else:
         console.print(found.says, markup=False)
-    console.print(_prediction(found))
+    console.print(_prediction_table(found))
     if found.aligned is not None and found.differences:
         console.print(alignment_sentence(found.aligned), markup=False)
     if details:
         if found.differences:
             console.print(f"\n{found.says}", markup=False)
-            console.print(_places(found))
-        console.print(_recordings(found))
+            console.print(_location_table(found))
+        console.print(_recording_table(found))
 
 
-def _lines(found: Match) -> object:
+def _difference_table(found: Match) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -62,7 +62,7 @@ def _lines(found: Match) -> object:
     return table
 
 
-def _prediction(found: Match) -> object:
+def _prediction_table(found: Match) -> object:
     from rich.table import Table
 
     table = Table(title="What was not fitted, predicted", title_justify="left")
@@ -75,7 +75,7 @@ def _prediction(found: Match) -> object:
     return table
 
 
-def _places(found: Match) -> object:
+def _location_table(found: Match) -> object:
     from rich.table import Table
 
     table = Table(title="Where it shows", title_justify="left")
@@ -92,7 +92,7 @@ def _places(found: Match) -> object:
     return table
 
 
-def _recordings(found: Match) -> object:
+def _recording_table(found: Match) -> object:
     from rich.table import Table
 
     table = Table(title="Recordings", title_justify="left")

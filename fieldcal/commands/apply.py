@@ -34,13 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
-    from fieldcal.commands.compare import read
-    from fieldcal.commands.installing import check_same
+    from fieldcal.commands.compare import read_calibration
+    from fieldcal.commands.install_values import check_same_installed
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    calibration = read(args.calibration or args.session)
-    check_same(calibration, session)
+    calibration = read_calibration(args.calibration or args.session)
+    check_same_installed(calibration, session)
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
     kept = [g for g in ("acc_scale", "gyr_scale") if g not in calibration.groups]
     for group in kept:
@@ -49,13 +49,13 @@ def run(args: argparse.Namespace) -> int:
             "used\n"
         )
     block = calibration.apply(session.block, nominal)
-    _write(args.out, block)
+    _write_samples(args.out, block)
     sys.stdout.write(f"written: {args.out}, {len(block)} samples, m/s^2 and rad/s\n")
     return 0
 
 
 def _with_units(table: pa.Table) -> pa.Table:
-    """State the unit of each column."""
+    """The table with the unit of each column as metadata."""
     import pyarrow as pa
 
     from fieldcal.core.samples import CHANNELS, UNITS
@@ -68,13 +68,13 @@ def _with_units(table: pa.Table) -> pa.Table:
     return pa.Table.from_arrays(table.columns, schema=pa.schema(fields))
 
 
-def _write(path: Path, block: Block) -> None:
+def _write_samples(path: Path, block: Block) -> None:
     """Write samples in the columns of a session.
 
     Raises
     ------
     InputError
-        If the ending is none that is known, or the file cannot be written.
+        If the ending of the name is unknown, or the file cannot be written.
 
     """
     import pyarrow as pa

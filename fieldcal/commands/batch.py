@@ -28,7 +28,7 @@ EXAMPLE = """\
   fieldcal batch /net/archive --scheduler tcp://10.0.0.5:8786
 """
 
-TABLE = "batch.parquet"
+DEFAULT_TABLE = "batch.parquet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,9 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         type=Path,
-        default=Path(TABLE),
+        default=Path(DEFAULT_TABLE),
         metavar="FILE",
-        help=f"table of the results (default: {TABLE})",
+        help=f"table of the results (default: {DEFAULT_TABLE})",
     )
     add("--json", action="store_true", help="print one JSON object")
     add("--limits", type=Path, metavar="FILE", help="limits for GO and NO-GO of each")
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 0 all good, 1 some are not, or have no result."""
+    """Carry out the command; 0 if all are good, 1 if some are not or have no result."""
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
@@ -77,20 +77,20 @@ def run(args: argparse.Namespace) -> int:
     every = [str(folder) for folder in batch.folders]
     left = batch.unprocessed() if args.resume else every
     if left:
-        with pool_of(args) as pool:
-            carried_out(batch, left, pool)
+        with worker_pool(args) as pool:
+            process_with_progress(batch, left, pool)
     batch.write(args.output)
-    return _said(args, batch, len(left))
+    return _print_summary(args, batch, len(left))
 
 
 @contextlib.contextmanager
-def pool_of(args: argparse.Namespace) -> Iterator[WorkerPool]:
-    """Processes as --jobs has them, or the workers of --scheduler.
+def worker_pool(args: argparse.Namespace) -> Iterator[WorkerPool]:
+    """Yield a pool of --jobs processes, or of the workers of --scheduler.
 
     Raises
     ------
     InputError
-        If there is none.
+        If there would be no process.
 
     """
     from fieldcal.fleet.workers import dask_pool, process_pool
@@ -104,18 +104,20 @@ def pool_of(args: argparse.Namespace) -> Iterator[WorkerPool]:
         yield process_pool(args.jobs or os.cpu_count() or 1, ["fieldcal.fleet.outcome"])
 
 
-def carried_out(batch: SessionBatch, left: list[str], pool: WorkerPool) -> None:
-    """Do what is left, with a bar that says how quick and how long still."""
+def process_with_progress(
+    batch: SessionBatch, left: list[str], pool: WorkerPool
+) -> None:
+    """Process the folders `left`, with a bar that shows rate and remaining time."""
     from rich import progress
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
     bar = progress.Progress(
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TextColumn("{task.fields[rate]}"),
         progress.TimeRemainingColumn(),
-        console=ShownConsole(stderr=True),
+        console=EscapingConsole(stderr=True),
         transient=True,
     )
     with bar, contextlib.closing(batch.process(left, pool)) as done:
@@ -129,7 +131,7 @@ def carried_out(batch: SessionBatch, left: list[str], pool: WorkerPool) -> None:
                 bar.console.print(escape_line(one.error), soft_wrap=True)
 
 
-def _said(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
+def _print_summary(args: argparse.Namespace, batch: SessionBatch, done: int) -> int:
     rows = [one for some in batch.stored_rows() for one in some]
     failed = [one for one in rows if one.error]
     solved = [one for one in rows if not one.error]

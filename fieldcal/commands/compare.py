@@ -35,29 +35,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 1 if one of several instances is out."""
+    """Carry out the command; 1 if one of several instances disagrees."""
     from fieldcal.calibration import compare
     from fieldcal.core.errors import InputError
 
     if args.instances:
-        return _instances(args)
+        return _compare_instances(args)
     if len(args.paths) != len(("first", "second")):
         raise InputError("name two calibrations, or several sessions with --instances")
-    found = compare(*(read(path) for path in args.paths))
+    found = compare(*(read_calibration(path) for path in args.paths))
     if args.json:
-        sys.stdout.write(json.dumps(document(found)) + "\n")
+        sys.stdout.write(json.dumps(comparison_document(found)) + "\n")
     else:
-        sys.stdout.write(table(found))
+        sys.stdout.write(comparison_table(found))
     return 0
 
 
-def _instances(args: argparse.Namespace) -> int:
-    """Hold the IMUs of one log against each other and g."""
+def _compare_instances(args: argparse.Namespace) -> int:
+    """Compare the IMUs of one log with each other and with gravity."""
     from fieldcal.evaluation.instances import compare_instances
     from fieldcal.evaluation.observations import usable_windows
     from fieldcal.session.folder import Session
 
-    sessions = {one.name: Session.open(one) for one in _folders(args.paths)}
+    sessions = {one.name: Session.open(one) for one in _session_folders(args.paths)}
     means = {
         name: np.array([a.mean[:3] for a in usable_windows(one).averages])
         for name, one in sessions.items()
@@ -70,13 +70,13 @@ def _instances(args: argparse.Namespace) -> int:
     return int(any(one.out for one in found))
 
 
-def _folders(paths: list[Path]) -> list[Path]:
-    """Sessions among some folders and in them.
+def _session_folders(paths: list[Path]) -> list[Path]:
+    """Folders that are sessions, and the sessions in those that are not.
 
     Raises
     ------
     InputError
-        If there are not two.
+        If there are fewer than two.
 
     """
     from fieldcal.core.errors import InputError
@@ -94,13 +94,13 @@ def _folders(paths: list[Path]) -> list[Path]:
     return found
 
 
-def read(path: Path) -> Calibration:
+def read_calibration(path: Path) -> Calibration:
     """Read the calibration of a solved session folder or of a result.json.
 
     Raises
     ------
     InputError
-        If there is none, or it cannot be used.
+        If there is no calibration, or it cannot be used.
 
     """
     from fieldcal.calibration import Calibration
@@ -121,8 +121,8 @@ def read(path: Path) -> Calibration:
         raise InputError(f"{file}: {error}") from None
 
 
-def table(found: Comparison) -> str:
-    """Lines of a comparison, a parameter each."""
+def comparison_table(found: Comparison) -> str:
+    """Text of a comparison, one line for each parameter."""
     from fieldcal.calibration.wording import format_with_sigma
 
     width = max(len(n) for n in found.names)
@@ -143,7 +143,7 @@ def table(found: Comparison) -> str:
     return "\n".join(lines) + "\n"
 
 
-def document(found: Comparison) -> dict[str, object]:
+def comparison_document(found: Comparison) -> dict[str, object]:
     """A comparison as one JSON object."""
     return {
         "names": list(found.names),

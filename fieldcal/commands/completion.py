@@ -6,7 +6,7 @@ import argparse
 import sys
 from importlib import import_module
 
-from fieldcal.commands import found
+from fieldcal.commands import command_modules
 
 EXAMPLE = """\
   fieldcal completion bash > ~/.local/share/bash-completion/completions/fieldcal
@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
 
     whole = argparse.ArgumentParser(prog="fieldcal")
     commands = whole.add_subparsers(dest="command")
-    for name, (what, module) in found().items():
+    for name, (what, module) in command_modules().items():
         command = commands.add_parser(name, help=what)
         import_module(f"fieldcal.commands.{module}").add_arguments(command)
     sys.stdout.write(shtab.complete(whole, args.shell) + "\n")

@@ -1,4 +1,4 @@
-"""A console that shows what is in names and sentences, and carries out none of it."""
+"""Console that shows control characters and markup in foreign text as characters."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from rich.segment import Segment
 from fieldcal.core.escaping import escape_invisible
 
 
-class ShownConsole(Console):
-    """A console without markup or highlighting; takes what rich's takes."""
+class EscapingConsole(Console):
+    """A rich console without markup and highlighting, which escapes control characters.
+
+    It takes the options of `rich.console.Console`.
+    """
 
     def __init__(
         self, file: IO[str] | None = None, stderr: bool = False, **options: Any
@@ -26,7 +29,7 @@ class ShownConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Render, with the text of each segment as `escape_invisible` returns it."""
+        """Render, with the text of each segment escaped by `shown`."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment
@@ -34,13 +37,13 @@ class ShownConsole(Console):
                 yield Segment(escape_invisible(segment.text), segment.style)
 
     def on_broken_pipe(self) -> None:
-        """Go on for nobody: whoever read the first line only has the exit code too."""
+        """Continue without output, so that the exit code is still right."""
         self.quiet = True
-        unread()
+        discard_output()
 
 
-def unread() -> None:
-    """Have standard output go nowhere from here on: its reader is gone."""
+def discard_output() -> None:
+    """Redirect standard output to nowhere, since its reader is gone."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)

@@ -1,4 +1,4 @@
-"""GO or NO-GO as a person reads it, with its reasons and what it means."""
+"""Terminal view of the decision GO or NO-GO with its reasons."""
 
 from __future__ import annotations
 
@@ -15,54 +15,56 @@ MARKS = {True: "ok  ", False: "NO  ", None: "?   "}
 
 
 def show_decision(found: Calibration, folder: Path | None = None) -> None:
-    """Print what is left for a navigator, checks and decision; nothing without one.
+    """Print expected navigation errors, checks and decision; nothing without one.
 
-    The decision comes last, with its reasons just above it: what is on the screen when
-    all is over; behind a NO-GO the cheapest remedy, or positions that were left out.
-    `folder` is the session of a run, in which they can be taken.
+    The decision comes last, with its reasons just above it, so that both are on the
+    screen at the end. After a NO-GO follow the cheapest remedy, or the positions that
+    were left out. `folder` is the session of a run, in which they can be taken.
     """
-    from fieldcal.commands.console import ShownConsole
-    from fieldcal.commands.table import say
+    from fieldcal.commands.console import EscapingConsole
+    from fieldcal.commands.table import print_sentence
 
     decision = found.info.get("decision")
     if not decision:
         return
-    console = ShownConsole()
+    console = EscapingConsole()
     for growth in found.info.get("expectation", []):
-        say(console, "", _growth(growth))
+        print_sentence(console, "", _growth_sentence(growth))
     for sentence in found.info.get("temperature_change", {}).get("says", []):
-        say(console, "", sentence)
+        print_sentence(console, "", sentence)
     order = {True: 0, None: 1, False: 2}
     for check in sorted(decision["checks"], key=lambda each: order[each["ok"]]):
-        say(console, MARKS[check["ok"]], check["says"])
+        print_sentence(console, MARKS[check["ok"]], check["says"])
     word, style = (GO, "green") if decision["go"] else (NO_GO, "red")
     console.print(f" {word} ", style=f"bold reverse {style}", markup=False)
     remedy = decision.get("remedy")
     if remedy:
-        say(console, "to GO: ", remedy["says"])
+        print_sentence(console, "to GO: ", remedy["says"])
     if folder is not None and not decision["go"]:
-        _how_to_go_on(folder, remedy)
+        _print_resume_command(folder, remedy)
 
 
-def _how_to_go_on(folder: Path, remedy: dict[str, Any] | None) -> None:
-    """Print which command takes the remedy, or positions that were left out."""
-    from fieldcal.commands.console import ShownConsole
-    from fieldcal.commands.table import say
+def _print_resume_command(folder: Path, remedy: dict[str, Any] | None) -> None:
+    """Print the command that takes the remedy or the positions that were left out."""
+    from fieldcal.commands.console import EscapingConsole
+    from fieldcal.commands.table import print_sentence
     from fieldcal.run.session_run import positions_left_out
     from fieldcal.session.folder import Session
 
-    console = ShownConsole()
+    console = EscapingConsole()
     call = f"fieldcal run --resume {shlex.quote(str(folder))}"
     if remedy:
-        say(console, "       ", f"{call} takes it")
+        print_sentence(console, "       ", f"{call} takes it")
     elif left_out := positions_left_out(Session.open(folder)):
         which = ", ".join(str(i + 1) for i in left_out)
         what = "positions" if len(left_out) > 1 else "position"
-        say(console, "first: ", f"take {what} {which}, left out so far: {call}")
+        print_sentence(
+            console, "first: ", f"take {what} {which}, left out so far: {call}"
+        )
 
 
-def _growth(growth: dict[str, Any]) -> str:
-    """One sentence about what errors grow to."""
+def _growth_sentence(growth: dict[str, Any]) -> str:
+    """Sentence about the navigation errors after some time without aid."""
     parts = [
         f"{name} ± {float(f'{growth[key]:.2g}'):g}{unit}"
         for name, key, unit in (

@@ -57,10 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write a virtual device with the effects found, for fieldcal sim"
         " --profile FILE, and replay the session on it",
     )
-    _add_against(parser)
+    _add_comparison_options(parser)
 
 
-def _add_against(parser: argparse.ArgumentParser) -> None:
+def _add_comparison_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of a comparison with a simulator."""
     add = parser.add_argument
     add(
@@ -105,7 +105,7 @@ def _add_against(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 0 consistent, 1 something is left out or unexplained."""
+    """Carry out the command; 0 if consistent, 1 for any other verdict."""
     if args.shared:
         from fieldcal.commands import shared
 
@@ -128,11 +128,11 @@ def run(args: argparse.Namespace) -> int:
             f"{args.twin} cannot be written: there is no folder {args.twin.parent};"
             " create it, or name another file"
         )
-    return _diagnosed(args)
+    return _diagnose_session(args)
 
 
-def _diagnosed(args: argparse.Namespace) -> int:
-    """Diagnose one session, and write what was found."""
+def _diagnose_session(args: argparse.Namespace) -> int:
+    """Diagnose one session and write the diagnosis."""
     from fieldcal.diagnosis.explain import explain
     from fieldcal.diagnosis.prepare import prepare_recording
     from fieldcal.diagnosis.verdict import make_diagnosis
@@ -141,7 +141,9 @@ def _diagnosed(args: argparse.Namespace) -> int:
     session = Session.open(args.session)
     explanation = explain(prepare_recording(session.block, session.about))
     found = make_diagnosis(session.block, explanation)
-    again = _replayed(args.twin, session, explanation, found) if args.twin else None
+    again = (
+        _replay_on_twin(args.twin, session, explanation, found) if args.twin else None
+    )
     if again is not None:
         found = replace(found, says=f"{found.says} {again.says}")
     content = found.to_json()
@@ -153,21 +155,21 @@ def _diagnosed(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
     else:
-        from fieldcal.commands.diagnosis_view import show
+        from fieldcal.commands.diagnosis_view import show_diagnosis
 
-        show(found, again, details=args.details)
+        show_diagnosis(found, again, details=args.details)
         sys.stdout.write(f"written: {path}\n")
     if args.report:
-        from fieldcal.commands.report import write
+        from fieldcal.commands.report import write_report
 
-        page = write(args.session)
+        page = write_report(args.session)
         (sys.stderr if args.json else sys.stdout).write(f"written: {page}\n")
     if args.twin and not args.json:
         sys.stdout.write(f"written: {args.twin}\n")
     return 0 if found.verdict == "consistent" else 1
 
 
-def _replayed(
+def _replay_on_twin(
     path: Path, session: Session, explanation: Explanation, found: Diagnosis
 ) -> ReplayResult:
     """Replay the session on its twin, and write the twin's device file."""

@@ -1,7 +1,7 @@
-"""A diagnosis as a person at a terminal reads it.
+"""Terminal view of a diagnosis.
 
-First the verdict and what to do; then each effect in one line and one picture. What is
-behind them follows where it is asked for.
+First come the verdict and what to do, then one line for each effect and a bar chart of
+the residuals. With `details`, all numbers follow.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ STYLES = {
     "unexplained": "bold red",
 }
 
-STEPS = 3
-"""Steps of what to do that are shown without being asked for."""
+STEPS_SHOWN = 3
+"""Number of recommended steps that are shown without `details`."""
 
-BAR = 14
-"""Width of a bar of the picture, characters: two stand side by side in 80."""
+BAR_WIDTH = 14
+"""Width of a bar, characters: two fit side by side in 80 columns."""
 
-FOLLOWS = 22
-"""Least width of what a mismatch follows, characters: some words on each line."""
+FOLLOWS_WIDTH = 22
+"""Least width of the column "follows", characters, for some words on each line."""
 
-WIDEST = 4
-"""Cells of the bar that shows how significant a mismatch is."""
+SIGMA_BAR_WIDTH = 4
+"""Longest bar of the significance of a mismatch, characters."""
 
-BELOW = 3
+LINES_BELOW = 3
 """Lines of a screen below a diagnosis: the file it is written to, and the prompt."""
 
-BRIEF = 5.0
-"""Stretches shorter than this are told to a tenth of a second, s."""
+BRIEF_S = 5.0
+"""Limits of stretches shorter than this are shown to 0.1 s, s."""
 
 
-def show(
+def show_diagnosis(
     diagnosis: Diagnosis,
     again: ReplayResult | None = None,
     out: IO[str] | None = None,
@@ -57,34 +57,34 @@ def show(
     width: int | None = None,
     height: int | None = None,
 ) -> None:
-    """Print verdict, what to do, effects and picture; all else if `details`.
+    """Print verdict, what to do, effects and residuals; with `details` all the rest.
 
-    `width` and `height` are those of the terminal unless they are said; without
-    `details` no more effects are shown than fit on one screen, so that the verdict
-    stays on it. What is no terminal takes them all.
+    `width` and `height` are those of the terminal unless given. Without `details`, as
+    many effects are shown as fit on one screen together with the verdict. Output that
+    is no terminal gets all of them.
     """
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole(file=out, width=width)
+    console = EscapingConsole(file=out, width=width)
     if height is None and console.is_terminal:
         height = console.height
-    head = [_verdict(diagnosis), *_steps(diagnosis, details)]
-    picture = _picture(diagnosis)
-    rest = sum(_lines_of(console, part) for part in (*head, *picture))
-    room = None if details or height is None else height - BELOW - rest
-    for part in (*head, *_effects(console, diagnosis, room), *picture):
+    head = [_verdict_line(diagnosis), *_next_steps(diagnosis, details)]
+    picture = _residual_bars(diagnosis)
+    rest = sum(_line_count(console, part) for part in (*head, *picture))
+    room = None if details or height is None else height - LINES_BELOW - rest
+    for part in (*head, *_fitting_effect_table(console, diagnosis, room), *picture):
         console.print(part)
     if details:
-        _details(console, diagnosis)
+        _print_details(console, diagnosis)
     if again is not None:
-        console.print(_replays(again))
+        console.print(_replay_table(again))
 
 
-def _lines_of(console: Console, part: RenderableType) -> int:
+def _line_count(console: Console, part: RenderableType) -> int:
     return len(console.render_lines(part, pad=False))
 
 
-def _verdict(diagnosis: Diagnosis) -> RenderableType:
+def _verdict_line(diagnosis: Diagnosis) -> RenderableType:
     from rich.text import Text
 
     verdict = diagnosis.verdict.replace("_", " ")
@@ -95,19 +95,19 @@ def _verdict(diagnosis: Diagnosis) -> RenderableType:
     return head + Text(f"  {sure}")
 
 
-def _steps(diagnosis: Diagnosis, details: bool) -> list[RenderableType]:
-    """What to do, the first steps of it unless there are to be `details`."""
-    steps = diagnosis.next if details else diagnosis.next[:STEPS]
-    out = [_step(s) for s in steps]
+def _next_steps(diagnosis: Diagnosis, details: bool) -> list[RenderableType]:
+    """Recommended steps, only the first ones without `details`."""
+    steps = diagnosis.next if details else diagnosis.next[:STEPS_SHOWN]
+    out = [_step_row(s) for s in steps]
     if not steps:
-        out = [_step("Nothing: the simulation has all that this can show.")]
+        out = [_step_row("Nothing: the simulation has all that this can show.")]
     if more := len(diagnosis.next) - len(steps):
-        out.append(_step(f"{more} more: --details"))
+        out.append(_step_row(f"{more} more: --details"))
     return out
 
 
-def _step(text: str) -> RenderableType:
-    """One thing to do; further lines of it stand under its words."""
+def _step_row(text: str) -> RenderableType:
+    """A recommended step; its further lines are indented to the first."""
     from rich.table import Table
     from rich.text import Text
 
@@ -116,20 +116,20 @@ def _step(text: str) -> RenderableType:
     return grid
 
 
-def _effects(
+def _fitting_effect_table(
     console: Console, diagnosis: Diagnosis, room: int | None
 ) -> list[RenderableType]:
-    """The effects, as many as there are lines for, at least one; nothing of none."""
+    """Table of the effects that fit into `room` lines, at least one; empty if none."""
     many = len(diagnosis.lines)
     while many > 1 and room is not None:
-        if _lines_of(console, _lines(diagnosis, many)) <= room:
+        if _line_count(console, _effect_table(diagnosis, many)) <= room:
             break
         many -= 1
-    return [_lines(diagnosis, many)] if many else []
+    return [_effect_table(diagnosis, many)] if many else []
 
 
-def _lines(diagnosis: Diagnosis, many: int) -> RenderableType:
-    """The first effects, a row each, and how many more there are."""
+def _effect_table(diagnosis: Diagnosis, many: int) -> RenderableType:
+    """Table of the first `many` effects, and the number of the others."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -147,8 +147,8 @@ def _lines(diagnosis: Diagnosis, many: int) -> RenderableType:
     return table
 
 
-def _picture(diagnosis: Diagnosis) -> list[RenderableType]:
-    """What was predicted without having been seen, before and after, by channel."""
+def _residual_bars(diagnosis: Diagnosis) -> list[RenderableType]:
+    """Held-out residuals before and after the diagnosis, as a bar for each channel."""
     from rich.table import Table
     from rich.text import Text
 
@@ -160,39 +160,39 @@ def _picture(diagnosis: Diagnosis) -> list[RenderableType]:
     grid = Table.grid(padding=(0, 2))
     triads = [[n for n in names if n[0] == triad] for triad in "ag"]
     for pair in zip_longest(*(t for t in triads if t)):
-        grid.add_row(*(_bar(name, names, before, after) for name in pair))
+        grid.add_row(*(_residual_bar(name, names, before, after) for name in pair))
     return [Text(f"{legend}   ░ before  █ after", style="bold"), grid]
 
 
-def _bar(
+def _residual_bar(
     name: str | None,
     names: Sequence[str],
     before: Mapping[str, float],
     after: Mapping[str, float],
 ) -> str:
-    """What was left of a channel's residual, on the scale of its sensor's largest."""
+    """Bar of a channel's residual before and after, scaled to the sensor's largest."""
     if name is None:
         return ""
     most = max(max(before[n], after[n]) for n in names if n[0] == name[0])
-    first, then = (round(BAR * q[name] / most) for q in (before, after))
+    first, then = (round(BAR_WIDTH * q[name] / most) for q in (before, after))
     bar = "█" * max(1, then) + "░" * (first - max(1, then))
-    return f"{name} {bar:<{BAR}} {before[name]:.3g} → {after[name]:.3g}"
+    return f"{name} {bar:<{BAR_WIDTH}} {before[name]:.3g} → {after[name]:.3g}"
 
 
-def _details(console: Console, diagnosis: Diagnosis) -> None:
-    """Everything that stands behind the lines."""
+def _print_details(console: Console, diagnosis: Diagnosis) -> None:
+    """Print all numbers of the diagnosis."""
     console.print(f"\n{diagnosis.says}", markup=False)
     if diagnosis.mismatch:
-        console.print(_mismatch(diagnosis.mismatch))
+        console.print(_mismatch_table(diagnosis.mismatch))
     for found in diagnosis.effects:
-        console.print(_heading(found), markup=False)
+        console.print(_effect_heading(found), markup=False)
         if found.parameters:
-            console.print(_effect(found))
-    console.print(_fit(diagnosis))
-    console.print(_calibration(diagnosis))
+            console.print(_parameter_table(found))
+    console.print(_agreement_table(diagnosis))
+    console.print(_calibration_table(diagnosis))
 
 
-def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
+def _mismatch_table(mismatch: tuple[Mismatch, ...]) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -204,30 +204,32 @@ def _mismatch(mismatch: tuple[Mismatch, ...]) -> object:
         pad_edge=False,
     )
     table.add_column("channel")
-    table.add_column("follows", min_width=FOLLOWS)
+    table.add_column("follows", min_width=FOLLOWS_WIDTH)
     for name in ("positions", "time, s"):
         table.add_column(name, no_wrap=name == "time, s")
     table.add_column("rms", justify="right", no_wrap=True)
     table.add_column("σ", no_wrap=True)
     most = max((m.sigma for m in mismatch if m.sigma < float("inf")), default=1.0)
-    for names, m in _alike(mismatch):
+    for names, m in _group_by_channel(mismatch):
         finite = m.sigma < float("inf")
-        bar = "█" * max(1, round(WIDEST * (min(m.sigma, most) / most) ** 0.5))
-        digits = 0 if m.to_s - m.from_s >= BRIEF else 1
+        bar = "█" * max(1, round(SIGMA_BAR_WIDTH * (min(m.sigma, most) / most) ** 0.5))
+        digits = 0 if m.to_s - m.from_s >= BRIEF_S else 1
         span = dict.fromkeys(f"{t:.{digits}f}" for t in (m.from_s, m.to_s))
         table.add_row(
             " ".join(names),
             m.kind if m.covariate in (m.kind, "") else f"{m.kind}: {m.covariate}",
             position_numbers(m.positions),
             "–".join(span),
-            _rms(names, m.rms),
+            _format_rms(names, m.rms),
             f"{bar} {m.sigma:.0f}" if finite else bar,
         )
     return table
 
 
-def _alike(mismatch: tuple[Mismatch, ...]) -> list[tuple[list[str], Mismatch]]:
-    """What differs in the channel only, together."""
+def _group_by_channel(
+    mismatch: tuple[Mismatch, ...],
+) -> list[tuple[list[str], Mismatch]]:
+    """Mismatches that are equal but for the channel, each with its channels."""
     found: dict[object, tuple[list[str], Mismatch]] = {}
     for m in mismatch:
         place = (m.kind, m.positions, m.from_s, m.to_s, m.covariate)
@@ -236,14 +238,14 @@ def _alike(mismatch: tuple[Mismatch, ...]) -> list[tuple[list[str], Mismatch]]:
     return list(found.values())
 
 
-def _rms(names: list[str], rms: float) -> str:
-    """Size of a residual with its unit; sensors with different units have no common."""
+def _format_rms(names: list[str], rms: float) -> str:
+    """Size of a residual with its unit; a dash if the channels have different units."""
     unit = common_unit(names)
     return "–" if unit is None else f"{rms:.3g} {unit}".strip()
 
 
-def _heading(found: FoundEffect) -> str:
-    """An effect and what speaks for it."""
+def _effect_heading(found: FoundEffect) -> str:
+    """Line with an effect and its evidence."""
     gain = found.evidence.get("held_out_gain", float("nan"))
     squares = found.evidence.get("delta_chi2", float("nan"))
     about = [
@@ -258,7 +260,7 @@ def _heading(found: FoundEffect) -> str:
     return "; ".join(about)
 
 
-def _effect(found: FoundEffect) -> object:
+def _parameter_table(found: FoundEffect) -> object:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -270,7 +272,7 @@ def _effect(found: FoundEffect) -> object:
     return table
 
 
-def _fit(diagnosis: Diagnosis) -> object:
+def _agreement_table(diagnosis: Diagnosis) -> object:
     from rich.table import Table
 
     table = Table(title="Agreement", title_justify="left")
@@ -283,7 +285,7 @@ def _fit(diagnosis: Diagnosis) -> object:
     return table
 
 
-def _calibration(diagnosis: Diagnosis) -> object:
+def _calibration_table(diagnosis: Diagnosis) -> object:
     from rich.table import Table
 
     from fieldcal.calibration.wording import TITLES, format_with_sigma
@@ -303,7 +305,7 @@ def _calibration(diagnosis: Diagnosis) -> object:
     return table
 
 
-def _replays(again: ReplayResult) -> object:
+def _replay_table(again: ReplayResult) -> object:
     from rich.table import Table
 
     unit = UNITS[again.triad]

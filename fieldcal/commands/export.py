@@ -14,11 +14,16 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    from fieldcal.exporters import formats
+    from fieldcal.exporters import format_names
 
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="session folder, solved")
-    add("--format", required=True, choices=formats(), help="; ".join(formats()))
+    add(
+        "--format",
+        required=True,
+        choices=format_names(),
+        help="; ".join(format_names()),
+    )
     add("-o", "--output", type=Path, help="file (default: the session's name)")
     add(
         "--calibration",
@@ -38,21 +43,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.calibration import Nominal
-    from fieldcal.commands.compare import read
+    from fieldcal.commands.compare import read_calibration
     from fieldcal.core.errors import InputError
-    from fieldcal.exporters import ExportSource, exporter
+    from fieldcal.exporters import ExportSource, load_exporter
     from fieldcal.install.proposal import installed_in
     from fieldcal.session.folder import Session
 
     session = Session.open(args.session)
-    module = exporter(args.format)
+    module = load_exporter(args.format)
     name = args.session.resolve().name
     path = args.output or Path(f"{name}{module.ENDING}")
     if path.exists():
         raise InputError(f"{path}: is there already; name another file with -o")
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
     source = ExportSource(
-        read(args.calibration or args.session),
+        read_calibration(args.calibration or args.session),
         nominal,
         session,
         installed_in(session),

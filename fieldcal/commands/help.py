@@ -1,6 +1,6 @@
-"""Help that fits a screen: what is seldom wanted is told by ``--help-all``.
+"""Help that fits on a screen; ``--help-all`` shows the rarely used options as well.
 
-A command names in ``RARE`` what its options are kept under that its help leaves out.
+A command lists in ``RARE`` the ``dest`` of the options that its help leaves out.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 
 from fieldcal.core.errors import InputError
 
-BROKEN, INTERRUPTED = 70, 130
-"""What sysexits.h calls EX_SOFTWARE, which is no verdict and no wrong input; and what a
-shell says of Ctrl-C."""
+EXIT_INTERNAL_ERROR, EXIT_INTERRUPTED = 70, 130
+"""Exit codes of an internal error (EX_SOFTWARE of sysexits.h) and of Ctrl-C, as shells
+have it."""
 
 EXIT_CODES = """\
 exit codes:
@@ -27,25 +27,27 @@ exit codes:
   130  interrupted
 """
 
-IN_SHORT = "exit codes: 0 good, 1 bad, 2 wrong usage or input, 3 the device failed"
+EXIT_CODES_IN_SHORT = (
+    "exit codes: 0 good, 1 bad, 2 wrong usage or input, 3 the device failed"
+)
 
 
 class CommandParser(argparse.ArgumentParser):
-    """Options of a command.
+    """Parser of a command's options.
 
     Parameters
     ----------
-    example : of its use
-    rare : what options are kept under that only ``--help-all`` tells
-    whatever : of `argparse.ArgumentParser`
+    example : of the command's use
+    rare : ``dest`` of the options that only ``--help-all`` shows
+    options : of `argparse.ArgumentParser`
 
     """
 
     def __init__(
-        self, example: str, rare: Collection[str] = (), **whatever: Any
+        self, example: str, rare: Collection[str] = (), **options: Any
     ) -> None:
         super().__init__(
-            formatter_class=argparse.RawDescriptionHelpFormatter, **whatever
+            formatter_class=argparse.RawDescriptionHelpFormatter, **options
         )
         self._example, self._rare = f"example:\n{example.rstrip()}", rare
         if rare:
@@ -57,12 +59,12 @@ class CommandParser(argparse.ArgumentParser):
             )
 
     def format_help(self) -> str:
-        """Help without what is seldom wanted."""
-        positional = [a.metavar or a.dest for a in self._actions if _is_named(a)]
+        """Help without the rarely used options."""
+        positional = [a.metavar or a.dest for a in self._actions if _is_positional(a)]
         left = [a for a in self._actions if a.dest in self._rare]
         before = [a.help for a in left]
         self.usage = " ".join(["%(prog)s [options]", *map(str, positional)])
-        self.epilog = f"{self._example}\n\n{IN_SHORT}"
+        self.epilog = f"{self._example}\n\n{EXIT_CODES_IN_SHORT}"
         for action in left:
             action.help = argparse.SUPPRESS
         try:
@@ -73,7 +75,7 @@ class CommandParser(argparse.ArgumentParser):
                 action.help = text
 
     def error(self, message: str) -> NoReturn:
-        """Refuse what was typed in one sentence, as every other error is said.
+        """Report wrong usage in one sentence, like every other error.
 
         Raises
         ------
@@ -92,7 +94,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 class _WholeHelp(argparse.Action):
-    """Prints all of the help, and ends."""
+    """Prints the help with every option, and exits."""
 
     def __call__(
         self,
@@ -106,6 +108,6 @@ class _WholeHelp(argparse.Action):
         parser.exit()
 
 
-def _is_named(action: argparse.Action) -> bool:
-    """Whether an argument is told by its place."""
+def _is_positional(action: argparse.Action) -> bool:
+    """Whether an argument is positional and shown."""
     return not action.option_strings and action.help != argparse.SUPPRESS

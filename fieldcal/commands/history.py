@@ -23,7 +23,7 @@ EXAMPLE = """\
   fieldcal history A1B2 --png bias.png
 """
 
-STRIP = 20
+STRIP_WIDTH = 20
 """Width of the plot beside the numbers, characters."""
 
 
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
     history = History(args.history or default_location())
     if args.serial is None:
-        return _devices(args, history)
+        return _list_devices(args, history)
     if args.accept is not None:
         history.accept(args.serial, args.accept)
     runs = history.runs(args.serial)
@@ -80,11 +80,11 @@ def run(args: argparse.Namespace) -> int:
             f" has {known}"
         )
     if args.compare:
-        return _compare(args, runs)
-    return _trends(args, runs)
+        return _compare_runs(args, runs)
+    return _show_trends(args, runs)
 
 
-def _devices(args: argparse.Namespace, history: History) -> int:
+def _list_devices(args: argparse.Namespace, history: History) -> int:
     devices = history.serials()
     if args.json:
         keys = ("serial", "calibrations", "last")
@@ -104,9 +104,9 @@ def _devices(args: argparse.Namespace, history: History) -> int:
     return 0
 
 
-def _compare(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
+def _compare_runs(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     from fieldcal.calibration import compare
-    from fieldcal.commands.compare import document, table
+    from fieldcal.commands.compare import comparison_document, comparison_table
     from fieldcal.core.errors import InputError
 
     known = {run.number: run for run in runs}
@@ -119,40 +119,44 @@ def _compare(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     first, second = (known[n] for n in args.compare)
     found = compare(first.calibration, second.calibration)
     if args.json:
-        sys.stdout.write(json.dumps(document(found)) + "\n")
+        sys.stdout.write(json.dumps(comparison_document(found)) + "\n")
         return 0
     for run_ in (first, second):
-        sys.stdout.write(f"{run_.number}: {run_.taken_at}, {_warm(run_)}\n")
-    sys.stdout.write(table(found))
+        sys.stdout.write(
+            f"{run_.number}: {run_.taken_at}, {_format_temperature(run_)}\n"
+        )
+    sys.stdout.write(comparison_table(found))
     return 0
 
 
-def _trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
+def _show_trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     from fieldcal.calibration import limits
     from fieldcal.history.trend import parameter_names, parameter_trend
 
     grade = runs[-1].calibration.info.get("conditions", {}).get("grade", "tactical")
     bounds = limits.read(str(grade), args.limits)
-    wanted = _wanted(args.parameter, parameter_names(runs))
+    wanted = _selected_parameters(args.parameter, parameter_names(runs))
     trends = {name: parameter_trend(runs, name, bounds) for name in wanted}
     if args.png:
-        from fieldcal.commands.history_plot import plot
+        from fieldcal.commands.history_plot import plot_trends
 
-        plot(args.png, args.serial, trends)
+        plot_trends(args.png, args.serial, trends)
         sys.stderr.write(f"written: {args.png}\n")
     if args.json:
         document = {
             "serial": args.serial,
-            "runs": [_run(r) for r in runs],
+            "runs": [_run_document(r) for r in runs],
             "parameters": {n: [p.to_json() for p in t] for n, t in trends.items()},
         }
         sys.stdout.write(json.dumps(document) + "\n")
         return 0
-    _show(args.serial, runs, trends, bounds)
+    _print_trends(args.serial, runs, trends, bounds)
     return 0
 
 
-def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
+def _selected_parameters(
+    asked: Sequence[str] | None, known: Sequence[str]
+) -> list[str]:
     from fieldcal.calibration.names import group_of
     from fieldcal.core.errors import InputError
 
@@ -165,7 +169,7 @@ def _wanted(asked: Sequence[str] | None, known: Sequence[str]) -> list[str]:
     return list(asked)
 
 
-def _run(run: HistoryRun) -> dict[str, Any]:
+def _run_document(run: HistoryRun) -> dict[str, Any]:
     return {
         "number": run.number,
         "taken_at": run.taken_at,
@@ -179,11 +183,11 @@ def _run(run: HistoryRun) -> dict[str, Any]:
     }
 
 
-def _warm(run: HistoryRun) -> str:
+def _format_temperature(run: HistoryRun) -> str:
     return "? °C" if run.temperature is None else f"{run.temperature:.1f} °C"
 
 
-def _show(
+def _print_trends(
     serial: str,
     runs: Sequence[HistoryRun],
     trends: dict[str, list[TrendPoint]],
@@ -194,7 +198,7 @@ def _show(
     for name, points in trends.items():
         unit = points[-1].unit if points else ""
         say(f"\n{name}, {unit}\n")
-        for line in lines(points):
+        for line in trend_lines(points):
             say(line + "\n")
         odd = [str(p.run.number) for p in points if p.out_of_family]
         spread = points[-1].spread
@@ -202,20 +206,19 @@ def _show(
         say(f"; out of family: {', '.join(odd)}\n" if odd else "; all in family\n")
 
 
-def lines(points: Sequence[TrendPoint]) -> list[str]:
-    """A line for each calibration: number, date, value, and where that lies.
+def trend_lines(points: Sequence[TrendPoint]) -> list[str]:
+    """A line for each calibration: number, date, value, and a plot of the value.
 
-    The strip spans all values with twice their uncertainty; ``o`` is the value, ``-``
-    its ± 2 sigma.
+    The plot spans all values ± 2 sigma; ``o`` is the value, ``-`` its ± 2 sigma.
     """
     from fieldcal.calibration.wording import format_with_sigma
 
     low = min(p.value - 2 * p.sigma for p in points)
     high = max(p.value + 2 * p.sigma for p in points)
-    step = (high - low) / (STRIP - 1) or 1.0
+    step = (high - low) / (STRIP_WIDTH - 1) or 1.0
     out = []
     for p in points:
-        cells = [" "] * STRIP
+        cells = [" "] * STRIP_WIDTH
         ends = (p.value - 2 * p.sigma, p.value + 2 * p.sigma)
         first, last = (round((end - low) / step) for end in ends)
         cells[first : last + 1] = "-" * (last + 1 - first)
@@ -224,7 +227,7 @@ def lines(points: Sequence[TrendPoint]) -> list[str]:
         word = "OUT" if p.out_of_family else "no-go" if p.run.go is False else ""
         word = "accepted" if p.run.accepted else word
         out.append(
-            f"  {p.run.number:3d} {p.run.taken_at[:10]} {_warm(p.run):>8}"
+            f"  {p.run.number:3d} {p.run.taken_at[:10]} {_format_temperature(p.run):>8}"
             f" {value:>10} ± {sigma:<8} |{''.join(cells)}| {word}".rstrip()
         )
     return out

@@ -1,4 +1,4 @@
-"""A picture of parameters from run to run, with what was expected of each."""
+"""Plot of parameters from run to run, with the values out of family in red."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from fieldcal.history.trend import TrendPoint
 
 
-def plot(path: Path, serial: str, trends: Mapping[str, Sequence[TrendPoint]]) -> None:
-    """Write the picture, in the format that the file's ending says.
+def plot_trends(
+    path: Path, serial: str, trends: Mapping[str, Sequence[TrendPoint]]
+) -> None:
+    """Write the plot, in the format of the file's ending.
 
     Raises
     ------

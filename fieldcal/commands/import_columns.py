@@ -1,4 +1,4 @@
-"""Options of `fieldcal import` by which the user says what a file does not."""
+"""Options of `fieldcal import` for what a file does not state itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from fieldcal.importing.recording import ReadOptions
 
 
-def add_columns(parser: argparse.ArgumentParser) -> None:
-    """Declare them."""
+def add_column_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
     add = parser.add_argument_group(
         "files that do not say what is in them"
     ).add_argument
@@ -41,7 +41,7 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     add("--gyr-lsb", type=float, default=1.0, metavar="N", help="counts in one unit")
     add(
         "--acc-zero",
-        type=_three,
+        type=_parse_triad,
         default=(),
         metavar="X,Y,Z",
         help="numbers of the file at no acceleration, such as 32768,32768,32768;"
@@ -52,8 +52,8 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
     add("--temp-zero", type=float, default=0.0, metavar="C", help="deg C at count 0")
 
 
-def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
-    """What is said of the file of that number."""
+def read_options(args: argparse.Namespace, i: int) -> ReadOptions:
+    """Options for reading the i-th file."""
     from fieldcal.importing.recording import ReadOptions
 
     given = args.columns[min(i, len(args.columns) - 1)] if args.columns else ""
@@ -78,10 +78,10 @@ def said_of_columns(args: argparse.Namespace, i: int) -> ReadOptions:
     )
 
 
-def _three(text: str) -> tuple[float, ...]:
-    """Read one number for each axis, or one for all.
+def _parse_triad(text: str) -> tuple[float, ...]:
+    """Parse one number for each axis, or one for all.
 
-    >>> _three("33000"), _three("1,2.5,-3")
+    >>> _parse_triad("33000"), _parse_triad("1,2.5,-3")
     ((33000.0, 33000.0, 33000.0), (1.0, 2.5, -3.0))
     """
     try:

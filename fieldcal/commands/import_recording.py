@@ -10,8 +10,8 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.import_columns import add_columns, said_of_columns
-from fieldcal.commands.site import add_site, site_tables
+from fieldcal.commands.import_columns import add_column_options, read_options
+from fieldcal.commands.site import add_site_options, site_tables
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 from fieldcal.core.factory import FACTORY_KEYS
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="QUERY",
         help="options of the format, as in a device address",
     )
-    add_columns(parser)
+    add_column_options(parser)
     add(
         "--still",
         type=float,
@@ -105,7 +105,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A,G",
         help="uncertainties of the means in a table of means, m/s^2 and rad/s",
     )
-    add_site(parser)
+    add_site_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
     opened: list[Recording] = [
-        open_recording(path, said_of_columns(args, i), args.format, args.repair)
+        open_recording(path, read_options(args, i), args.format, args.repair)
         for i, path in enumerate(args.files)
     ]
     if args.join and args.in_order:
@@ -126,24 +126,26 @@ def run(args: argparse.Namespace) -> int:
     if args.in_order:
         opened = [FilesInOrder(opened)]
     if args.list:
-        return _list(opened)
+        return _list_streams(opened)
     written: list[Path] = []
     imported: list[ImportedSession] = []
     try:
         for recording in opened:
-            imported += _bring_all(args, recording, len(opened) > 1, written)
+            imported += _import_streams(args, recording, len(opened) > 1, written)
     except InputError:
         # the same command with the answer must find its folders free
         for folder in written:
             rmtree(folder)
             sys.stderr.write(f"{folder}: removed again, for this is not all\n")
         raise
-    _say_together(args.files, imported)
+    _suggest_one_session(args.files, imported)
     return 0
 
 
-def _say_together(files: Sequence[Path], imported: Sequence[ImportedSession]) -> None:
-    """Say that files look like the positions, or the two sensors, of one IMU."""
+def _suggest_one_session(
+    files: Sequence[Path], imported: Sequence[ImportedSession]
+) -> None:
+    """Suggest --join or --in-order if the files seem to belong to one IMU."""
     import numpy as np
 
     from fieldcal.importing.units.gravity_size import are_means
@@ -164,38 +166,38 @@ def _say_together(files: Sequence[Path], imported: Sequence[ImportedSession]) ->
             )
 
 
-def _bring_all(
+def _import_streams(
     args: argparse.Namespace, recording: Recording, among: bool, written: list[Path]
 ) -> list[ImportedSession]:
-    """Make a session of each IMU that is wanted, and note the folders.
+    """Make a session of each selected IMU of a recording.
 
     Parameters
     ----------
-    args, recording : what is wanted of which
+    args, recording : options, and the recording
     among : whether it is one of several files
-    written : folders, grows
+    written : session folders; new ones are appended
 
     """
     name = recording.path.name.split(".")[0]
     folder = args.output or Path(name)
     if args.output and among:
         folder = args.output / name
-    names = _chosen(recording, args.instance)
+    names = _selected_streams(recording, args.instance)
     imported: dict[str, ImportedSession] = {}
-    inner = folders_of([stream.name for stream in names])
+    inner = stream_folders([stream.name for stream in names])
     for stream in names:
-        # what was said of one IMU of the file is no matter of another
+        # each IMU of the file has its own messages
         one = recording.alone(stream.name)
         there = folder / inner[stream.name] if len(names) > 1 else folder
-        imported[stream.name] = _bring(args, one, stream, there)
+        imported[stream.name] = _import_stream(args, one, stream, there)
         written.append(there)
     if len(names) > 1:
         rests = {name: one.forces for name, one in imported.items()}
-        _say_instances(folder, rests, float(args.gravity or G0))
+        _report_instances(folder, rests, float(args.gravity or G0))
     return list(imported.values())
 
 
-def _list(opened: list[Recording]) -> int:
+def _list_streams(opened: list[Recording]) -> int:
     for recording in opened:
         for stream in recording.streams():
             named = (recording.path, stream.name, stream.says)
@@ -203,10 +205,10 @@ def _list(opened: list[Recording]) -> int:
     return 0
 
 
-def folders_of(streams: Sequence[str]) -> dict[str, str]:
-    """Folder of each stream; those whose names differ in signs alone are numbered.
+def stream_folders(streams: Sequence[str]) -> dict[str, str]:
+    """Folder name of each stream; a number makes equal names distinct.
 
-    >>> folders_of(["/a/b", "/a_b", "/c"])
+    >>> stream_folders(["/a/b", "/a_b", "/c"])
     {'/a/b': 'a_b', '/a_b': 'a_b_2', '/c': 'c'}
     """
     found: dict[str, str] = {}
@@ -219,8 +221,8 @@ def folders_of(streams: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
-    """Return the streams that are imported."""
+def _selected_streams(recording: Recording, wanted: list[str]) -> list[ImuStream]:
+    """Streams to be imported: the wanted ones, or all."""
     there = {stream.name: stream for stream in recording.streams()}
     for name in wanted:
         if name not in there:
@@ -230,7 +232,7 @@ def _chosen(recording: Recording, wanted: list[str]) -> list[ImuStream]:
     return [there[name] for name in wanted or there]
 
 
-def _bring(
+def _import_stream(
     args: argparse.Namespace, recording: Recording, stream: ImuStream, folder: Path
 ) -> ImportedSession:
     from fieldcal.importing.session.ingest import import_stream
@@ -251,12 +253,12 @@ def _bring(
         about["guessed"] = guessed
         stream = next(s for s in recording.streams() if s.name == stream.name)
     if (scatter := recording.scatter()) is not None:
-        return _bring_means(args, recording, stream, folder, about, scatter)
+        return _import_means(args, recording, stream, folder, about, scatter)
     imported = import_stream(recording, stream.name, folder, about, args.still)
     err = sys.stderr.write
     err(
         f"{folder}: {stream.name}, {stream.says}: {imported.facts.sentence()},"
-        f" {_many(len(imported.rests), 'still stretch', 'es')}"
+        f" {_counted(len(imported.rests), 'still stretch', 'es')}"
         f" of {args.still:g} s or more\n"
     )
     for what, why in guessed.items():
@@ -264,7 +266,7 @@ def _bring(
     for sentence in imported.says:
         err(f"{folder}: {sentence}\n")
     if imported.facts.left_out:
-        err(f"{folder}: left out: {_many(imported.facts.left_out, 'row', 's')}\n")
+        err(f"{folder}: left out: {_counted(imported.facts.left_out, 'row', 's')}\n")
     if not imported.rests and kept:
         err(
             f"nothing says what a {' or '.join(sorted(set(kept.values())))} is worth,"
@@ -279,7 +281,7 @@ def _bring(
     return imported
 
 
-def _bring_means(
+def _import_means(
     args: argparse.Namespace,
     recording: Recording,
     stream: ImuStream,
@@ -300,8 +302,8 @@ def _bring_means(
     err = sys.stderr.write
     err(
         f"{folder}: {stream.name}, {stream.says}:"
-        f" {_many(imported.facts.rows, 'position', 's')}, means only: nothing that goes"
-        " on within a position or between two can be found\n"
+        f" {_counted(imported.facts.rows, 'position', 's')}, means only: nothing that"
+        " goes on within a position or between two can be found\n"
     )
     for what, why in guessed.items():
         err(f"{folder}: {what.replace('_', ' ')} taken as {why}\n")
@@ -311,8 +313,8 @@ def _bring_means(
     return imported
 
 
-def _say_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
-    """Say which of several IMUs in one log is out."""
+def _report_instances(folder: Path, rests: dict[str, Array], gravity: float) -> None:
+    """Report which of several IMUs in one log disagrees with the others."""
     from fieldcal.evaluation.instances import compare_instances
 
     found = compare_instances(rests, gravity)
@@ -320,6 +322,6 @@ def _say_instances(folder: Path, rests: dict[str, Array], gravity: float) -> Non
         sys.stderr.write(f"{folder}: {one.sentence()}\n")
 
 
-def _many(number: int, what: str, ending: str) -> str:
-    """So many of something."""
+def _counted(number: int, what: str, ending: str) -> str:
+    """Number with a noun, in the plural unless it is 1."""
     return f"{number} {what}{ending if number != 1 else ''}"

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 RARE = ("limits", "history")
 
-SHOWN = 12
-"""Odd units that are listed; --json has all."""
+ODD_UNITS_SHOWN = 12
+"""Number of odd units that are listed; --json has all."""
 
 EXAMPLE = """\
   fieldcal lot
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 0 in control, 1 something is odd or has shifted."""
+    """Carry out the command; 0 if in control, 1 with an odd unit, shift or drift."""
     from fieldcal.calibration import limits
     from fieldcal.core.errors import InputError
     from fieldcal.fleet.lot import analyse_lot
@@ -76,13 +76,13 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(found.to_json(), allow_nan=False) + "\n")
     else:
-        _show(found)
+        _print_lot(found)
         if args.report:
             sys.stdout.write(f"written: {args.report}\n")
     return 0 if found.in_control else 1
 
 
-def _show(found: LotAnalysis) -> None:
+def _print_lot(found: LotAnalysis) -> None:
     from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     say = sys.stdout.write
@@ -101,24 +101,24 @@ def _show(found: LotAnalysis) -> None:
         unit = format_unit(one.unit)
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
         say(f"{one.name:24}{mean:>24}{f'{wide} {unit}':>32}{cpk:>14}\n")
-    for line in statements(found):
+    for line in lot_findings(found):
         say(line + "\n")
 
 
-def statements(found: LotAnalysis) -> list[str]:
-    """What is odd, what has shifted, and which chart is beyond its limits."""
+def lot_findings(found: LotAnalysis) -> list[str]:
+    """Lines about odd units, shifts, and charts beyond their limits."""
     from fieldcal.calibration.wording import format_unit, format_with_sigma
 
     out = []
-    for odd in found.odd[:SHOWN]:
+    for odd in found.odd[:ODD_UNITS_SHOWN]:
         unit = format_unit(found.parameters[odd.parameter].unit)
         off = " ± ".join(format_with_sigma(odd.deviation, odd.sigma))
         out.append(
             f"odd: {escape_line(odd.serial or odd.folder)}, {odd.parameter} is off by"
             f" {off} {unit}".rstrip()
         )
-    if len(found.odd) > SHOWN:
-        out.append(f"odd: and {len(found.odd) - SHOWN} more (--json)")
+    if len(found.odd) > ODD_UNITS_SHOWN:
+        out.append(f"odd: and {len(found.odd) - ODD_UNITS_SHOWN} more (--json)")
     for shift in found.shifts:
         unit = format_unit(found.parameters[shift.parameter].unit)
         groups = zip(shift.labels, shift.values, shift.sigmas, strict=True)

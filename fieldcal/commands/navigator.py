@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.commands.table import show
+    from fieldcal.commands.table import show_calibration
     from fieldcal.navigator.session_runs import calibrate_navigator
     from fieldcal.session import description
     from fieldcal.session.folder import DESCRIPTION, RESULT, write_atomically
@@ -36,6 +36,6 @@ def run(args: argparse.Namespace) -> int:
             sys.stderr.write(f"fieldcal navigator: {warning}\n")
         sys.stdout.write(text + "\n")
     else:
-        show(found)
+        show_calibration(found)
         sys.stdout.write(f"written: {path}\n")
     return 0

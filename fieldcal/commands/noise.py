@@ -32,8 +32,8 @@ EXAMPLE = """\
   fieldcal noise overnight.mcap
 """
 
-JOINED = 3.0
-"""Windows no further apart are one stretch, s."""
+JOINED_GAP_S = 3.0
+"""Largest gap between windows that are joined into one stretch, s."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,9 +63,10 @@ def run(args: argparse.Namespace) -> int:
 
     with TemporaryDirectory(prefix="fieldcal-noise-") as place:
         sessions = [
-            _opened(path, Path(place) / str(i)) for i, path in enumerate(args.sessions)
+            _open_session(path, Path(place) / str(i))
+            for i, path in enumerate(args.sessions)
         ]
-        found = result(sessions, args.limits, args.history)
+        found = noise_result(sessions, args.limits, args.history)
     found = replace(found, sessions=[str(path) for path in args.sessions])
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
@@ -76,9 +77,9 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(content, allow_nan=False) + "\n")
     else:
-        from fieldcal.commands.noise_view import show
+        from fieldcal.commands.noise_view import show_noise
 
-        show(found)
+        show_noise(found)
         if path:
             sys.stdout.write(f"written: {path}\n")
     if args.report:
@@ -90,13 +91,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _opened(path: Path, place: Path) -> Session:
-    """A session folder; of a file, what it imports as.
+def _open_session(path: Path, place: Path) -> Session:
+    """The session of a folder, or of a file, which is imported into `place`.
 
     Raises
     ------
     InputError
-        If the file asks a question, or has several IMUs.
+        If the file needs options to be imported, or has several IMUs.
 
     """
     from fieldcal.commands import import_recording
@@ -127,12 +128,12 @@ def _opened(path: Path, place: Path) -> Session:
     return Session.open(place)
 
 
-def result(
+def noise_result(
     sessions: Sequence[Session],
     limits: Path | None = None,
     history: StoreLocation | None = None,
 ) -> NoiseResult:
-    """Everything that recordings of a device at rest tell of its noise.
+    """The noise of a device, from its recordings at rest.
 
     Raises
     ------
@@ -144,12 +145,12 @@ def result(
     from fieldcal.noise.alignment import gyrocompass_heading
     from fieldcal.noise.document import NoiseResult
 
-    _check_same(sessions)
-    model = estimate_noise([reduce_recording(_at_rest(s)) for s in sessions])
+    _check_one_device(sessions)
+    model = estimate_noise([reduce_recording(_blocks_at_rest(s)) for s in sessions])
     about = sessions[0].about
     grade = about.grade
     serial = str(about.device.get("serial", ""))
-    recalibrate, since = _recalibrate(model, grade, serial, limits, history)
+    recalibrate, since = _recalibration_times(model, grade, serial, limits, history)
     gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
     compass = None
     if grade == "navigation" and gyroscopes:
@@ -165,7 +166,7 @@ def result(
     )
 
 
-def _check_same(sessions: Sequence[Session]) -> None:
+def _check_one_device(sessions: Sequence[Session]) -> None:
     from fieldcal.core.errors import InputError
 
     first = sessions[0]
@@ -178,11 +179,11 @@ def _check_same(sessions: Sequence[Session]) -> None:
             )
 
 
-def _at_rest(session: Session) -> Iterator[Block]:
-    """Samples of the windows; of all where the session has none."""
+def _blocks_at_rest(session: Session) -> Iterator[Block]:
+    """Samples of the windows; all samples if the session has no windows."""
     spans: list[list[float]] = []
     for start, end in sorted(w for w in session.windows if w):
-        if spans and start - spans[-1][1] <= JOINED:
+        if spans and start - spans[-1][1] <= JOINED_GAP_S:
             spans[-1][1] = max(spans[-1][1], end)
         else:
             spans.append([start, end])
@@ -195,14 +196,14 @@ def _at_rest(session: Session) -> Iterator[Block]:
                 yield part
 
 
-def _recalibrate(
+def _recalibration_times(
     model: NoiseModel,
     grade: str,
     serial: str,
     limits: Path | None,
     history: StoreLocation | None,
 ) -> tuple[Mapping[str, Recalibration], str]:
-    """When each bias leaves the limit of the grade, and since when."""
+    """When each bias leaves the limit of the grade, and the start of that time."""
     from fieldcal.calibration import limits as bounds
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History
@@ -213,7 +214,7 @@ def _recalibrate(
     out = {}
     for name, channel in model.channels.items():
         group = "acc_bias" if name[0] == "a" else "gyr_bias"
-        steps = _steps(runs, f"{group}.{name[1]}")
+        steps = _history_steps(runs, f"{group}.{name[1]}")
         limit = float(getattr(allowed, f"{group}_sigma"))
         variance = channel.averaging.at(30.0)[0] ** 2
         pair = channel.pair
@@ -225,7 +226,7 @@ def _recalibrate(
     return out, dates[-1] if dates else datetime.now(UTC).isoformat()
 
 
-def _steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
+def _history_steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
     """Changes of a bias between calibrations that count as its family."""
     from fieldcal.history.store import family_runs
     from fieldcal.noise.recalibration import HistoryStep

@@ -1,4 +1,4 @@
-"""The noise of a device as a person at a terminal reads it."""
+"""Terminal view of the noise of a device."""
 
 from __future__ import annotations
 
@@ -20,46 +20,48 @@ COLUMNS = (
     ("K", "walk K, {}·√Hz"),
 )
 OTHERS = {name: PROCESSES[name] for name in "QRG"}
-PAPERS = (30.0, 60.0)
-"""Averaging times of the papers, s."""
+PAPER_WINDOWS_S = (30.0, 60.0)
+"""Lengths of the windows in the papers, s."""
 
 
-def show(
+def show_noise(
     found: NoiseResult, out: IO[str] | None = None, width: int | None = None
 ) -> None:
-    """Print processes, how long to average, and what follows."""
-    from fieldcal.commands.console import ShownConsole
+    """Print processes, averaging times and consequences."""
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole(file=out, width=width)
+    console = EscapingConsole(file=out, width=width)
     model = found.model
     many = "one stretch" if model.stretches == 1 else f"{model.stretches} stretches"
-    _line(
+    _print_sentence(
         console,
-        f"at rest {_span(model.seconds)} in {many}, {model.rate_hz:.4g} Hz,"
+        f"at rest {_format_duration(model.seconds)} in {many}, {model.rate_hz:.4g} Hz,"
         f" {100 * model.bridged:.2g} % disturbed and bridged",
     )
     for triad, what in TRIADS:
         some = [c for n, c in model.channels.items() if n[0] == triad]
         if some:
-            scale, prefix = _scale(some)
-            _sizes(console, what, some, scale, prefix + format_unit(some[0].unit))
-            _windows(console, some, scale, prefix + format_unit(some[0].unit))
-    _follows(console, found)
+            scale, prefix = _unit_prefix(some)
+            _print_sizes(console, what, some, scale, prefix + format_unit(some[0].unit))
+            _print_averaging(console, some, scale, prefix + format_unit(some[0].unit))
+    _print_consequences(console, found)
 
 
-def _scale(channels: list[ChannelEstimate]) -> tuple[float, str]:
-    """A prefix in which white noise is more than one."""
+def _unit_prefix(channels: list[ChannelEstimate]) -> tuple[float, str]:
+    """Factor and prefix of the unit in which the largest white noise is 1 or more."""
     largest = max(c.processes["N"].value for c in channels)
     return next((p for p in PREFIXES if largest >= p[0]), PREFIXES[-1])
 
 
-def _cell(size: ProcessSize | None, below: ProcessSize | None, scale: float) -> str:
+def _size_cell(
+    size: ProcessSize | None, below: ProcessSize | None, scale: float
+) -> str:
     if size is not None:
         return " ± ".join(format_with_sigma(size.value / scale, size.sigma / scale))
     return "–" if below is None else f"< {below.value / scale:.2g}"
 
 
-def _sizes(
+def _print_sizes(
     console: Console, what: str, some: list[ChannelEstimate], scale: float, unit: str
 ) -> None:
     from rich.box import SIMPLE_HEAD
@@ -73,18 +75,18 @@ def _sizes(
         table.add_column(title.format(unit), justify="right")
     for channel in some:
         cells = [
-            _cell(channel.processes.get(p), channel.limits.get(p), scale)
+            _size_cell(channel.processes.get(p), channel.limits.get(p), scale)
             for p, _ in COLUMNS
         ]
         table.add_row(channel.name, *cells)
     console.print(table)
     for channel in some:
-        for text in _more(channel, scale, unit):
-            _line(console, f"  {channel.name}: {text}")
+        for text in _other_processes(channel, scale, unit):
+            _print_sentence(console, f"  {channel.name}: {text}")
 
 
-def _more(channel: ChannelEstimate, scale: float, unit: str) -> list[str]:
-    """What a channel has beside white noise, flicker and walk."""
+def _other_processes(channel: ChannelEstimate, scale: float, unit: str) -> list[str]:
+    """Sentences about a channel's noise beside white noise, flicker and walk."""
     out = []
     for name, size in channel.processes.items():
         what = OTHERS.get(name[0])
@@ -112,10 +114,10 @@ def _more(channel: ChannelEstimate, scale: float, unit: str) -> list[str]:
     return out
 
 
-def _windows(
+def _print_averaging(
     console: Console, some: list[ChannelEstimate], scale: float, unit: str
 ) -> None:
-    """How long to average."""
+    """Print the error of a mean against its length."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -130,7 +132,7 @@ def _windows(
             " ± ".join(format_with_sigma(v / scale, s / scale))
             if seconds <= found.seconds[-1]
             else "too short"
-            for seconds in PAPERS
+            for seconds in PAPER_WINDOWS_S
             for v, s in [found.at(seconds)]
         ]
         least = float(found.sigma.min()) / scale
@@ -138,14 +140,14 @@ def _windows(
             channel.name,
             *cells,
             f"{least:.2g}",
-            _until(found.best, float(found.seconds[-1])),
-            _until(found.white_until, float(found.seconds[-1])),
+            _time_with_range(found.best, float(found.seconds[-1])),
+            _time_with_range(found.white_until, float(found.seconds[-1])),
         )
     console.print(table)
 
 
-def _until(times: tuple[float, float, float], last: float) -> str:
-    """A time with what it may be, or that it is longer than can be told."""
+def _time_with_range(times: tuple[float, float, float], last: float) -> str:
+    """A time with its 68 % interval, or a lower bound if it is longer than `last`."""
     middle, low, high = times
     if not math.isfinite(middle):
         return f"> {last:.0f} s" if not math.isfinite(low) else f"> {low:.0f} s"
@@ -153,22 +155,22 @@ def _until(times: tuple[float, float, float], last: float) -> str:
     return f"{middle:.0f} s ({low:.0f}–{end})"
 
 
-def _follows(console: Console, found: NoiseResult) -> None:
+def _print_consequences(console: Console, found: NoiseResult) -> None:
     for program in ("kalibr", "ardupilot", "px4"):
         console.print(f"{program}:", style="bold")
         for name, (value, sigma, unit) in found.programs[program].items():
             text = f"{value_or_bound(value, sigma)} {format_unit(unit)}"
             console.print(f"  {name:30} {text}")
     for text in consequences(found):
-        _line(console, f"  {text}")
+        _print_sentence(console, f"  {text}")
 
 
-def _line(console: Console, text: str) -> None:
-    """Print a sentence: between words on a terminal, else as one line."""
+def _print_sentence(console: Console, text: str) -> None:
+    """Print a sentence, wrapped between words on a terminal, else on one line."""
     console.print(text, soft_wrap=not console.is_terminal)
 
 
-def _span(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     if seconds < 600:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

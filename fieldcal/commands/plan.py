@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.plan_file import chosen, table, write
-from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed, show_spins
-from fieldcal.commands.site import add_site, site_tables
+from fieldcal.commands.plan_file import position_table, select_positions, write_plan
+from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed_options, show_spins
+from fieldcal.commands.site import add_site_options, site_tables
 from fieldcal.core.errors import PlanError
 from fieldcal.core.factory import FACTORY_KEYS
 
@@ -35,13 +35,14 @@ EXAMPLE = """\
   fieldcal run plan.toml --device "serial:/dev/ttyUSB0?format=witmotion"
 """
 
-TURN = 10.0
+TURN_S = 10.0
 """Time to turn the device and let it settle, s."""
 
-SHORTEST, LONGEST = 10.0, 60.0
-"""Averaging times worth planning for, s: noise below, disturbances and drift above."""
+SHORTEST_S, LONGEST_S = 10.0, 60.0
+"""Range of averaging times, s. Shorter windows are noisy, longer ones drift or are
+disturbed."""
 
-PAPER = "the paper's five"
+PAPER_COLUMN = "the paper's five"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,8 +89,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the plan for fieldcal run",
     )
     add("--json", action="store_true", help="print one JSON object")
-    add_speed(parser)
-    add_site(parser)
+    add_speed_options(parser)
+    add_site_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -106,33 +107,35 @@ def run(args: argparse.Namespace) -> int:
         tables["site"] = {**tables.get("site", {}), "sways": True}
     gravity = description.parse_description(tables).gravity
     if args.speed is not None:
-        return _spins(args)
+        return _plan_spins(args)
     if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
         raise PlanError("limits are 0 to 180° for α and 0 to 90° for β")
     ladder = planner.Ladder(*np.deg2rad([args.alpha, args.beta]).tolist())
-    places = chosen(args, ladder, gravity)
-    seconds = _seconds(args.minutes, len(places))
-    device = _device(args.noise_of) if args.noise_of else None
+    places = select_positions(args, ladder, gravity)
+    seconds = _seconds_per_position(args.minutes, len(places))
+    device = _read_device_noise(args.noise_of) if args.noise_of else None
     grade = device.grade(seconds) if device else planner.GRADES[args.noise]
     noise = "this device" if device else args.noise
-    needed = None if args.sways is None else _needed(args.sways, grade)
+    needed = None if args.sways is None else _seconds_needed(args.sways, grade)
     found = planner.expected(places, grade, seconds, gravity)
     paper = planner.expected(FIVE_POSITIONS, grade, seconds, gravity)
     further = planner.extra_position(places, ladder, gravity)
     with_it = planner.expected((*places, further), grade, seconds, gravity)
     confused = find_aliases(places, gravity)
     if args.output:
-        write(args.output, tables, places, seconds)
+        write_plan(args.output, tables, places, seconds)
     if args.json:
-        out = _json(places, seconds, found, confused, further, with_it)
+        out = _plan_document(places, seconds, found, confused, further, with_it)
         out["averaging"] = device.to_json() if device else grade.to_json()
         if needed is not None:
             out["needed_s"] = needed
         sys.stdout.write(json.dumps(out) + "\n")
         return 0
-    _show(places, seconds, noise, grade, found, paper, with_it)
-    _tell(confused, further)
-    sys.stdout.write(f"{device.sentence(seconds) if device else _worth(grade)}\n")
+    _print_plan(places, seconds, noise, grade, found, paper, with_it)
+    _print_aliases(confused, further)
+    sys.stdout.write(
+        f"{device.sentence(seconds) if device else _averaging_sentence(grade)}\n"
+    )
     if needed is not None:
         sys.stdout.write(
             f"on a base that sways by 1° at {args.sways:g} Hz each position needs"
@@ -143,13 +146,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _needed(hz: float, grade: GradeNoise) -> float:
-    """Seconds that a position needs on a swaying base.
+def _seconds_needed(hz: float, grade: GradeNoise) -> float:
+    """Averaging time that a position needs on a base that sways at `hz`, s.
 
     Raises
     ------
     PlanError
-        If it does not sway.
+        If the frequency is not above 0.
 
     """
     from fieldcal.planning.swaying_base import window_seconds_needed
@@ -159,25 +162,25 @@ def _needed(hz: float, grade: GradeNoise) -> float:
     return window_seconds_needed(hz, grade)
 
 
-def _spins(args: argparse.Namespace) -> int:
-    """Plan windows on a table."""
+def _plan_spins(args: argparse.Namespace) -> int:
+    """Plan windows on a rate table."""
     from fieldcal.planning.planner import GRADES
 
     windows = (SPINS if args.positions is None else args.positions) + RESTS
-    seconds = _seconds(args.minutes, windows)
-    device = _device(args.noise_of) if args.noise_of else None
+    seconds = _seconds_per_position(args.minutes, windows)
+    device = _read_device_noise(args.noise_of) if args.noise_of else None
     grade = device.grade(seconds) if device else GRADES[args.noise]
     noise = "this device" if device else args.noise
     return show_spins(args, grade.gyr(seconds), seconds, noise)
 
 
-def _device(path: Path) -> DeviceNoise:
-    """What `fieldcal noise` found of a device.
+def _read_device_noise(path: Path) -> DeviceNoise:
+    """Noise of a device, from its noise.json.
 
     Raises
     ------
     SessionError
-        If there is no noise.json, or it is none.
+        If there is no noise.json, or it is invalid.
 
     """
     from fieldcal.core.errors import SessionError
@@ -192,20 +195,20 @@ def _device(path: Path) -> DeviceNoise:
     return device_noise_from(content)
 
 
-def _seconds(minutes: float, n: int) -> float:
-    """Averaging time of each position within the budget, s."""
-    each = 60 * minutes / n - TURN
-    if each < SHORTEST:
+def _seconds_per_position(minutes: float, n: int) -> float:
+    """Averaging time of each of n positions within some minutes, s."""
+    each = 60 * minutes / n - TURN_S
+    if each < SHORTEST_S:
         raise PlanError(
             f"{minutes:g} min for {n} positions leave {max(each, 0):.0f} s to average"
-            f" after {TURN:g} s to turn: allow"
-            f" {n * (SHORTEST + TURN) / 60:.1f} min or take fewer positions"
+            f" after {TURN_S:g} s to turn: allow"
+            f" {n * (SHORTEST_S + TURN_S) / 60:.1f} min or take fewer positions"
         )
-    return float(min(LONGEST, round(each)))
+    return float(min(LONGEST_S, round(each)))
 
 
-def _worth(grade: GradeNoise) -> str:
-    """How long a device of a grade is worth averaging."""
+def _averaging_sentence(grade: GradeNoise) -> str:
+    """Sentence about the averaging time from which longer windows gain little."""
     return (
         f"flicker wins over white noise from {grade.acc_seconds:.0f} s"
         f" (accelerometers) and {grade.gyr_seconds:.0f} s (gyroscopes): longer windows"
@@ -213,7 +216,7 @@ def _worth(grade: GradeNoise) -> str:
     )
 
 
-def _json(
+def _plan_document(
     chosen: Sequence[Position],
     seconds: float,
     found: Mapping[str, float],
@@ -222,16 +225,16 @@ def _json(
     with_it: Mapping[str, float],
 ) -> dict[str, Any]:
     return {
-        "positions": [table(p) for p in chosen],
+        "positions": [position_table(p) for p in chosen],
         "seconds": seconds,
         "sigma": dict(found),
         "hidden": list(confused.hidden),
         "aliases": {name: list(others) for name, others in confused.pairs},
-        "extra_position": {**table(further), "sigma": dict(with_it)},
+        "extra_position": {**position_table(further), "sigma": dict(with_it)},
     }
 
 
-def _show(
+def _print_plan(
     chosen: Sequence[Position],
     seconds: float,
     noise: str,
@@ -242,35 +245,35 @@ def _show(
 ) -> None:
     from rich.table import Table
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole()
+    console = EscapingConsole()
     console.print(f"{len(chosen)} positions, {seconds:g} s each:")
     for i, position in enumerate(chosen, start=1):
         console.print(f"  {i}  {position.name}")
     title = f"Expected ± 1σ ({noise}: {1e3 * grade.acc(seconds):.2f} mm/s² a mean)"
     table = Table(title=title, title_justify="left")
-    for column in ("parameter", "this plan", PAPER, "one more", "unit"):
+    for column in ("parameter", "this plan", PAPER_COLUMN, "one more", "unit"):
         side = "left" if column in ("parameter", "unit") else "right"
         table.add_column(column, justify="right" if side == "right" else "left")
     for name in dict.fromkeys([*found, *paper]):
-        cells = [_cell(sigmas.get(name)) for sigmas in (found, paper, with_it)]
-        table.add_row(name, *cells, _unit(name))
+        cells = [_sigma_cell(sigmas.get(name)) for sigmas in (found, paper, with_it)]
+        table.add_row(name, *cells, _unit_of_parameter(name))
     console.print(table)
 
 
-def _cell(sigma: float | None) -> str:
+def _sigma_cell(sigma: float | None) -> str:
     return "not determined" if sigma is None else f"{sigma:.2g}"
 
 
-def _unit(name: str) -> str:
+def _unit_of_parameter(name: str) -> str:
     from fieldcal.calibration.names import group_of
 
     units = {"acc_bias": "m/s²", "acc_scale": "1", "gyr_bias": "rad/s"}
     return units.get(group_of(name), "°")
 
 
-def _tell(confused: Aliases, further: Position) -> None:
+def _print_aliases(confused: Aliases, further: Position) -> None:
     say = sys.stdout.write
     say(f"one more position worth most: {further.name}\n")
     if confused.hidden:

@@ -1,4 +1,4 @@
-"""Positions of `fieldcal plan`, from a file and into one."""
+"""Reads and writes the positions of `fieldcal plan`."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from fieldcal.core.positions import Position
     from fieldcal.planning.planner import Ladder
 
-POSITIONS = 5
-"""Positions unless another number is asked for."""
+DEFAULT_COUNT = 5
+"""Number of positions unless another is given."""
 
 
-def chosen(
+def select_positions(
     args: argparse.Namespace, ladder: Ladder, gravity: float
 ) -> tuple[Position, ...]:
-    """The positions that are to be evaluated, or the best ones of the ladder.
+    """Positions to evaluate: of a file, of a known set, or the best of the ladder.
 
     Raises
     ------
     PlanError
-        If none are best, or those of a file are not known.
+        If no best positions exist, or a file has positions without angles.
 
     """
     from fieldcal.core.positions import POSITION_SETS
@@ -34,7 +34,7 @@ def chosen(
     from fieldcal.session.folder import DESCRIPTION
 
     if args.of is None:
-        many = POSITIONS if args.positions is None else args.positions
+        many = DEFAULT_COUNT if args.positions is None else args.positions
         return (
             POSITION_SETS[args.set]
             if args.set
@@ -52,7 +52,7 @@ def chosen(
     return found
 
 
-def write(
+def write_plan(
     path: Path, tables: Mapping[str, Any], positions: Sequence[Position], seconds: float
 ) -> None:
     """Write a plan for `fieldcal run`.
@@ -70,12 +70,16 @@ def write(
     if path.exists():
         raise InputError(f"{path}: is there already; name another file")
     run_table = {"procedure": "positions", "seconds": seconds}
-    whole = {**tables, "run": run_table, "position": [table(p) for p in positions]}
+    whole = {
+        **tables,
+        "run": run_table,
+        "position": [position_table(p) for p in positions],
+    }
     write_atomically(path, tomlkit.dumps(whole))
 
 
-def table(position: Position) -> dict[str, Any]:
-    """A position as a plan has it."""
+def position_table(position: Position) -> dict[str, Any]:
+    """Table of a position in a plan file."""
     alpha, beta, gamma = position.all_degrees or (0.0, 0.0, 0.0)
     third = {"gamma_deg": gamma} if gamma else {}
     return {"name": position.name, "alpha_deg": alpha, "beta_deg": beta, **third}

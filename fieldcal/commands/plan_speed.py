@@ -11,10 +11,10 @@ from fieldcal.core.errors import PlanError
 from fieldcal.core.samples import Array
 
 SPINS, RESTS = 6, 2
-"""Windows on the table unless another number is asked for, and at rest beside."""
+"""Number of windows on the turning table unless given, and of windows at rest."""
 
 
-def add_speed(parser: argparse.ArgumentParser) -> None:
+def add_speed_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     group = parser.add_argument_group("gyroscopes on a table of known speed")
     add = group.add_argument
@@ -31,14 +31,14 @@ def add_speed(parser: argparse.ArgumentParser) -> None:
 def show_spins(
     args: argparse.Namespace, sigma: float, seconds: float, noise: str
 ) -> int:
-    """Print how to set the device on the table, and the ± that follows.
+    """Print how to mount the device on the table, and the expected uncertainties.
 
     Parameters
     ----------
     args : of the command
-    sigma : rad/s, standard error of a gyroscope's mean over a window
+    sigma : standard error of a gyroscope's mean over a window, rad/s
     seconds : length of a window
-    noise : whose it is
+    noise : name of the device or grade that `sigma` belongs to
 
     Raises
     ------
@@ -70,24 +70,26 @@ def show_spins(
         }
         sys.stdout.write(json.dumps(out) + "\n")
         return 0
-    _show(axes, seconds, found, f"{noise}: {sigma:.2g} rad/s a mean")
+    _print_spins(axes, seconds, found, f"{noise}: {sigma:.2g} rad/s a mean")
     if missing:
         sys.stdout.write(f"not determined: {', '.join(missing)}; take more spins\n")
     return 0
 
 
-def _show(axes: Array, seconds: float, found: Mapping[str, float], noise: str) -> None:
+def _print_spins(
+    axes: Array, seconds: float, found: Mapping[str, float], noise: str
+) -> None:
     from rich.table import Table
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole()
+    console = EscapingConsole()
     console.print(
         f"{len(axes)} spins and {RESTS} rests, {seconds:g} s each; in the device the"
         " table's axis is along"
     )
     for i, axis in enumerate(axes.tolist(), start=1):
-        console.print(f"  {i}  {_direction(axis)}")
+        console.print(f"  {i}  {_axis_direction(axis)}")
     table = Table(title=f"Expected ± 1σ ({noise})", title_justify="left")
     for column in ("parameter", "this plan", "unit"):
         table.add_column(column, justify="right" if column == "this plan" else "left")
@@ -97,10 +99,10 @@ def _show(axes: Array, seconds: float, found: Mapping[str, float], noise: str) -
     console.print(table)
 
 
-def _direction(axis: list[float]) -> str:
-    """A direction of a cube by the axes between which it lies.
+def _axis_direction(axis: list[float]) -> str:
+    """Words for a direction along an axis or between axes.
 
-    >>> _direction([0.7, 0.0, -0.7])
+    >>> _axis_direction([0.7, 0.0, -0.7])
     'between +x and -z'
     """
     parts = [

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    ports = _named(args.port) if args.port else plugged_in()
+    ports = _ports_by_name(args.port) if args.port else serial_ports()
     if args.probe:
         from fieldcal.drivers.probe import probe_port
 
@@ -47,39 +47,39 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps({"ports": ports}) + "\n")
     elif ports:
-        _show(ports, args.probe)
+        _print_ports(ports, args.probe)
     else:
         sys.stdout.write("no serial port is plugged in\n")
     asked = args.probe and args.port
     return 3 if asked and not all(port["answer"]["url"] for port in ports) else 0
 
 
-def plugged_in() -> list[dict[str, Any]]:
-    """What the system knows of each serial port that is plugged in."""
+def serial_ports() -> list[dict[str, Any]]:
+    """Properties of each serial port of the system."""
     from serial.tools.list_ports import comports
 
-    return [_described(port) for port in sorted(comports())]
+    return [_port_properties(port) for port in sorted(comports())]
 
 
-def _named(names: list[str]) -> list[dict[str, Any]]:
-    known = {port["port"]: port for port in plugged_in()}
+def _ports_by_name(names: list[str]) -> list[dict[str, Any]]:
+    known = {port["port"]: port for port in serial_ports()}
     return [known.get(name, {"port": name, "what": "", "serial": ""}) for name in names]
 
 
-def _described(port: Any) -> dict[str, Any]:
-    """What the system knows of a port."""
+def _port_properties(port: Any) -> dict[str, Any]:
+    """Properties of a port: device path, description, serial number."""
     usb = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None else ""
     parts = (port.manufacturer, port.product or port.description, usb)
     what = " ".join(part for part in parts if part and part != "n/a")
     return {"port": port.device, "what": what, "serial": port.serial_number or ""}
 
 
-def _show(ports: list[dict[str, Any]], probed: bool) -> None:
+def _print_ports(ports: list[dict[str, Any]], probed: bool) -> None:
     from rich.table import Table
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
-    console = ShownConsole(soft_wrap=True)
+    console = EscapingConsole(soft_wrap=True)
     table = Table("port", "what it is", "serial number")
     if probed:
         table.add_column("what it says")

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    page = write(args.session, args.output, args.earlier)
+    page = write_report(args.session, args.output, args.earlier)
     sys.stdout.write(f"written: {page}\n")
     if args.pdf or args.png:
         from fieldcal.report.browser import Browser
@@ -64,13 +64,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def write(
+def write_report(
     session: Path,
     output: Path | None = None,
     earlier: Sequence[Path] = (),
     history: StoreLocation | None = None,
 ) -> Path:
-    """Write the report of a session and return where it is.
+    """Write the report of a session; returns its path.
 
     Parameters
     ----------
@@ -90,14 +90,16 @@ def write(
     from fieldcal.report.page import REPORT
     from fieldcal.session.folder import write_atomically
 
-    before = [read_earlier_result(path) for path in earlier] or _before(
+    before = [read_earlier_result(path) for path in earlier] or _earlier_calibrations(
         session, history
     )
     return write_atomically(output or session / REPORT, render(gather(session, before)))
 
 
-def _before(folder: Path, history: StoreLocation | None) -> list[EarlierCalibration]:
-    """What the history knows of the device, without this session."""
+def _earlier_calibrations(
+    folder: Path, history: StoreLocation | None
+) -> list[EarlierCalibration]:
+    """Calibrations of the device in the history, without this session."""
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.report import EarlierCalibration

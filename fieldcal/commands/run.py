@@ -9,21 +9,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.help import BROKEN, INTERRUPTED
-from fieldcal.commands.introduce import introduce
-from fieldcal.commands.run_operator import operator_of
-from fieldcal.commands.run_page import LOCAL, served, told_end
-from fieldcal.commands.run_results import broken_off, write_junit
+from fieldcal.commands.find_device import find_device
+from fieldcal.commands.help import EXIT_INTERNAL_ERROR, EXIT_INTERRUPTED
+from fieldcal.commands.repeated_option import StoreRepeated
+from fieldcal.commands.run_operator import run_operator
+from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
+from fieldcal.commands.run_results import report_broken_run, write_junit
 from fieldcal.commands.run_task import SESSIONS, make_task
-from fieldcal.commands.run_waits import (
+from fieldcal.commands.run_timeouts import (
     PATIENCE,
     PATIENCE_HEADLESS,
-    asks,
-    give_up,
-    patience,
+    can_ask_operator,
+    give_up_seconds,
+    reconnect_seconds,
 )
-from fieldcal.commands.several import StoreSeveral
-from fieldcal.commands.site import add_site
+from fieldcal.commands.site import add_site_options
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.plugins import module_names
@@ -53,7 +53,7 @@ RARE = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
-    # their names alone: what they import is not loaded for a line of help
+    # names only, since importing the procedures would slow down the help
     procedures = module_names([str(Path(__file__).parents[1] / "procedures")])
     add(
         "procedure",
@@ -70,8 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SESSION",
         help="continue an interrupted run (default: the last)",
     )
-    _add_device(parser)
-    _add_task(parser)
+    _add_device_options(parser)
+    _add_task_options(parser)
     add("-o", "--output", type=Path, metavar="FOLDER", help="where to record")
     add(
         "--headless",
@@ -89,14 +89,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--json", action="store_true", help="print the result as one JSON object")
     add("--no-report", action="store_true", help="write no report.html")
     add("--junit", type=Path, metavar="FILE", help="write the outcome as JUnit XML")
-    add_site(parser, several=True)
+    add_site_options(parser, several=True)
 
 
-def _add_device(parser: argparse.ArgumentParser) -> None:
+def _add_device_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "--device",
-        action=StoreSeveral,
+        action=StoreRepeated,
         metavar="URL",
         help='such as "serial:/dev/ttyUSB0?format=witmotion"; repeat it for each'
         " further device that turns with the first",
@@ -120,7 +120,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_task(parser: argparse.ArgumentParser) -> None:
+def _add_task_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--seconds", type=float, metavar="S", help="averaging time (default: 30)")
     add("--sigma", type=float, metavar="M/S^2", help="stop averaging at this ± instead")
@@ -157,20 +157,20 @@ def _add_task(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command; a script is told of its end, whatever that is."""
+    """Carry out the command; with --headless every end is reported as an event."""
     from fieldcal.run.operator.script import report_event
 
     code, said = 0, None
     try:
-        code = _carried_out(args)
+        code = _prepare_and_run(args)
     except FieldcalError as error:
         code, said = error.exit_code, str(error)
         raise
     except KeyboardInterrupt:
-        code, said = INTERRUPTED, "interrupted"
+        code, said = EXIT_INTERRUPTED, "interrupted"
         raise
     except Exception as error:
-        code, said = BROKEN, f"broke on {type(error).__name__}"
+        code, said = EXIT_INTERNAL_ERROR, f"broke on {type(error).__name__}"
         raise
     finally:
         if args.headless:
@@ -178,21 +178,21 @@ def run(args: argparse.Namespace) -> int:
     return code
 
 
-def _carried_out(args: argparse.Namespace) -> int:
-    if _names_none(args):
-        introduce(args)
+def _prepare_and_run(args: argparse.Namespace) -> int:
+    if _names_no_device(args):
+        find_device(args)
     task, folder = make_task(args)
-    with served(args) as page:
-        return _shown_on(page, args, task, folder)
+    with serve_page(args) as page:
+        return _run_and_show(page, args, task, folder)
 
 
-def _shown_on(
+def _run_and_show(
     page: PageServer | None, args: argparse.Namespace, task: PlanTask, folder: Path
 ) -> int:
     from fieldcal.calibration import limits
     from fieldcal.commands import run_view
     from fieldcal.commands.run_results import (
-        check_heard,
+        check_companions,
         first_result,
         further_results,
     )
@@ -203,59 +203,62 @@ def _shown_on(
     bounds = limits.read(task.about.grade, Path(file) if file else None)
     history = History(args.history or default_location())
     try:
-        found, truth, others = _record(args, task, folder, bounds, page)
+        found, truth, others = _record_and_solve(args, task, folder, bounds, page)
         found = first_result(found, folder, bounds, history)
     except (FieldcalError, KeyboardInterrupt) as error:
-        told_end(page, (), error)
-        broken_off(args, task, folder, error)
+        show_end_on_page(page, (), error)
+        report_broken_run(args, task, folder, error)
         raise
     if args.junit:
         write_junit(args.junit, task, folder, found.to_json())
     further = further_results(others, bounds, history)
-    told_end(page, (found, *further.values()))
+    show_end_on_page(page, (found, *further.values()))
     if args.json:
         run_view.show_json(found, truth, further)
     else:
         run_view.show_results(found, folder, truth, further)
     if not args.no_report:
         for each in (folder, *(folder / name for name in further)):
-            report = run_view.write_report(each, history.place)
+            report = run_view.try_write_report(each, history.place)
             if report and not args.json:
                 sys.stdout.write(f"report:   {report}\n")
     if not args.json:
         run_view.show_decisions(found, further, folder)
     try:
-        check_heard(others)
+        check_companions(others)
     except FieldcalError as error:
         error.printed = bool(args.json)
         raise
     return 0 if all(map(run_view.is_go, (found, *further.values()))) else 1
 
 
-def _names_none(args: argparse.Namespace) -> bool:
-    """Whether a run by the name of a procedure says no device at all."""
+def _names_no_device(args: argparse.Namespace) -> bool:
+    """Whether a run of a procedure has no option that states the device."""
     from fieldcal import procedures
 
     said = args.device or args.virtual is not None or args.resume
     return not said and args.procedure in procedures.procedure_names()
 
 
-def _record(
+def _record_and_solve(
     args: argparse.Namespace,
     task: PlanTask,
     folder: Path,
     bounds: GradeLimits,
     page: PageServer | None,
 ) -> tuple[Calibration, dict[str, Any] | None, Sequence[Companion]]:
-    """Hold the positions, record and solve; and what a virtual device conceals."""
-    from fieldcal.commands.run_device import device
+    """Record the positions and solve.
+
+    Returns the calibration, the truth of a virtual device, and the further devices.
+    """
+    from fieldcal.commands.run_device import device_and_mover
     from fieldcal.run.companions import record_companions
-    from fieldcal.run.patient_mover import PatientMover
+    from fieldcal.run.retrying_mover import RetryingMover
     from fieldcal.run.session_run import SessionRun, recorded_averages
     from fieldcal.session.folder import Session
     from fieldcal.session.recorder import Recorder
 
-    with device(task) as (opened, mover), contextlib.ExitStack() as stack:
+    with device_and_mover(task) as (opened, mover), contextlib.ExitStack() as stack:
         driver = opened()
         stack.callback(driver.close)
         known = Session.open(folder) if args.resume else None
@@ -267,17 +270,26 @@ def _record(
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)
         )
-        turns = PatientMover(mover, patience(args))
-        operator = stack.enter_context(operator_of(args, task, turns, folder, page))
+        turns = RetryingMover(mover, reconnect_seconds(args))
+        operator = stack.enter_context(run_operator(args, task, turns, folder, page))
         turns.tell = recorder.tell = operator.tell
-        for sentence in _unsaid(task):
+        for sentence in _missing_statements(task):
             operator.tell(sentence)
         if known:
-            _take_besides(recorder, task, len(known.positions), args.again, taken)
+            _mark_remedy_positions(
+                recorder, task, len(known.positions), args.again, taken
+            )
             recorder.mark("resumed", taken=sorted(taken))
-        how_long = (patience(args), give_up(args, task))
+        how_long = (reconnect_seconds(args), give_up_seconds(args, task))
         running = SessionRun(
-            task, operator, recorder, opened, bounds, *how_long, taken, asks(args)
+            task,
+            operator,
+            recorder,
+            opened,
+            bounds,
+            *how_long,
+            taken,
+            can_ask_operator(args),
         )
         try:
             found = running.run(driver)
@@ -289,8 +301,8 @@ def _record(
         return found, dict(truth) if truth else None, recorder.others
 
 
-def _unsaid(task: PlanTask) -> list[str]:
-    """What nobody said of base, site and angles, without which it is NO-GO."""
+def _missing_statements(task: PlanTask) -> list[str]:
+    """Sentences about missing level, site and angles, without which it is NO-GO."""
     from fieldcal import procedures
     from fieldcal.acceptance.angles import unstated_angles_warning
     from fieldcal.acceptance.level import level_warning_before_run
@@ -299,18 +311,18 @@ def _unsaid(task: PlanTask) -> list[str]:
     unsaid = [unstated_angles_warning(task.about)]
     if procedures.max_positions(task.about, task.procedure) is None:
         unsaid.append(level_warning_before_run(task.about))
-    unsaid.append(gravity_missing_warning(task.about))  # what matters most is said last
+    unsaid.append(gravity_missing_warning(task.about))  # the most important one last
     return [sentence for sentence in unsaid if sentence]
 
 
-def _take_besides(
+def _mark_remedy_positions(
     recorder: Any,
     task: PlanTask,
     known: int,
     again: Sequence[int],
     taken: dict[int, Any],
 ) -> None:
-    """Note the positions that a remedy adds, and those that it takes once more."""
+    """Mark the positions that a remedy adds and those that it repeats."""
     from fieldcal.session.marks import POSITION_ADDED
 
     for number in again:

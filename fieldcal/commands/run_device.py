@@ -1,4 +1,4 @@
-"""The device of a run, and who turns it, from its plan."""
+"""Device and mover of a run, from its plan."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ VIRTUAL_FORMAT = "witmotion"
 
 
 @contextlib.contextmanager
-def device(task: PlanTask) -> Iterator[tuple[Callable[[], Driver], Mover]]:
-    """Yield what opens the device, and who turns it."""
+def device_and_mover(task: PlanTask) -> Iterator[tuple[Callable[[], Driver], Mover]]:
+    """Yield a function that opens the device, and the mover."""
     from fieldcal.commands.signals import interruptible
-    from fieldcal.commands.virtual import address
+    from fieldcal.commands.virtual_address import driver_address
     from fieldcal.drivers.driver import open_driver
     from fieldcal.run import movers
     from fieldcal.run.command_mover import CommandMover
@@ -34,9 +34,9 @@ def device(task: PlanTask) -> Iterator[tuple[Callable[[], Driver], Mover]]:
         if mover["kind"] == "virtual" and "control" in mover:
             turns = stack.enter_context(movers.RunningDevice(mover["control"]))
         elif mover["kind"] == "virtual":
-            options = _virtual(task)
+            options = _virtual_options(task)
             made = stack.enter_context(movers.VirtualMover(options))
-            turns, url = made, address(options, made.port)
+            turns, url = made, driver_address(options, made.port)
         elif mover["kind"] == "command":
             timeout = float(mover.get("timeout_s", TURN))
             turns = stack.enter_context(CommandMover(mover["command"], timeout))
@@ -48,7 +48,7 @@ def device(task: PlanTask) -> Iterator[tuple[Callable[[], Driver], Mover]]:
         yield lambda: open_driver(url), turns
 
 
-def _virtual(task: PlanTask) -> list[str]:
+def _virtual_options(task: PlanTask) -> list[str]:
     site = task.about
     options = ["--serial", VIRTUAL_FORMAT]
     options += [f"--latitude={site.latitude_deg}", f"--height={site.height_m}"]

@@ -1,4 +1,4 @@
-"""Who is shown a run and moves its device: a script, or a person at the console."""
+"""The operator of a run: a script, or a person at the console."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldcal.commands.run_page import watched
+from fieldcal.commands.run_page import show_on_page
 
 if TYPE_CHECKING:
     from fieldcal.run.movers import Mover
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def operator_of(
+def run_operator(
     args: argparse.Namespace,
     task: PlanTask,
     mover: Mover,
     folder: Path,
     page: PageServer | None,
 ) -> Iterator[Operator]:
-    """Yield the operator of a run, seen on the page as well if there is one."""
+    """Yield the operator of a run, who is shown on the page as well if there is one."""
     from fieldcal import procedures
 
     most = procedures.max_positions(task.about, task.procedure)
@@ -33,9 +33,9 @@ def operator_of(
     if args.headless:
         from fieldcal.run.operator.script import ScriptOperator
 
-        yield watched(ScriptOperator(mover), page, task, title, most)
+        yield show_on_page(ScriptOperator(mover), page, task, title, most)
         return
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
     from fieldcal.run.operator.keyboard import Keyboard
     from fieldcal.run.operator.terminal import ConsoleOperator
 
@@ -43,10 +43,10 @@ def operator_of(
         title,
         task.about.positions if most else task.positions,
         mover,
-        ShownConsole(stderr=args.json),
+        EscapingConsole(stderr=args.json),
         args.plain,
         Keyboard(),
         len(task.about.positions) if task.verification and most is None else None,
         most,
     ) as operator:
-        yield watched(operator, page, task, title, most)
+        yield show_on_page(operator, page, task, title, most)

@@ -1,4 +1,4 @@
-"""The page of a run for phone and tablet: where it is served, and how it ends."""
+"""Serves the page of a run for phone and tablet, and shows the result on it."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
 
 LOCAL = "local"
-"""What stands for this computer's address on the local network."""
+"""Placeholder for this computer's address on the local network."""
 
-SCANNED = 60.0
-"""How long the code on the console is shown before the run goes on, s."""
+SCAN_WAIT_S = 60.0
+"""How long the run waits for the code on the console to be scanned, s."""
 
 
 @contextlib.contextmanager
-def served(args: argparse.Namespace) -> Iterator[PageServer | None]:
-    """Serve the page if it is asked for, and show where it is.
+def serve_page(args: argparse.Namespace) -> Iterator[PageServer | None]:
+    """Serve the page if --page is given, and show its address.
 
     Raises
     ------
     InputError
-        If it cannot be served.
+        If the page cannot be served.
 
     """
     if args.page is None:
@@ -42,17 +42,17 @@ def served(args: argparse.Namespace) -> Iterator[PageServer | None]:
         raise InputError(
             "the page needs starlette, uvicorn and segno: pip install 'fieldcal[page]'"
         ) from error
-    host, port = address_of(args.page)
+    host, port = parse_address(args.page)
     with PageServer(local_address() if host == LOCAL else host, port) as server:
-        _announce(server, args)
+        _announce_page(server, args)
         yield server
 
 
-def address_of(text: str, option: str = "--page") -> tuple[str, int]:
-    """Host and port of what an option says.
+def parse_address(text: str, option: str = "--page") -> tuple[str, int]:
+    """Host and port of an option's value; port 0 if it has none.
 
-    >>> address_of("local"), address_of("192.168.1.5:8080"), address_of("[::1]:8080")
-    (('local', 0), ('192.168.1.5', 8080), ('::1', 8080))
+    >>> [parse_address(at) for at in ("local", "192.168.1.5:8080", "[::1]:8080")]
+    [('local', 0), ('192.168.1.5', 8080), ('::1', 8080)]
     """
     host, colon, port = text.rpartition(":")
     if not colon or text.endswith("]"):
@@ -66,8 +66,8 @@ def address_of(text: str, option: str = "--page") -> tuple[str, int]:
     return host, int(port)
 
 
-def _announce(server: PageServer, args: argparse.Namespace) -> None:
-    """Show the address, and a code to scan where there is a terminal."""
+def _announce_page(server: PageServer, args: argparse.Namespace) -> None:
+    """Show the address, and on a terminal a code to scan."""
     if args.headless:
         from fieldcal.run.operator.script import report_event
 
@@ -81,16 +81,16 @@ def _announce(server: PageServer, args: argparse.Namespace) -> None:
     segno.make(server.address, error="l").terminal(sys.stderr, compact=True)
     sys.stderr.write("scan it, or press Enter to go on without\n")
     sys.stderr.flush()
-    _until_scanned(server)
+    _wait_for_page(server)
 
 
-def _until_scanned(server: PageServer) -> None:
-    """Wait until the page was opened, or somebody goes on without."""
+def _wait_for_page(server: PageServer) -> None:
+    """Wait until the page is opened, a key is pressed, or the time is over."""
     from time import monotonic, sleep
 
     from fieldcal.run.operator.keyboard import Keyboard
 
-    until = monotonic() + SCANNED
+    until = monotonic() + SCAN_WAIT_S
     with Keyboard() as keyboard:
         while keyboard.has_keys and not server.watched and monotonic() < until:
             if keyboard.pressed() == "confirm":
@@ -98,30 +98,30 @@ def _until_scanned(server: PageServer) -> None:
             sleep(0.05)
 
 
-def watched(
+def show_on_page(
     operator: Operator,
     server: PageServer | None,
     task: PlanTask,
     title: str,
     most: int | None,
 ) -> Operator:
-    """The operator, whose run is seen on the page as well where there is one."""
+    """The operator, who is shown on the page as well if there is one."""
     if server is None:
         return operator
     from fieldcal.run.page.board import Board
-    from fieldcal.run.page.watched import WatchedOperator
+    from fieldcal.run.page.page_operator import PageOperator
 
     positions = task.about.positions if most else task.positions
     server.board = Board(title, positions, most)
-    return WatchedOperator(operator, server.board, server.buttons)
+    return PageOperator(operator, server.board, server.buttons)
 
 
-def told_end(
+def show_end_on_page(
     server: PageServer | None,
     results: Sequence[Calibration],
     broken: BaseException | None = None,
 ) -> None:
-    """Tell the page GO, NO-GO with its reasons, or why the run stopped."""
+    """Show GO, NO-GO with its reasons, or why the run stopped, on the page."""
     if server is None:
         return
     if broken is not None:
@@ -130,12 +130,12 @@ def told_end(
     from fieldcal.commands.run_view import is_go
 
     good = all(map(is_go, results))
-    said = [s for found in results for s in _reasons(found)]
+    said = [s for found in results for s in _decision_sentences(found)]
     server.board.run_ended("GO" if good else "NO-GO", said, good)
 
 
-def _reasons(found: Calibration) -> list[str]:
-    """Why it is NO-GO and what to do, or what GO relies on."""
+def _decision_sentences(found: Calibration) -> list[str]:
+    """Reasons of a NO-GO, and its remedy."""
     decision = found.info.get("decision", {})
     said = [str(c["says"]) for c in decision.get("checks", ()) if c["ok"] is False]
     remedy = decision.get("remedy")

@@ -1,4 +1,4 @@
-"""What comes of a run: the result of each device, decided about, kept and written."""
+"""Results of a run: each device is solved, decided about, stored and written."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ if TYPE_CHECKING:
     from fieldcal.session.folder import Session
 
 
-def concluded(
+def solve_and_decide(
     session: Session, bounds: GradeLimits, history: History, method: str = "auto"
 ) -> Calibration:
-    """Solve what was recorded, decide, write it down and keep it.
+    """Solve a session, decide, write result.json and store it in the history.
 
     Parameters
     ----------
     session : the recording
     bounds : limits of the device's grade
-    history : where it is kept, if the device has a serial number
+    history : stores the result if the device has a serial number
     method : of the procedure
 
     """
     from fieldcal.acceptance.assessment import assess, store_in_history
-    from fieldcal.commands.installing import with_installed
+    from fieldcal.commands.install_values import add_install_values
     from fieldcal.evaluation.observations import usable_windows
     from fieldcal.evaluation.solution import solve_session
     from fieldcal.session.folder import RESULT
 
     still = usable_windows(session)
-    found = with_installed(solve_session(session, still, method=method), session)
+    found = add_install_values(solve_session(session, still, method=method), session)
     found = assess(found, session, still, bounds, history)
     session.write_json(RESULT, found.to_json())
     if said := store_in_history(history, session, found):
@@ -53,22 +53,22 @@ def concluded(
 def first_result(
     found: Calibration, folder: Path, bounds: GradeLimits, history: History
 ) -> Calibration:
-    """Result of the device that was led through the procedure.
+    """Result of the first device, which the procedure was carried out on.
 
-    Whatever set its method solves: with the positions of a remedy there are more.
+    The method is that of the procedure, or "auto" if positions were added.
     """
     from fieldcal.session.folder import Session
     from fieldcal.session.marks import POSITION_ADDED
 
     session = Session.open(folder)
     more = any(mark.get("event") == POSITION_ADDED for mark in session.marks())
-    return concluded(session, bounds, history, "auto" if more else found.method)
+    return solve_and_decide(session, bounds, history, "auto" if more else found.method)
 
 
 def further_results(
     others: Sequence[Companion], bounds: GradeLimits, history: History
 ) -> dict[str, Calibration]:
-    """Results of the further devices that were heard to the end, by folder."""
+    """Results of the further devices that were recorded to the end, by folder."""
     from fieldcal.session.folder import Session
 
     found = {}
@@ -76,14 +76,14 @@ def further_results(
         if other.failed is None:
             try:
                 session = Session.open(other.folder)
-                found[other.folder.name] = concluded(session, bounds, history)
+                found[other.folder.name] = solve_and_decide(session, bounds, history)
             except FieldcalError as fault:
                 other.failed = fault
     return found
 
 
-def check_heard(others: Sequence[Companion]) -> None:
-    """Say which of the further devices failed.
+def check_companions(others: Sequence[Companion]) -> None:
+    """Raise an error if one of the further devices failed.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def check_heard(others: Sequence[Companion]) -> None:
 def write_junit(
     path: Path, task: PlanTask, folder: Path, result: Any, said: str = ""
 ) -> None:
-    """Write what happened as JUnit XML; `result` is None where the run broke off."""
+    """Write the outcome as JUnit XML; `result` is None if the run broke off."""
     from fieldcal.acceptance.verification import planned_verification
     from fieldcal.core.positions import Position
     from fieldcal.run import junit
@@ -120,10 +120,13 @@ def write_junit(
     junit.write(path, task.procedure, positions, marks, result, said)
 
 
-def broken_off(
+def report_broken_run(
     args: argparse.Namespace, task: PlanTask, folder: Path, error: BaseException
 ) -> None:
-    """Say what is kept, if anything was recorded; another run's folder is let be."""
+    """Report what is kept of a run that broke off, and how to resume it.
+
+    A folder of another run is not touched.
+    """
     from fieldcal.session.marks import MARKS
 
     own = args.resume or args.records
@@ -131,7 +134,7 @@ def broken_off(
         return
     if args.junit:
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")
-    if args.resume or not _discarded(folder):
+    if args.resume or not _discard_if_empty(folder):
         moved = ", with --device if its port is another now (fieldcal ports)"
         sys.stderr.write(
             f"what was recorded is kept in {folder}; to go on:"
@@ -140,10 +143,10 @@ def broken_off(
         )
 
 
-def _discarded(folder: Path) -> bool:
-    """Remove a session of which no sample ever came; whether that was so.
+def _discard_if_empty(folder: Path) -> bool:
+    """Remove a session without samples; returns whether it was removed.
 
-    The next attempt would be refused the folder for the sake of nothing.
+    Its folder would block the next attempt.
     """
     from fieldcal.session.arrow_stream import end_of_whole_batches
     from fieldcal.session.folder import DESCRIPTION

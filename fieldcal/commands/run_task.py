@@ -1,4 +1,4 @@
-"""What a run is to do, from its options, a plan file or a session broken off."""
+"""The task of a run, from options, a plan file or an interrupted session."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.site import given_tables, overlay, site_tables
+from fieldcal.commands.site import merge_tables, site_tables, tables_of_options
 from fieldcal.core.errors import InputError
 
 if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
 
 SESSIONS = Path("sessions")
-"""Where runs are recorded that name no folder."""
+"""Folder of the sessions of runs without --output."""
 
-EXACT_DEG = 0.001
-"""How well a virtual fixture sets its angles, deg: as it turns them, to rounding."""
+VIRTUAL_SETTING_DEG = 0.001
+"""Uncertainty of the angles of a virtual fixture, deg: exact but for rounding."""
 
-VIRTUAL_DEG = 45.0
-"""Latitude that a virtual device is told where nobody says one."""
+VIRTUAL_LATITUDE_DEG = 45.0
+"""Latitude of a virtual device unless one is stated, deg."""
 
-OFF = "angle"
-"""What is in the name of every effect that makes it stand elsewhere."""
+ANGLE_EFFECT = "angle"
+"""Part of the name of every effect that changes a virtual device's angles."""
 
 
 def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
-    """What is to be done, and the folder it is recorded into.
+    """The task of a run, and the folder it is recorded into.
 
     Raises
     ------
     InputError
-        Naming what is wrong with the plan.
+        If the plan is invalid; the message says why.
 
     """
     from fieldcal import procedures
     from fieldcal.run import plan_file
 
     if args.resume:
-        return _resumed(args)
+        return _task_to_resume(args)
     if not args.procedure:
         raise InputError(
             f"name a procedure ({', '.join(procedures.procedure_names())})"
@@ -50,32 +50,34 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
         name, tables = "the options", _tables_of_options(args)
     else:
         name, tables = args.procedure, _tables_of_file(args)
-    task = plan_file.task_from_tables(_stood(overlay(tables, _site(args))), name)
+    task = plan_file.task_from_tables(
+        _with_virtual_latitude(merge_tables(tables, _site_options(args))), name
+    )
     stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     return task, args.output or SESSIONS / f"{stamp}-{task.procedure}"
 
 
-def _resumed(args: argparse.Namespace) -> tuple[PlanTask, Path]:
+def _task_to_resume(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     from fieldcal.run import plan_file
     from fieldcal.run.session_run import open_for_resume
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")
-    if given_tables(args):
+    if tables_of_options(args):
         raise InputError(
             "--resume goes on with the device and place its session.toml names:"
             " leave those options out"
         )
-    session, tables, args.again = open_for_resume(_newest(args.resume))
-    tables["run"] = {**tables["run"], **_given(args)}
-    tables = overlay(tables, _site(args))
+    session, tables, args.again = open_for_resume(_session_to_resume(args.resume))
+    tables["run"] = {**tables["run"], **_run_options(args)}
+    tables = merge_tables(tables, _site_options(args))
     return plan_file.task_from_tables(
         tables, f"{session.folder}/session.toml"
     ), session.folder
 
 
-def _newest(folder: Path) -> Path:
-    """The session that was named, or the one last written to in the folder of all."""
+def _session_to_resume(folder: Path) -> Path:
+    """The session that was named, or the latest one in `SESSIONS`."""
     from fieldcal.session.marks import MARKS
 
     if folder != SESSIONS:
@@ -91,30 +93,30 @@ def _tables_of_options(args: argparse.Namespace) -> dict[str, Any]:
     from fieldcal.session import description
 
     tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
-    tables["position"] = plan_file.positions_of(args.procedure)
-    tables["run"] = {"procedure": args.procedure, **_given(args)}
+    tables["position"] = plan_file.default_positions(args.procedure)
+    tables["run"] = {"procedure": args.procedure, **_run_options(args)}
     return tables
 
 
 def _tables_of_file(args: argparse.Namespace) -> dict[str, Any]:
     from fieldcal.run import plan_file
 
-    tables = plan_file.read(Path(args.procedure))
+    tables = plan_file.read_plan(Path(args.procedure))
     if not isinstance(tables.get("run", {}), dict):
         raise InputError(f"{args.procedure}: run must be a table: write [run]")
-    tables = overlay(tables, given_tables(args))
-    tables["run"] = {**tables.get("run", {}), **_given(args)}
+    tables = merge_tables(tables, tables_of_options(args))
+    tables["run"] = {**tables.get("run", {}), **_run_options(args)}
     return tables
 
 
-def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """How level and steady the base is, how well angles are set, as options say it.
+def _site_options(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Table [site] of the options on level, swaying base and angle setting.
 
-    A virtual fixture stands where it is told, unless it is to be off.
+    The angles of a virtual fixture are exact unless an effect changes them.
     """
     angles = args.angles
-    if angles is None and args.virtual is not None and OFF not in args.virtual:
-        angles = EXACT_DEG
+    if angles is None and args.virtual is not None and ANGLE_EFFECT not in args.virtual:
+        angles = VIRTUAL_SETTING_DEG
     said = {
         "level_deg": args.level,
         "angle_setting_deg": angles,
@@ -125,8 +127,8 @@ def _site(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     return {"site": site} if site else {}
 
 
-def _stood(tables: dict[str, Any]) -> dict[str, Any]:
-    """With the place of a virtual device, which stands where it is told."""
+def _with_virtual_latitude(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables, with a latitude for a virtual device that has none."""
     run, site = tables.get("run"), tables.get("site", {})
     mover = run.get("mover") if isinstance(run, dict) else None
     if not isinstance(mover, dict) or mover.get("kind") != "virtual":
@@ -135,11 +137,11 @@ def _stood(tables: dict[str, Any]) -> dict[str, Any]:
         return tables
     if any(word in str(mover.get("options")) for word in ("--latitude", "--gravity")):
         return tables
-    return {**tables, "site": {"latitude_deg": VIRTUAL_DEG, **site}}
+    return {**tables, "site": {"latitude_deg": VIRTUAL_LATITUDE_DEG, **site}}
 
 
-def _given(args: argparse.Namespace) -> dict[str, Any]:
-    """The table [run] as far as options say it."""
+def _run_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Table [run] of the options that were given."""
     given: dict[str, Any] = {
         "device": args.device,
         "further": args.further_device or None,

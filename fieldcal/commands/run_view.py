@@ -1,4 +1,4 @@
-"""What a run prints at its end, of the first device and of its companions."""
+"""Output of a run at its end, for the first device and the further ones."""
 
 from __future__ import annotations
 
@@ -33,21 +33,24 @@ def show_results(
     truth: Mapping[str, Any] | None,
     further: Mapping[str, Calibration],
 ) -> None:
-    """Print the table of each device, and where the session is."""
-    from fieldcal.commands.table import show
+    """Print the table of each device, and the path of the session."""
+    from fieldcal.commands.table import show_calibration
     from fieldcal.session.folder import RESULT
 
-    show(found, truth)
+    show_calibration(found, truth)
     for name, each in further.items():
         sys.stdout.write(f"\n{name}\n")
-        show(each)
+        show_calibration(each)
     sys.stdout.write(f"recorded: {folder}\nwritten:  {folder / RESULT}\n")
 
 
 def show_decisions(
     found: Calibration, further: Mapping[str, Calibration], folder: Path
 ) -> None:
-    """That of the first device last, but for a line on each that is NO-GO."""
+    """Print the decision of each device, that of the first device last.
+
+    A line for each further device follows.
+    """
     from fieldcal.commands.decision_view import show_decision
 
     for name, each in further.items():
@@ -61,16 +64,16 @@ def show_decisions(
 
 
 def is_go(found: Calibration) -> bool:
-    """Whether a device may be launched with."""
+    """Whether the calibration is good and the decision is GO."""
     return found.good and bool(found.info["decision"]["go"])
 
 
-def write_report(folder: Path, history: StoreLocation) -> Path | None:
-    """Write the report; the calibration stands without it."""
-    from fieldcal.commands.report import write
+def try_write_report(folder: Path, history: StoreLocation) -> Path | None:
+    """Write the report; a failure is only reported. None if there is no report."""
+    from fieldcal.commands.report import write_report
 
     try:
-        return write(folder, history=history)
+        return write_report(folder, history=history)
     except FieldcalError as error:
         sys.stderr.write(f"fieldcal run: no report: {error}\n")
         return None

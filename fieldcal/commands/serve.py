@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "the service needs starlette and uvicorn: pip install 'fieldcal[page]'"
         ) from error
-    from fieldcal.commands.run_page import address_of
+    from fieldcal.commands.run_page import parse_address
     from fieldcal.fleet.workers import dask_pool, process_pool
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
@@ -78,13 +78,13 @@ def run(args: argparse.Namespace) -> int:
         jobs=args.jobs, kept=args.kept, seconds=60 * args.minutes,
     )  # fmt: skip
     tokens = read_tokens(args.tokens) if args.tokens else []
-    host, port = address_of(args.listen, "--listen")
+    host, port = parse_address(args.listen, "--listen")
     with ExitStack() as open_:
         if args.scheduler:
             pool = open_.enter_context(dask_pool(args.scheduler))
         else:
             pool = process_pool(1, ["fieldcal.service.work"])
-        jobs = JobStore((args.folder or _folder()).resolve(), bounds)
+        jobs = JobStore((args.folder or _default_folder()).resolve(), bounds)
         database = Database(args.history or default_location())
         queue = JobQueue(jobs, database, pool)
         service = Service.listen(host, port, jobs, queue, tokens, args.known_as)
@@ -96,6 +96,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _folder() -> Path:
+def _default_folder() -> Path:
     data = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     return Path(data) / "fieldcal" / "served"

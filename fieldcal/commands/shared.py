@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from fieldcal.fleet.shared import SharedFinding
     from fieldcal.history.sessions import StoredSession
 
-GROUPS = 6
-"""Groups of an effect that are shown; --json has all."""
+GROUPS_SHOWN = 6
+"""Number of groups of an effect that are shown; --json has all."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 0 nothing is shared, 1 something is left out."""
+    """Carry out the command; 0 if no effect is shared, else 1."""
     from fieldcal.fleet.shared import SharedSearch
 
     if args.twin or args.against or args.report:
         raise InputError("--shared goes without --twin, --against and --report")
-    sessions = _reduced(args)
+    sessions = _sessions_with_rows(args)
     if len(sessions) < 2:
         raise InputError("--shared needs two sessions at least")
     search = SharedSearch(sessions)
@@ -47,21 +47,21 @@ def run(args: argparse.Namespace) -> int:
     if not found:
         say("nothing is shared that a calibration leaves out\n")
     for one in found:
-        for line in lines(one):
+        for line in finding_lines(one):
             say(line + "\n")
     return 1 if found else 0
 
 
-def _reduced(args: argparse.Namespace) -> list[StoredSession]:
-    """The sessions with their reduced rows; those not in the store yet are solved.
+def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
+    """The sessions with their rows; those not in the store yet are solved first.
 
     Raises
     ------
     InputError
-        Naming the session that cannot be solved.
+        If a session cannot be solved.
 
     """
-    from fieldcal.commands.batch import carried_out, pool_of
+    from fieldcal.commands.batch import process_with_progress, worker_pool
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
@@ -76,8 +76,8 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
     known = set(diagnosed.unprocessed())
     left = [folder for folder in plain.unprocessed() if folder in known]
     if left:
-        with pool_of(args) as pool:
-            carried_out(plain, left, pool)
+        with worker_pool(args) as pool:
+            process_with_progress(plain, left, pool)
     rows = [one for some in plain.stored_rows() for one in some]
     for one in rows:
         if one.error:
@@ -85,10 +85,10 @@ def _reduced(args: argparse.Namespace) -> list[StoredSession]:
     return rows
 
 
-def lines(one: SharedFinding) -> list[str]:
-    """What is said of an effect: its level, and its values in the groups that show it.
+def finding_lines(one: SharedFinding) -> list[str]:
+    """Lines about an effect: its level, and its values in the groups.
 
-    Groups are in the order of what they show, by the largest value in its sigmas.
+    Groups are ordered by their largest value in units of its sigma.
     """
     from fieldcal.calibration.wording import format_unit, format_with_sigma
 
@@ -103,13 +103,13 @@ def lines(one: SharedFinding) -> list[str]:
         out.append(f"  or, as well: {', '.join(one.alternatives)}")
     groups = one.effect.level_effect.grouping.labels
     order = np.argsort(-np.abs(one.values / one.sigmas).max(axis=1), kind="stable")
-    for g in order[:GROUPS]:
+    for g in order[:GROUPS_SHOWN]:
         told = []
         rows = zip(one.effect.columns, one.values[g], one.sigmas[g], strict=True)
         for column, value, sigma in rows:
             shown = " ± ".join(format_with_sigma(float(value), float(sigma)))
             told.append(f"{column.name} {shown} {format_unit(column.unit)}".rstrip())
         out.append(f"  {escape_line(groups[g])}: {'; '.join(told)}")
-    if len(groups) > GROUPS:
-        out.append(f"  and {len(groups) - GROUPS} more, which show less (--json)")
+    if len(groups) > GROUPS_SHOWN:
+        out.append(f"  and {len(groups) - GROUPS_SHOWN} more, which show less (--json)")
     return out

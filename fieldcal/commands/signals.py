@@ -1,4 +1,4 @@
-"""A command that is told to end, by whatever signal, ends in order: once."""
+"""Makes signals that end a command act like Ctrl-C, once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Iterator
 
-ENDING = tuple(
+ENDING_SIGNALS = tuple(
     getattr(signal, name)
     for name in ("SIGINT", "SIGTERM", "SIGHUP")
     if hasattr(signal, name)  # Windows has no terminal that hangs up
@@ -16,23 +16,23 @@ ENDING = tuple(
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Treat being terminated, or losing the terminal, like an interrupt.
+    """Treat termination, or loss of the terminal, like a keyboard interrupt.
 
-    Once it ends, further signals change nothing: what a device was told is taken back
-    first. In a thread other than the main one signals stay as they are.
+    Further signals are ignored, so that settings of a device are restored before the
+    command ends. Outside of the main thread, signals stay as they are.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def interrupt(number: int, frame: object) -> None:
-        for kind in ENDING:
+        for kind in ENDING_SIGNALS:
             signal.signal(kind, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    before = [signal.signal(kind, interrupt) for kind in ENDING]
+    before = [signal.signal(kind, interrupt) for kind in ENDING_SIGNALS]
     try:
         yield
     finally:
-        for kind, handler in zip(ENDING, before, strict=True):
+        for kind, handler in zip(ENDING_SIGNALS, before, strict=True):
             signal.signal(kind, handler)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.help import INTERRUPTED
+from fieldcal.commands.help import EXIT_INTERRUPTED
 from fieldcal.core.errors import InputError
 from fieldcal.core.grade import GRADES
 
@@ -42,19 +42,19 @@ RARE = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    _add_link(parser)
-    _add_course(parser)
-    _add_device(parser)
+    _add_link_options(parser)
+    _add_time_options(parser)
+    _add_device_options(parser)
 
 
-def _add_link(parser: argparse.ArgumentParser) -> None:
-    """Declare where the device is, and as what."""
+def _add_link_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the link."""
     add = parser.add_argument_group("link").add_argument
     add(
         "--serial",
         metavar="FORMAT",
         default="witmotion",
-        help=f"wire format of the pty: {_formats()}; with options as in"
+        help=f"wire format of the pty: {_format_names()}; with options as in"
         ' "text?separator=tab&columns=t,ax,ay,az" (default: witmotion)',
     )
     add(
@@ -79,8 +79,8 @@ def _add_link(parser: argparse.ArgumentParser) -> None:
     add("--port-link", type=Path, metavar="PATH", help="symbolic link to the pty")
 
 
-def _add_course(parser: argparse.ArgumentParser) -> None:
-    """Declare what moves it, how fast time goes, and for how long."""
+def _add_time_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of control, speed and duration."""
     add = parser.add_argument_group("time and orders").add_argument
     add(
         "--control",
@@ -105,14 +105,14 @@ def _add_course(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _formats() -> str:
+def _format_names() -> str:
     """Names of the wire formats, without importing any."""
     from fieldcal.sim_device.wire import formats
 
     return ", ".join(formats())
 
 
-def _add_device(parser: argparse.ArgumentParser) -> None:
+def _add_device_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "device", "A list that begins with a minus is written as in --acc-bias=-0.3,0,0"
     )
@@ -152,7 +152,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: run until told to stop, or interrupted."""
+    """Carry out the command: run until stopped or interrupted."""
     _check_system()
     from fieldcal.commands.signals import interruptible
     from fieldcal.sim_device.control import Control
@@ -161,33 +161,33 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.sim_device.orders import carry_out
     from fieldcal.sim_device.stream import DeviceStream
 
-    device = VirtualDevice(_profile(args), args.seed)
-    speed, duration = _speed(args.speed), _duration(args.duration)
-    steps = _numbers("--steps", args.steps, 2)
+    device = VirtualDevice(_profile_from_options(args), args.seed)
+    speed, duration = _parse_speed(args.speed), _parse_duration(args.duration)
+    steps = _parse_numbers("--steps", args.steps, 2)
     if args.truth:
-        _write(args.truth, device.concealed())
+        _write_truth(args.truth, device.concealed())
     try:
         with contextlib.ExitStack() as stack:
             stack.enter_context(interruptible())
             faults = LineFaults(args.seed)
-            link = _link(args, faults, device.rate)
+            link = _open_link(args, faults, device.rate)
             stack.callback(link.close)
             stream = DeviceStream(
-                device, link, faults, speed, duration, args.once, _say
+                device, link, faults, speed, duration, args.once, _print_line
             )
             control = Control(lambda order: carry_out(stream, order), args.control)
             stack.callback(control.close)
-            _say(link.address)
-            _say(str(control.path))
-            keys = stack.enter_context(_keys(stream, (steps[0], steps[1])))
+            _print_line(link.address)
+            _print_line(str(control.path))
+            keys = stack.enter_context(_steering_keys(stream, (steps[0], steps[1])))
             stream.run(control, *keys)
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     return 0
 
 
 def _check_system() -> None:
-    """Refuse where a virtual device has nowhere to be."""
+    """Refuse a system without pseudo-terminals or unix sockets."""
     if importlib.util.find_spec("termios") is None or not hasattr(socket, "AF_UNIX"):
         raise InputError(
             "a virtual device needs a system with pseudo-terminals and unix sockets,"
@@ -195,8 +195,8 @@ def _check_system() -> None:
         )
 
 
-def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
-    """Make what the device talks through."""
+def _open_link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
+    """Open the link of the device."""
     if args.can:
         from fieldcal.sim_device.link_can import open_link
 
@@ -211,8 +211,8 @@ def _link(args: argparse.Namespace, faults: LineFaults, rate: float) -> Link:
     return SerialLink(open_wire(args.serial), faults, args.port_link, args.baud)
 
 
-def _profile(args: argparse.Namespace) -> Profile:
-    """Return the device of the file, or the default, as the options change it."""
+def _profile_from_options(args: argparse.Namespace) -> Profile:
+    """Profile of the file, or the default one, changed by the options."""
     from dataclasses import replace
 
     from fieldcal.sim_device import profile_file
@@ -220,7 +220,7 @@ def _profile(args: argparse.Namespace) -> Profile:
     from fieldcal.sim_device.profile import Profile
     from fieldcal.sim_device.vocabulary import checked_effect, parse
 
-    # a real device always feels the Earth; a device file says for itself what it has
+    # every real device measures the Earth's rate; a device file lists all its effects
     default = Profile(effects=(checked_effect("earth_rate", {}),))
     profile = profile_file.read_profile(args.profile) if args.profile else default
     tables: dict[str, dict[str, Any]] = {
@@ -233,10 +233,12 @@ def _profile(args: argparse.Namespace) -> Profile:
         },
         "frame": {"mounting": args.mounting and tuple(args.mounting.split(","))},
         "motion": {"turn_s": args.turn_time},
-        "truth": _triads(args, ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")),
+        "truth": _triad_options(
+            args, ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
+        ),
         "noise": {
             name.removesuffix("_noise"): value
-            for name, value in _triads(args, ("acc_noise", "gyr_noise")).items()
+            for name, value in _triad_options(args, ("acc_noise", "gyr_noise")).items()
         },
     }
     more: list[SimulatedEffect] = []
@@ -245,7 +247,7 @@ def _profile(args: argparse.Namespace) -> Profile:
         ("angle_offset", "angle_offset", ("alpha0_deg", "beta0_deg")),
     ):
         if text := getattr(args, option):
-            values = _numbers(f"--{option.replace('_', '-')}", text, 2)
+            values = _parse_numbers(f"--{option.replace('_', '-')}", text, 2)
             more.append(checked_effect(id_, dict(zip(names, values, strict=True))))
     changes: dict[str, Any] = {}
     for table, values_ in tables.items():
@@ -255,16 +257,16 @@ def _profile(args: argparse.Namespace) -> Profile:
     return replace(profile, **changes, effects=effects)
 
 
-def _triads(args: argparse.Namespace, names: tuple[str, ...]) -> dict[str, Any]:
+def _triad_options(args: argparse.Namespace, names: tuple[str, ...]) -> dict[str, Any]:
     """Values of options of three numbers, None where not given."""
     return {
-        name: text and _numbers(f"--{name.replace('_', '-')}", text, 3)
+        name: text and _parse_numbers(f"--{name.replace('_', '-')}", text, 3)
         for name in names
         for text in [getattr(args, name)]
     }
 
 
-def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+def _parse_numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -277,7 +279,7 @@ def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     return values
 
 
-def _speed(text: str) -> float:
+def _parse_speed(text: str) -> float:
     if text == "max":
         return math.inf
     try:
@@ -289,7 +291,7 @@ def _speed(text: str) -> float:
     return speed
 
 
-def _duration(seconds: float | None) -> float:
+def _parse_duration(seconds: float | None) -> float:
     if seconds is None:
         return math.inf
     if not seconds > 0:
@@ -297,23 +299,23 @@ def _duration(seconds: float | None) -> float:
     return seconds
 
 
-def _write(path: Path, concealed: dict[str, Any]) -> None:
+def _write_truth(path: Path, concealed: dict[str, Any]) -> None:
     try:
         path.write_text(json.dumps(concealed, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
 
 
 @contextlib.contextmanager
-def _keys(
+def _steering_keys(
     stream: DeviceStream, steps: tuple[float, float]
 ) -> Iterator[list[OrderSource]]:
-    """Listen to the keys, if there is somebody at a terminal."""
+    """Yield the arrow keys as a source of orders, if there is a terminal."""
     if not sys.stdin.isatty():
         yield []
         return

@@ -1,4 +1,4 @@
-"""Options that describe device and place, for the commands that begin a session."""
+"""Options that describe device and site, for the commands that create a session."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from fieldcal.commands.several import StoreSeveral
+from fieldcal.commands.repeated_option import StoreRepeated
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.grade import GRADES
 
 
-def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
-    """Declare the options of device, site and frame, of more than one if `several`."""
+def add_site_options(parser: argparse.ArgumentParser, several: bool = False) -> None:
+    """Declare the options of device, site and frame; `several` for several devices."""
     group = parser.add_argument_group("device and place")
     add = group.add_argument
     add("--name", help="name of the device")
     if several:
         what = "serial number, key of the history; repeat it for each further device"
-        add("--serial", action=StoreSeveral, help=what)
+        add("--serial", action=StoreRepeated, help=what)
     else:
         add("--serial", help="serial number, key of the history")
     add("--lot", metavar="NAME", help="production lot, for fieldcal lot")
     add("--station", metavar="NAME", help="test station, for fieldcal lot")
     add("--operator", metavar="NAME", help="operator, for fieldcal lot")
     add("--grade", choices=GRADES, help="default: tactical")
-    add_factory(group)
+    add_factory_options(group)
     add("--latitude", type=float, metavar="DEG", help="of the site, for gravity")
     add("--height", type=float, metavar="M", help="above the ellipsoid, default: 0")
     add("--gravity", type=float, metavar="M/S^2", help="instead of the WGS84 value")
@@ -37,8 +37,8 @@ def add_site(parser: argparse.ArgumentParser, several: bool = False) -> None:
     )
 
 
-def add_factory(parser: argparse._ActionsContainer) -> None:
-    """Declare the options of what the factory left in the device."""
+def add_factory_options(parser: argparse._ActionsContainer) -> None:
+    """Declare the options of the errors that the factory left in the device."""
     for name, what in (
         ("squareness", "cross-coupling left in the device, 1σ of each coefficient"),
         ("quadratic", "K2 of its accelerometers, 1σ of each, 1/(m/s^2)"),
@@ -49,17 +49,17 @@ def add_factory(parser: argparse._ActionsContainer) -> None:
 
 
 def site_tables(args: argparse.Namespace, name: str) -> dict[str, Any]:
-    """Tables of a session.toml from the options; `name` where none is given."""
+    """Tables of a session.toml from options and defaults; `name` is a default too."""
     tables = {
         "device": {"name": name, "grade": "tactical"},
         "site": {"height_m": 0.0},
         "frame": {"mounting": ["+x", "+y", "+z"]},
     }
-    return overlay(tables, given_tables(args))
+    return merge_tables(tables, tables_of_options(args))
 
 
-def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """Only what the options say."""
+def tables_of_options(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Tables of a session.toml with only what the options state."""
     axes = args.mounting and [axis.strip() for axis in args.mounting.split(",")]
     tables = {
         "device": {
@@ -85,10 +85,10 @@ def given_tables(args: argparse.Namespace) -> dict[str, dict[str, Any]]:
     return {name: table for name, table in said.items() if table}
 
 
-def overlay(
+def merge_tables(
     tables: Mapping[str, Any], given: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Lay what is given over tables; what is no table is left to whoever parses it."""
+    """Tables with the keys of `given` replaced; values that are no tables stay."""
     out = dict(tables)
     for name, table in given.items():
         if isinstance(out.get(name, {}), Mapping):

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.site import add_factory
+from fieldcal.commands.site import add_factory_options
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import FACTORY_KEYS
 
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--heading", "how well z points north, 1σ; for the gyroscopes"),
     ):
         add(option, type=float, metavar="DEG", help=what)
-    add_factory(parser)
+    add_factory_options(parser)
     add(
         "--lot",
         action="append",
@@ -86,11 +86,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.commands.borrowed_view import show_borrowed
     from fieldcal.commands.decision_view import show_decision
-    from fieldcal.commands.installing import with_installed
+    from fieldcal.commands.install_values import add_install_values
+    from fieldcal.commands.lot_prior_view import show_lot_prior
     from fieldcal.commands.over_time_view import show_over_time
-    from fieldcal.commands.table import show
+    from fieldcal.commands.table import show_calibration
     from fieldcal.evaluation.observations import usable_windows
     from fieldcal.evaluation.omitted_effects import with_repaired_bytes
     from fieldcal.session.folder import RESULT, Session
@@ -99,22 +99,22 @@ def run(args: argparse.Namespace) -> int:
     if not args.as_printed:
         session, repaired = with_repaired_bytes(session)
     still = usable_windows(session)
-    found = _solved(args, session, still)
+    found = _solve_session(args, session, still)
     if not args.as_printed:
         found = replace(found, warnings=(*repaired, *found.warnings))
-    found = with_installed(found, session)
-    over_time = _over_time(session) if args.over_time else None
+    found = add_install_values(found, session)
+    over_time = _solve_over_time(session) if args.over_time else None
     if over_time is not None:
         found = replace(found, info={**found.info, "over_time": over_time})
-    found = _decided(args, found, session, still)
+    found = _decide(args, found, session, still)
     path = session.write_json(RESULT, found.to_json())
     if args.json:
         for warning in found.warnings:
             sys.stderr.write(f"fieldcal solve: {warning}\n")
         sys.stdout.write(json.dumps(found.to_json()) + "\n")
     else:
-        show(found)
-        show_borrowed(found)
+        show_calibration(found)
+        show_lot_prior(found)
         show_over_time(found)
         show_decision(found)
         sys.stdout.write(f"written: {path}\n")
@@ -122,17 +122,17 @@ def run(args: argparse.Namespace) -> int:
     return 0 if found.good and go else 1
 
 
-def _solved(
+def _solve_session(
     args: argparse.Namespace, session: Session, still: UsableWindows
 ) -> Calibration:
-    """What windows, turns and lot say, estimated as the options want it."""
+    """Calibration from windows, turns and lot, with the options of the command."""
     from fieldcal.evaluation.solution import solve_session
 
     return solve_session(
         session,
         still,
         args.turns,
-        _left(args),
+        _factory_options(args),
         method=args.method,
         tilt=args.tilt,
         cross=args.cross,
@@ -140,17 +140,17 @@ def _solved(
         level_sigma_deg=args.level,
         heading_sigma_deg=args.heading,
         angle_sigma_deg=args.angles,
-        lot=_lot(args, session) if args.lot else None,
+        lot=_lot_prior(args, session) if args.lot else None,
     )
 
 
-def _over_time(session: Session) -> dict[str, Any]:
-    """Each parameter against the averaging time.
+def _solve_over_time(session: Session) -> dict[str, Any]:
+    """Each parameter's uncertainty against the averaging time.
 
     Raises
     ------
     InputError
-        If its windows cannot be cut.
+        If the windows are too short.
 
     """
     from fieldcal.evaluation.nested_windows import solve_nested_windows
@@ -163,14 +163,14 @@ def _over_time(session: Session) -> dict[str, Any]:
     return found.to_json()
 
 
-def _left(args: argparse.Namespace) -> dict[str, float]:
-    """What the options say that the factory left in the device."""
+def _factory_options(args: argparse.Namespace) -> dict[str, float]:
+    """Errors left by the factory, as far as options state them."""
     said = {name: getattr(args, name) for name in FACTORY_KEYS}
     return {name: value for name, value in said.items() if value is not None}
 
 
-def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
-    """What the store says of units as --lot wants them, but for the session's own."""
+def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
+    """Prior from the units of the store that --lot selects, without this unit."""
     from fieldcal.fleet.lot_prior import estimate_lot_prior
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
@@ -184,10 +184,10 @@ def _lot(args: argparse.Namespace, session: Session) -> LotPrior:
     return estimate_lot_prior(" ".join(args.lot), some, serial, folder)
 
 
-def _decided(
+def _decide(
     args: argparse.Namespace, found: Calibration, session: Session, still: UsableWindows
 ) -> Calibration:
-    """GO or NO-GO, where the session was a recalibration or limits are given."""
+    """The calibration with its decision, if the session is of a run or has limits."""
     from fieldcal.acceptance.assessment import assess, limits_path, with_faults
     from fieldcal.calibration import limits
     from fieldcal.history.location import default_location

@@ -1,7 +1,7 @@
-"""What a terminal of few letters is sent in place of those it lacks.
+"""Replacements for letters that a terminal cannot show.
 
-A Windows console with code page 1252 has ± and ° and no α; what it cannot show is
-spelled, so that no sentence is lost and no command ends for the sake of a letter.
+A Windows console with code page 1252 has ± and ° but no α. Such letters are spelled
+out, so that no sentence is lost and no command fails.
 """
 
 from __future__ import annotations
@@ -9,40 +9,40 @@ from __future__ import annotations
 import codecs
 import sys
 
-SPELLED = {
+SPELLINGS = {
     "α": "alpha", "β": "beta", "σ": "sigma", "χ": "chi", "Δ": "d", "√": "sqrt ",
     "→": "->", "←": "<-", "≤": "<=", "≥": ">=", "−": "-", "²": "^2", "³": "^3",
     "±": "+-", "°": " deg", "·": ".", "–": "-", "…": "...", "█": "#", "░": ":",
 }  # fmt: skip
-"""By letter; others become a question mark, lines of boxes a plus or a dash."""
+"""By letter. Others become a question mark, lines of boxes a plus or a dash."""
 
-BOXES = range(0x2500, 0x2580)
-FLAT = "─━═╌┄"
+BOX_CHARACTERS = range(0x2500, 0x2580)
+HORIZONTAL = "─━═╌┄"
 
-NAME = "fieldcal.spelled"
+ERROR_HANDLER = "fieldcal.spelled"
 
 
-def spelled(error: UnicodeError) -> tuple[str, int]:
-    """What stands for letters that cannot be encoded, as `codecs` asks for it."""
+def spell_unencodable(error: UnicodeError) -> tuple[str, int]:
+    """Error handler for `codecs`: replacements for letters that cannot be encoded."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]
-    return "".join(map(_one, text)), error.end
+    return "".join(map(_spell_letter, text)), error.end
 
 
-def _one(letter: str) -> str:
-    if letter in SPELLED:
-        return SPELLED[letter]
-    if ord(letter) in BOXES:
-        return "-" if letter in FLAT else "+"
+def _spell_letter(letter: str) -> str:
+    if letter in SPELLINGS:
+        return SPELLINGS[letter]
+    if ord(letter) in BOX_CHARACTERS:
+        return "-" if letter in HORIZONTAL else "+"
     return "?"
 
 
-def spell_out() -> None:
-    """Have the standard streams spell what their terminal cannot show."""
-    codecs.register_error(NAME, spelled)
+def use_spellings() -> None:
+    """Make the standard streams spell letters that their encoding does not have."""
+    codecs.register_error(ERROR_HANDLER, spell_unencodable)
     for stream in (sys.stdout, sys.stderr):
         encoding = getattr(stream, "encoding", None) or "utf-8"
         change = getattr(stream, "reconfigure", None)
         if change and not encoding.lower().replace("-", "").startswith("utf"):
-            change(errors=NAME)
+            change(errors=ERROR_HANDLER)

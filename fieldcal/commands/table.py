@@ -1,4 +1,4 @@
-"""A calibration as a person reads it: a table of values with their uncertainty."""
+"""Terminal view of a calibration: a table of values with their uncertainty."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.gauge import in_sample_units
 from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import format_with_sigma, parameter_title
-from fieldcal.commands.installing import lines
+from fieldcal.commands.install_values import install_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,7 +22,7 @@ UNCHECKED = (
 """Verdict about an estimate with as many parameters as means."""
 
 
-def show(
+def show_calibration(
     calibration: Calibration,
     truth: Mapping[str, Any] | None = None,
     out: IO[str] | None = None,
@@ -32,23 +32,23 @@ def show(
     Parameters
     ----------
     calibration : to show
-    truth : what a virtual device conceals, shown beside it
-    out : standard output, unless given
+    truth : true values of a virtual device, shown beside the estimates
+    out : standard output by default
 
     """
     from rich.table import Table
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
     calibration = in_sample_units(calibration)
-    console = ShownConsole(file=out)
+    console = EscapingConsole(file=out)
     table = Table(title="Calibration", title_justify="left")
     columns = ["parameter", "value", "± 1σ", "unit"]
     columns += ["concealed", "off by"] if truth else []
     for column in columns:
         right = column in ("value", "± 1σ", "concealed", "off by")
         table.add_column(column, justify="right" if right else "left", no_wrap=True)
-    concealed = concealed_values(truth or {})
+    true_by_name = true_values(truth or {})
     before = ""
     rows = zip(calibration.names, calibration.values, calibration.sigma, strict=True)
     for (name, value, sigma), unit in zip(rows, calibration.units, strict=True):
@@ -56,8 +56,8 @@ def show(
         if before and group != before:
             table.add_section()
         cells = [parameter_title(name), *format_with_sigma(value, sigma), unit]
-        if name in concealed:
-            true = concealed[name]
+        if name in true_by_name:
+            true = true_by_name[name]
             cells += [
                 format_with_sigma(true, sigma)[0],
                 f"{(value - true) / sigma:+.1f} σ",
@@ -65,24 +65,24 @@ def show(
         table.add_row(*cells)
         before = group
     console.print(table)
-    _tell(console, calibration)
+    _print_fit_and_verdict(console, calibration)
 
 
-def _tell(console: Console, calibration: Calibration) -> None:
-    say(console, "", _fit(calibration))
-    for told in lines(calibration):
-        say(console, "", told)
+def _print_fit_and_verdict(console: Console, calibration: Calibration) -> None:
+    print_sentence(console, "", _fit_sentence(calibration))
+    for told in install_lines(calibration):
+        print_sentence(console, "", told)
     for warning in calibration.warnings:
-        say(console, "! ", warning)
+        print_sentence(console, "! ", warning)
     if not calibration.good:
-        say(console, "", "verdict: BAD, do not use these numbers")
+        print_sentence(console, "", "verdict: BAD, do not use these numbers")
     elif "decision" not in calibration.info:  # which says more, below
         checked = calibration.dof > 0 or not math.isfinite(calibration.chi2)
-        say(console, "", f"verdict: {'good' if checked else UNCHECKED}")
+        print_sentence(console, "", f"verdict: {'good' if checked else UNCHECKED}")
 
 
-def say(console: Console, mark: str, text: str) -> None:
-    """Print a sentence behind a mark: between words on a terminal, else as one line."""
+def print_sentence(console: Console, mark: str, text: str) -> None:
+    """Print a sentence after a mark, wrapped on a terminal, else on one line."""
     from rich.table import Table
     from rich.text import Text
 
@@ -97,8 +97,8 @@ def say(console: Console, mark: str, text: str) -> None:
     console.print(grid)
 
 
-def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
-    """Concealed values by the full names of a calibration."""
+def true_values(truth: Mapping[str, Any]) -> dict[str, float]:
+    """True values of a virtual device, by the full names of a calibration."""
     flat = {
         f"{group}.{axis}": float(value)
         for group in ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
@@ -111,7 +111,7 @@ def concealed_values(truth: Mapping[str, Any]) -> dict[str, float]:
     return flat
 
 
-def _fit(calibration: Calibration) -> str:
+def _fit_sentence(calibration: Calibration) -> str:
     method = f"method: {calibration.method}"
     gyroscopes = calibration.info.get("gyroscopes")
     if not math.isfinite(calibration.chi2):

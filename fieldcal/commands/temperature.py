@@ -27,13 +27,13 @@ EXAMPLE = """\
 """
 
 FORMATS = {"ardupilot": ".param", "px4": ".params", "json": ".json"}
-"""Formats of the file, and how their names end."""
+"""Formats of the file, with the ending of its name."""
 
-FLOAT, INT = 9, 6
-"""What QGroundControl's files call a number of 32 bits."""
+PX4_FLOAT, PX4_INT = 9, 6
+"""Type codes of QGroundControl's files: 32 bit floating point and integer."""
 
-DISAGREES = 4.0
-"""Standard uncertainties from which a session is not what the others predict."""
+DISAGREEMENT_SIGMAS = 4.0
+"""Standard uncertainties beyond which a session disagrees with the others."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,40 +64,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Carry out the command: 1 if a session is not what the others predict."""
+    """Carry out the command; 1 if a session disagrees with the others."""
     if args.format and not args.output:
         raise InputError("--format is of a file: name it with -o")
-    points = opened(args.sessions)
-    found = modelled(points, args.limits)
-    document: dict[str, Any] = {**found.to_json(), "disagrees": disagrees(found)}
+    points = read_points(args.sessions)
+    found = fit_model(points, args.limits)
+    document: dict[str, Any] = {
+        **found.to_json(),
+        "disagrees": find_disagreements(found),
+    }
     if args.at is not None:
-        document["at"] = _at(found, args.at, points[-1])
+        document["at"] = _at_temperature(found, args.at, points[-1])
     if args.json:
         sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
     else:
-        _show(found, args.at, points[-1])
-    for sentence in (*left_out(points), *disagrees(found)):
+        _print_model(found, args.at, points[-1])
+    for sentence in (*groups_left_out(points), *find_disagreements(found)):
         sys.stderr.write(f"fieldcal temperature: {sentence}\n")
     if args.output:
-        _write(args, found, document)
+        _write_model(args, found, document)
     if args.device:
-        _install(args, found, points)
-    return 1 if disagrees(found) else 0
+        _install_model(args, found, points)
+    return 1 if find_disagreements(found) else 0
 
 
-def opened(paths: Sequence[Path]) -> list[ThermalPoint]:
-    """The sessions as points.
+def read_points(paths: Sequence[Path]) -> list[ThermalPoint]:
+    """Read the calibrations of sessions as thermal points.
 
     Raises
     ------
     InputError
-        If one cannot be used, or they are of several devices.
+        If a calibration cannot be used, or they are of several devices.
 
     """
-    from fieldcal.commands.compare import read
-    from fieldcal.thermal import point
+    from fieldcal.commands.compare import read_calibration
+    from fieldcal.thermal import thermal_point
 
-    points = [point(str(path), read(path)) for path in paths]
+    points = [thermal_point(str(path), read_calibration(path)) for path in paths]
     serials = {
         str(p.calibration.info.get("device", {}).get("serial", "")): p.name
         for p in points
@@ -109,13 +112,13 @@ def opened(paths: Sequence[Path]) -> list[ThermalPoint]:
     return points
 
 
-def modelled(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalModel:
-    """The model of points, by the limits of their grade.
+def fit_model(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalModel:
+    """Fit the model over temperature, with the limits of the device's grade.
 
     Raises
     ------
     InputError
-        If they are too few, or too close to each other.
+        If temperatures are too few or too close to each other.
 
     """
     from fieldcal.calibration.limits import read
@@ -125,25 +128,28 @@ def modelled(points: Sequence[ThermalPoint], limits: Path | None) -> ThermalMode
     return thermal_model(points, read(str(grade), limits))
 
 
-def left_out(points: Sequence[ThermalPoint]) -> list[str]:
-    """Groups that not all sessions have, a sentence each."""
+def groups_left_out(points: Sequence[ThermalPoint]) -> list[str]:
+    """Sentences about parameter groups that not all sessions have."""
     from fieldcal.calibration.gauge import GROUPS
     from fieldcal.calibration.names import group_of
-    from fieldcal.thermal.fit import common
+    from fieldcal.thermal.fit import common_parameters
 
-    used = {name for names in common(points) for name in names}
+    used = {name for names in common_parameters(points) for name in names}
     rest = {group_of(n) for p in points for n in p.calibration.names if n not in used}
     device = sorted(rest & GROUPS.keys())  # a tilt of the base is no part of it
     return [f"{group} is not in every session, and left out" for group in device]
 
 
-def disagrees(found: ThermalModel) -> list[str]:
-    """Sessions that the others do not predict, by their worst parameter."""
+def find_disagreements(found: ThermalModel) -> list[str]:
+    """Sentences about sessions that disagree with the others, with the worst parameter.
+
+    Each session is compared with the prediction from the others.
+    """
     said = []
     for i, (name, temperature) in enumerate(found.sessions):
         worst = max(found.curves, key=lambda n: abs(found.curves[n].held_out[i]))
         z = found.curves[worst].held_out[i]
-        if abs(z) > DISAGREES:
+        if abs(z) > DISAGREEMENT_SIGMAS:
             said.append(
                 f"{escape_line(name)} at {temperature:.1f} °C: {worst} is {abs(z):.1f}"
                 " of its ± from what the other sessions predict: hysteresis, a jump, or"
@@ -152,9 +158,11 @@ def disagrees(found: ThermalModel) -> list[str]:
     return said
 
 
-def _at(found: ThermalModel, to: float, last: ThermalPoint) -> dict[str, Any]:
-    """Parameters at a temperature, and what using the last session's costs there."""
-    from fieldcal.thermal.wording import document
+def _at_temperature(
+    found: ThermalModel, to: float, last: ThermalPoint
+) -> dict[str, Any]:
+    """Parameters at a temperature, and their change since the last session."""
+    from fieldcal.thermal.wording import change_document
 
     values = found.at(to)
     return {
@@ -164,17 +172,17 @@ def _at(found: ThermalModel, to: float, last: ThermalPoint) -> dict[str, Any]:
             for n, (v, s) in values.items()
         },
         "since_degc": last.temperature,
-        "change": document(found.change(to, last.temperature)),
+        "change": change_document(found.change(to, last.temperature)),
     }
 
 
-def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
+def _print_model(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
     from fieldcal.calibration.wording import (
         format_unit,
         format_with_sigma,
         parameter_title,
     )
-    from fieldcal.thermal.wording import TOLD, costs
+    from fieldcal.thermal.wording import REPORTED_SIGMAS, change_sentences
 
     say = sys.stdout.write
     say(
@@ -196,7 +204,7 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
         spread = f"± {curve.spread:.2g} {unit}"
         say(f"{parameter_title(name):24}{cells}  {spread:>16}  {order}\n")
     if at is not None:
-        told, rest = costs(found.change(at, last.temperature))
+        told, rest = change_sentences(found.change(at, last.temperature))
         say(
             f"\nat {at:.1f} °C with the calibration of {escape_line(last.name)}"
             f" ({last.temperature:.1f} °C), off by:\n"
@@ -204,12 +212,12 @@ def _show(found: ThermalModel, at: float | None, last: ThermalPoint) -> None:
         say("".join(f"  {line}\n" for line in told))
         if rest:
             say(
-                f"  less than {TOLD:.0f} of its ±:"
+                f"  less than {REPORTED_SIGMAS:.0f} of its ±:"
                 f" {', '.join(map(parameter_title, rest))}\n"
             )
 
 
-def _parameters(
+def _autopilot_parameters(
     autopilot: int,
     found: ThermalModel,
     instance: int,
@@ -223,15 +231,15 @@ def _parameters(
     return made
 
 
-def _write(
+def _write_model(
     args: argparse.Namespace, found: ThermalModel, document: dict[str, Any]
 ) -> None:
-    """Write the file in its format.
+    """Write the model in the format of the options.
 
     Raises
     ------
     InputError
-        If it is there already.
+        If the file exists already.
 
     """
     from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
@@ -241,34 +249,34 @@ def _write(
     if path.exists():
         raise InputError(f"{path}: is there already; name another file with -o")
     if args.format == "ardupilot":
-        made = _parameters(ARDUPILOT, found, args.instance)
+        made = _autopilot_parameters(ARDUPILOT, found, args.instance)
         lines = [f"{n},{p.value:.9g}" for n, p in made.values.items()]
-        text = _commented(made.says, lines)
+        text = _with_comments(made.says, lines)
     elif args.format == "px4":
-        made = _parameters(PX4, found, args.instance)
+        made = _autopilot_parameters(PX4, found, args.instance)
         lines = [_px4_line(n, p) for n, p in made.values.items()]
         head = "# Vehicle-Id Component-Id Name Value Type"
-        text = _commented(made.says, [head, *lines])
+        text = _with_comments(made.says, [head, *lines])
     else:
         text = json.dumps(document, indent=2, allow_nan=False) + "\n"
     write_atomically(path, text)
     sys.stderr.write(f"written: {path}\n")
 
 
-def _commented(says: Sequence[str], lines: Sequence[str]) -> str:
+def _with_comments(says: Sequence[str], lines: Sequence[str]) -> str:
     head = ["# fieldcal: over temperature, m/s^2, rad/s, sensor axes"]
     return "\n".join([*head, *(f"# {s}" for s in says), *lines]) + "\n"
 
 
 def _px4_line(name: str, parameter: ThermalParameter) -> str:
     value = f"{parameter.value:.9g}"
-    return f"1\t1\t{name}\t{value}\t{INT if parameter.whole else FLOAT}"
+    return f"1\t1\t{name}\t{value}\t{PX4_INT if parameter.whole else PX4_FLOAT}"
 
 
-def _install(
+def _install_model(
     args: argparse.Namespace, found: ThermalModel, points: Sequence[ThermalPoint]
 ) -> None:
-    """Write onto an autopilot; the old set is kept in the last session.
+    """Write the model onto an autopilot; the last session keeps the old parameters.
 
     Raises
     ------
@@ -278,10 +286,10 @@ def _install(
     """
     from fieldcal.commands.write import (
         InstallRefused,
-        carried_out,
+        change_table,
         check_ready,
-        opened,
-        table,
+        open_parameters,
+        write_parameters,
     )
     from fieldcal.drivers.mavlink_installed import PX4
     from fieldcal.install.proposal import Change
@@ -294,18 +302,18 @@ def _install(
         )
     decided = [p.calibration.info.get("decision") or {"go": True} for p in points]
     refused = [p.name for p, d in zip(points, decided, strict=True) if not d["go"]]
-    if (refused or disagrees(found)) and not args.force:
+    if (refused or find_disagreements(found)) and not args.force:
         which = ", ".join(refused) or "a session that the others do not predict"
         raise InstallRefused(f"NO-GO, nothing is written: {which}; take it again")
-    with opened(args.device) as link:
+    with open_parameters(args.device) as link:
         check_ready(link, link.autopilot)
         ids = link.read(id_names(args.instance)) if link.autopilot == PX4 else None
-        made = _parameters(link.autopilot, found, args.instance, ids)
+        made = _autopilot_parameters(link.autopilot, found, args.instance, ids)
         now = link.read(made.values)
         wanted = [
             Change(n, now[n], p.value, p.sigma, p.unit) for n, p in made.values.items()
         ]
-        (sys.stderr if args.json else sys.stdout).write(table(wanted))
+        (sys.stderr if args.json else sys.stdout).write(change_table(wanted))
         new = {change.name: change.new for change in wanted}
-        carried_out(link, args.device, folder, now, new, args.yes)
+        write_parameters(link, args.device, folder, now, new, args.yes)
     sys.stderr.write("restart the autopilot: it takes them in when it starts\n")

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.commands.write import ask, check_ready, opened
+    from fieldcal.commands.write import check_ready, confirm, open_parameters
     from fieldcal.install.transaction import (
         WriteRolledBack,
         broken_off,
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     path, known = last_saved(args.session)
     old, new = known["old"], known["new"]
     device = args.device or known["device"]
-    with opened(device) as link:
+    with open_parameters(device) as link:
         check_ready(link, link.autopilot)
         if known["done"] and not args.force:
             check_unchanged(link, new, "when it was written", old)
@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
             sys.stderr.write(f"{said}\n")
         for name, value in old.items():
             sys.stdout.write(f"{name}: {now[name]:.9g} -> {value:.9g}\n")
-        ask(f"give these {len(old)} parameters back to {device}", args.yes)
-        note_done(path, done=False)  # from here on it may be broken off
+        confirm(f"give these {len(old)} parameters back to {device}", args.yes)
+        note_done(path, done=False)  # from here on it may be interrupted
         back = now if whole(now, new) else {**now, **new}
         try:
             install(link, back, old, "as they were written")

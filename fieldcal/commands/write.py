@@ -24,12 +24,12 @@ EXAMPLE = """\
   fieldcal undo bench-7/2026-03-01 --device mavlink:/dev/ttyACM0
 """
 
-SIGNIFICANT = 3.0
-"""Standard uncertainties from which a change counts as one."""
+SIGNIFICANT_SIGMAS = 3.0
+"""Standard uncertainties beyond which a parameter counts as changed."""
 
 
 class InstallRefused(FieldcalError):
-    """The calibration is not to be installed."""
+    """The calibration must not be installed."""
 
     exit_code = 1
 
@@ -54,39 +54,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
-    from fieldcal.commands.compare import read
+    from fieldcal.commands.compare import read_calibration
     from fieldcal.session.folder import Session
 
     if (args.device is None) == (args.output is None):
         raise InputError("say where to: --device URL, or -o FILE; one of them")
     session = Session.open(args.session)
-    found = read(args.session)
-    wanted, installed, says = prepared(session, found)
-    _refuse(found, wanted, installed, args.force)
+    found = read_calibration(args.session)
+    wanted, installed, says = propose_changes(session, found)
+    _check_installable(found, wanted, installed, args.force)
     out = sys.stderr if args.json else sys.stdout
-    out.write(table(wanted))
+    out.write(change_table(wanted))
     for sentence in says:
         out.write(f"! {sentence}\n")
     if args.output:
-        _to_file(args.output, wanted)
+        _write_file(args.output, wanted)
     else:
-        _to_device(args, session, wanted, installed)
+        _write_device(args, session, wanted, installed)
     if args.json:
-        rows = [_row(change) for change in wanted]
+        rows = [_change_document(change) for change in wanted]
         where = str(args.output or args.device)
         sys.stdout.write(json.dumps({"written": where, "parameters": rows}) + "\n")
     return 0
 
 
-def prepared(
+def propose_changes(
     session: Session, found: Calibration
 ) -> tuple[tuple[Change, ...], InstalledCalibration, tuple[str, ...]]:
-    """What is to be written, what was installed, and what must be known of it.
+    """Changes to write, the installed calibration, and messages for the user.
 
     Raises
     ------
     InputError
-        If the session does not say what was installed.
+        If the session does not state the installed calibration.
 
     """
     from fieldcal.calibration import Nominal
@@ -108,7 +108,7 @@ def prepared(
     return changes(found, nominal, installed), installed, says
 
 
-def _refuse(
+def _check_installable(
     found: Calibration,
     wanted: Sequence[Change],
     installed: InstalledCalibration,
@@ -128,15 +128,15 @@ def _refuse(
         )
 
 
-def table(wanted: Sequence[Change]) -> str:
-    """Old and new values with uncertainty and significance, a line each."""
+def change_table(wanted: Sequence[Change]) -> str:
+    """Text with old and new values, uncertainty and significance of each change."""
     width = max(len(c.name) for c in wanted)
     lines = [
         f"{'parameter':{width}}  {'old':>12}    {'new':>12}   ± 1σ     unit   change/σ"
     ]
     for c in wanted:
         z = c.significance
-        word = "" if not abs(z) > SIGNIFICANT else "  changed"
+        word = "" if not abs(z) > SIGNIFICANT_SIGMAS else "  changed"
         told = f"{z:+9.1f}{word}" if z == z else "     kept"
         lines.append(
             f"{c.name:{width}}  {c.old:12.6f} -> {c.new:12.6f}   {c.sigma:<8.2g}"
@@ -145,7 +145,7 @@ def table(wanted: Sequence[Change]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _row(change: Change) -> dict[str, Any]:
+def _change_document(change: Change) -> dict[str, Any]:
     z = change.significance
     return {
         "name": change.name,
@@ -157,13 +157,13 @@ def _row(change: Change) -> dict[str, Any]:
     }
 
 
-def _to_file(path: Path, wanted: Sequence[Change]) -> None:
-    """Write a parameter file of the kind that its ending says.
+def _write_file(path: Path, wanted: Sequence[Change]) -> None:
+    """Write a parameter file in the format of its ending.
 
     Raises
     ------
     InputError
-        If it has another ending.
+        If the ending is unknown.
 
     """
     from fieldcal.session.folder import write_atomically
@@ -179,7 +179,7 @@ def _to_file(path: Path, wanted: Sequence[Change]) -> None:
     sys.stderr.write(f"written: {path}\n")
 
 
-def _to_device(
+def _write_device(
     args: argparse.Namespace,
     session: Session,
     wanted: Sequence[Change],
@@ -187,12 +187,12 @@ def _to_device(
 ) -> None:
     known = {c.name: c.old for c in wanted}
     new = {c.name: c.new for c in wanted}
-    with opened(args.device) as link:
+    with open_parameters(args.device) as link:
         check_ready(link, installed.autopilot)
-        carried_out(link, args.device, session.folder, known, new, args.yes)
+        write_parameters(link, args.device, session.folder, known, new, args.yes)
 
 
-def carried_out(
+def write_parameters(
     link: ParameterLink,
     device: str,
     folder: Path,
@@ -200,15 +200,15 @@ def carried_out(
     new: Mapping[str, float],
     yes: bool,
 ) -> None:
-    """Write parameters, with the old set in a session's folder first.
+    """Write parameters, after saving the old ones in a session's folder.
 
     Parameters
     ----------
     link, device : the autopilot, and its address
     folder : of the session
-    known : what it should keep now
-    new : what it is to keep
-    yes : whether nobody is asked
+    known : values that the autopilot is expected to have
+    new : values to write
+    yes : whether to write without asking
 
     """
     from fieldcal.drivers.mavlink_parameters import same_float32
@@ -223,7 +223,7 @@ def carried_out(
     )
 
     earlier = unfinished(folder)
-    if earlier:  # whatever it keeps, it comes from there
+    if earlier:  # its values come from an interrupted write
         now = link.read(known)
         old = {name: earlier[1]["old"].get(name, now[name]) for name in now}
         if said := broken_off(now, old, earlier[1]["new"]):
@@ -235,7 +235,7 @@ def carried_out(
             note_done(earlier[0], done=True)
         sys.stderr.write(f"all {len(new)} parameters are installed already\n")
         return
-    ask(f"write these {len(new)} parameters to {device}", yes)
+    confirm(f"write these {len(new)} parameters to {device}", yes)
     path = save(folder, device, old, new)
     if earlier:
         note_done(earlier[0], undone=True)
@@ -252,13 +252,13 @@ def carried_out(
     )
 
 
-def opened(url: str) -> Any:
+def open_parameters(url: str) -> Any:
     """Open the parameters of an autopilot.
 
     Raises
     ------
     InputError
-        If it is no MAVLink address, or pymavlink is not installed.
+        If the address is not of MAVLink, or pymavlink is not installed.
 
     """
     from importlib.util import find_spec
@@ -277,12 +277,12 @@ def opened(url: str) -> Any:
 
 
 def check_ready(link: Any, autopilot: int) -> None:
-    """Refuse an autopilot of another program, or one that may fly.
+    """Refuse an autopilot that is armed or runs another program.
 
     Raises
     ------
     InputError
-        If it is.
+        If the autopilot is refused.
 
     """
     if link.armed:
@@ -294,13 +294,13 @@ def check_ready(link: Any, autopilot: int) -> None:
         )
 
 
-def ask(what: str, yes: bool) -> None:
-    """Ask a person; without one, it must have been said beforehand.
+def confirm(what: str, yes: bool) -> None:
+    """Ask the user for confirmation, unless `yes`.
 
     Raises
     ------
     InputError
-        If nobody is there to ask.
+        If there is no terminal to ask at.
     InstallRefused
         If the answer is no.
 

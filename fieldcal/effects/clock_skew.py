@@ -45,7 +45,7 @@ def estimate_skew(t: Array, t_host: Array) -> tuple[float, float]:
 
 
 class ClockSkew(Chain):
-    """Rate of the device's clock."""
+    """Rate error of the device's clock against the host's."""
 
     params = (Param("ppm", "ppm", 2000.0),)
     covariate = "t against t_host"

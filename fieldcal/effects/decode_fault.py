@@ -104,7 +104,7 @@ _UNDO = {
 
 
 class DecodeFault(Chain):
-    """A slip in decoding 16-bit values."""
+    """Fault in the decoding of 16-bit values."""
 
     params = (Param("step", "LSB", 65536.0),)
     covariate = "clusters 256 LSB apart, jumps at ±2^15"

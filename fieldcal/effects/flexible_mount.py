@@ -28,7 +28,7 @@ from fieldcal.physics.experience import Experience
 
 
 class FlexibleMount(Sensor):
-    """Compliance of what carries the accelerometers, by axis."""
+    """Compliance of the structure below the accelerometers, by axis."""
 
     params = tuple(Param(i, "s^2", 3e-4) for i in "xyz")
     while_moving = True

@@ -33,7 +33,7 @@ from fieldcal.physics.experience import Experience
 
 
 class Increments(Sensor):
-    """What increments of velocity and rotation have beside means of force and rate."""
+    """Sculling and coning terms of increments, which means do not have."""
 
     params = (Param("sculling", "s", 0.01), Param("coning", "s^2", 1e-4))
     while_moving = True

@@ -23,7 +23,7 @@ from fieldcal.physics.experience import Experience
 
 
 class LeverArm(Motion):
-    """Distance of the accelerometers from the axis of the turn."""
+    """Vector from the axis of the turn to the accelerometers."""
 
     params = tuple(Param(i, "m", 0.3) for i in "xyz")
     covariate = "rate squared and angular acceleration in turns"

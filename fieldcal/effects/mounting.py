@@ -187,7 +187,7 @@ def _whole_recording_fault(recording: CheckedSamples) -> Fault:
 
 
 class Mounting(Chain):
-    """Wrong axes or a wrong unit."""
+    """Wrong axes or a wrong unit in session.toml."""
 
     misread = True
     covariate = "force at rest is not where it should be"

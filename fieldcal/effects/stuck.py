@@ -61,7 +61,7 @@ def equal_value_runs(values: Array) -> NDArray[np.intp]:
 
 
 class Stuck(Chain):
-    """A channel that stands still."""
+    """Channel that repeats one value."""
 
     shapes = (Shape("from_s", "s"), Shape("to_s", "s"))
     covariate = "runs of equal values"

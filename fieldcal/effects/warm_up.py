@@ -24,7 +24,7 @@ from fieldcal.physics.shape import Shape
 
 
 class WarmUp(BiasChange):
-    """Exponential change of the biases since the start."""
+    """Exponential change of the biases since power-on."""
 
     thermal = True
     params = six("m/s^2", 5e-2, "rad/s", 2e-3)

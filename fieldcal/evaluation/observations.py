@@ -152,7 +152,7 @@ def usable_windows(session: Session) -> UsableWindows:
     for one in dead:
         averages = [_without_sensor(average, one.channels) for average in averages]
     return UsableWindows(
-        tuple(rows), tuple(averages), (*warnings, *(one.says for one in dead))
+        tuple(rows), tuple(averages), (*warnings, *(one.message for one in dead))
     )
 
 

@@ -55,7 +55,7 @@ def average_window(
     window = Window(noise=noise, grain=grain)
     window.add(part)
     try:
-        return window.average(), window.noise and window.noise.without_wander, ""
+        return window.average(), window.noise and window.noise.spectrum_shape_only, ""
     except Moved as moved:
         calm = _average_calm_part(part, moved, noise, grain)
         if calm is None:

@@ -1,8 +1,8 @@
-"""Results for other programs, one format a file.
+"""Writes results for other programs, with one module for each format.
 
 To add one, write exporters/<name>.py with ``WHAT`` (a line for the help), ``ENDING``
-and ``write(source, path)``, which returns what the user must know, one sentence each.
-Sign and order of its convention stand at the top of the file.
+and ``write(source, path)``, which returns notices for the user, one sentence each. The
+docstring of the module states sign and order of the format's convention.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ExportSource:
-    """What is exported.
+    """Calibration to export, with the session it comes from.
 
     Attributes
     ----------
     calibration : of the device, U = bias + M f in device axes
-    nominal : values for what was not determined
-    session : where it comes from
-    installed : what the device had taken out of its samples already, None if nothing
-    instance : which sensor of the device the numbers are for, from 0
+    nominal : values of parameters that were not determined
+    session : of the calibration
+    installed : calibration that the device applied to its samples, None if none
+    instance : number of the device's sensor, from 0
 
     """
 
@@ -60,8 +60,8 @@ class ExportSource:
         return [name for name in every if name not in self.calibration.names]
 
     @property
-    def says(self) -> list[str]:
-        """What the user must know whatever the format, one sentence each."""
+    def notices(self) -> list[str]:
+        """Notices for the user that hold for any format, one sentence each."""
         says, gauge = [], self.session.about.gauge
         for size, unit, si in zip(gauge.size, gauge.units, SI, strict=True):
             if unit != si:
@@ -78,19 +78,19 @@ class ExportSource:
 
 
 class Exporter(Protocol):
-    """What a module of `exporters` offers."""
+    """Interface of a format module in `exporters`."""
 
     WHAT: str
     ENDING: str
     write: Callable[[ExportSource, Path], list[str]]
 
 
-def formats() -> tuple[str, ...]:
-    """Names of the formats there are."""
+def format_names() -> tuple[str, ...]:
+    """Names of all formats."""
     return module_names(__path__)
 
 
-def exporter(name: str) -> Exporter:
+def load_exporter(name: str) -> Exporter:
     """Return the module of a format.
 
     Raises
@@ -99,6 +99,6 @@ def exporter(name: str) -> Exporter:
         If there is no such format.
 
     """
-    if name not in formats():
-        raise InputError(f"no format {name!r}: there are {', '.join(formats())}")
+    if name not in format_names():
+        raise InputError(f"no format {name!r}: there are {', '.join(format_names())}")
     return cast(Exporter, import_module(f"{__name__}.{name}"))

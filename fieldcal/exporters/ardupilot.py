@@ -5,10 +5,10 @@ ArduPilot corrects a sample r of a sensor, axis by axis in the sensor's own fram
     accelerometer  f = (r - INS_ACCOFFS) INS_ACCSCAL                               (1)
     gyroscope      w = r - INS_GYROFFS                                             (2)
 
-and turns it by AHRS_ORIENTATION afterwards. fieldcal has U = b + s f (true -> raw), so
-INS_ACCOFFS = b with the same sign, and INS_ACCSCAL = 1 / s. Where U had a calibration
-taken out already, the two are put together, see `mavlink_installed`. Cross-coupling and
-gyroscope scale have no place here: what that costs is said.
+and rotates it by AHRS_ORIENTATION afterwards. fieldcal has U = b + s f (true -> raw),
+so INS_ACCOFFS = b with the same sign, and INS_ACCSCAL = 1 / s. If the autopilot applied
+a calibration to U already, both are combined, see `mavlink_installed`. The parameters
+do not include cross-coupling and gyroscope scale; a notice states the resulting error.
 
 Units: m/s^2, rad/s. Source: ArduPilot's parameter list, INS_*.
 """
@@ -36,22 +36,22 @@ from fieldcal.session.folder import write_atomically
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"
 
-WIDEST_OFFSET, WIDEST_SCALE = 3.5, 0.2
-"""Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot takes."""
+LARGEST_OFFSET, LARGEST_SCALE_ERROR = 3.5, 0.2
+"""Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot accepts."""
 
 
 class ArdupilotParameters(NamedTuple):
-    """Parameters to install, and what the user must know of them.
+    """Parameters to install, with notices for the user.
 
     Attributes
     ----------
     values : by name
-    says : what was left out and what it costs, one sentence each
+    notices : about omitted parameters and the resulting errors, one sentence each
 
     """
 
     values: Mapping[str, float]
-    says: tuple[str, ...]
+    notices: tuple[str, ...]
 
 
 def parameters(
@@ -60,49 +60,51 @@ def parameters(
     installed: InstalledCalibration | None = None,
     instance: int = 0,
 ) -> ArdupilotParameters:
-    """Return the parameters that take this calibration out of what the sensor sends.
+    """Return the parameters by which ArduPilot corrects the sensor.
 
     Parameters
     ----------
     calibration : U = b + M f of the samples as recorded
-    nominal : values for what was not determined
-    installed : what the autopilot had in use while U was recorded; None for raw samples
-    instance : which sensor, from 0, where `installed` does not say it
+    nominal : values of parameters that were not determined
+    installed : calibration that the autopilot applied to U; None for raw samples
+    instance : number of the sensor, from 0, if `installed` does not state it
 
     Raises
     ------
     InputError
-        If `installed` is not complete, of another program, or behind a turned board;
-        or if neither biases nor scales were determined.
+        If `installed` is incomplete, of another program, or of a rotated board; or if
+        neither biases nor scales were determined.
 
     """
-    found = converted(ARDUPILOT, calibration, nominal, installed, instance)
+    found = autopilot_parameters(ARDUPILOT, calibration, nominal, installed, instance)
     wide = [
         f"{name} = {value:.4g} is beyond what ArduPilot takes: it will say that the "
         "sensor is not calibrated"
         for name, value in found.values.items()
         if (
-            name.startswith("INS_ACC") and "OFFS" in name and abs(value) > WIDEST_OFFSET
+            name.startswith("INS_ACC")
+            and "OFFS" in name
+            and abs(value) > LARGEST_OFFSET
         )
-        or ("SCAL" in name and abs(value - 1) > WIDEST_SCALE)
+        or ("SCAL" in name and abs(value - 1) > LARGEST_SCALE_ERROR)
     ]
-    return ArdupilotParameters(found.values, (*found.says, *wide))
+    return ArdupilotParameters(found.values, (*found.notices, *wide))
 
 
-def converted(
+def autopilot_parameters(
     autopilot: int,
     calibration: Calibration,
     nominal: Nominal | None,
     installed: InstalledCalibration | None,
     instance: int,
 ) -> ArdupilotParameters:
-    """Return offsets and scales of any autopilot that corrects by (1) and (2)."""
+    """Return offsets and scales for an autopilot that corrects by (1) and (2)."""
     if installed is not None and installed.autopilot != autopilot:
         raise InputError(
             "the recording has the calibration of another autopilot program taken "
             "out: export the format of that program"
         )
-    device = installed or _without(autopilot, instance)
+    device = installed or _nothing_installed(autopilot, instance)
     acc, gyr = (
         reduce_to_diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr")
     )
@@ -116,12 +118,12 @@ def converted(
         kept += known["gyr_offset"]
     if not kept:
         raise InputError("the calibration has neither biases nor scales to install")
-    says = _left_out(calibration, acc, gyr)
+    says = _left_out_notices(calibration, acc, gyr)
     return ArdupilotParameters({name: every[name] for name in kept}, tuple(says))
 
 
-def _without(autopilot: int, instance: int) -> InstalledCalibration:
-    """Return an autopilot that had nothing in use."""
+def _nothing_installed(autopilot: int, instance: int) -> InstalledCalibration:
+    """Return an autopilot without an installed calibration."""
     nothing = InstalledCalibration(autopilot, instance, {}, taken_out=True)
     known = parameter_names(autopilot, instance)
     nothing.values = {name: 0.0 for some in known.values() for name in some}
@@ -129,7 +131,7 @@ def _without(autopilot: int, instance: int) -> InstalledCalibration:
     return nothing
 
 
-def _left_out(
+def _left_out_notices(
     calibration: Calibration, acc: DiagonalCalibration, gyr: DiagonalCalibration
 ) -> list[str]:
     says = []
@@ -159,14 +161,14 @@ def _left_out(
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
+    """Write the file; returns notices for the user."""
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance
     )
     lines = [
         "# fieldcal: true = (raw - OFFS) * SCAL, m/s^2 and rad/s, sensor axes",
-        *(f"# {sentence}" for sentence in found.says),
+        *(f"# {sentence}" for sentence in found.notices),
         *(f"{name},{value:.9g}" for name, value in found.values.items()),
     ]
     write_atomically(path, "\n".join(lines) + "\n")
-    return list(found.says)
+    return list(found.notices)

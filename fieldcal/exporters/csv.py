@@ -1,8 +1,9 @@
-"""The parameters as a table: name, value, sigma, unit; true -> raw.
+"""Table of the parameters: name, value, sigma, unit; true -> raw.
 
     U = bias + M f,  M = diag(scale) + cross-coupling                              (1)
 
-as everywhere in fieldcal, so  f = M^-1 (U - bias). Only what was determined is in it.
+as everywhere in fieldcal, so  f = M^-1 (U - bias). The table has the determined
+parameters only.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ ENDING = "_calibration.csv"
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
+    """Write the file; returns notices for the user."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["name", "value", "sigma", "unit"])
@@ -31,5 +32,5 @@ def write(source: ExportSource, path: Path) -> list[str]:
         table.writerow([name, f"{value:.12g}", f"{sigma:.6g}", unit])
     write_atomically(path, text.getvalue())
     says = "raw = bias + M true, M = diag(scale) + cross-coupling, device axes"
-    others = ("nominal", "raw is in")  # none is filled in; raw is as the samples are
-    return [*(s for s in source.says if not any(o in s for o in others)), says]
+    others = ("nominal", "raw is in")  # neither applies to this table
+    return [*(s for s in source.notices if not any(o in s for o in others)), says]

@@ -8,9 +8,9 @@ imu_tk corrects with a misalignment T of unit diagonal, a scale K and a bias B,
 
     B = b,  K = diag(M^-1),  T = M^-1 K^-1                                         (2)
 
-which is exact. T of the accelerometers is upper triangular where imu_tk estimates it
-itself; here it is what M is. Files hold T, K and B one after the other, as imu_tk reads
-them. Units: m/s^2, rad/s. Source: Tedaldi, Pretto, Menegatti, ICRA 2014.
+which is exact. The T that imu_tk itself estimates for accelerometers is upper
+triangular; here it is full if M is. The files contain T, K and B in this order, as
+imu_tk reads them. Units: m/s^2, rad/s. Source: Tedaldi, Pretto, Menegatti, ICRA 2014.
 """
 
 from __future__ import annotations
@@ -35,20 +35,22 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array, Array]:
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write both files; what the user must know."""
+    """Write both files; returns notices for the user."""
     name = path.name.replace("_acc", "_gyro")
     if name == path.name:
         name = f"{path.stem}_gyro{path.suffix}"
     for sensor, file in (("acc", path), ("gyr", path.with_name(name))):
         parts = matrices(*source.linear(sensor))
-        write_atomically(file, "\n\n".join(_text(part) for part in parts) + "\n")
+        write_atomically(
+            file, "\n\n".join(_format_array(part) for part in parts) + "\n"
+        )
     return [
-        *source.says,
+        *source.notices,
         f"the gyroscopes are in {path.with_name(name)}",
         "true = T K (raw - B), m/s^2 and rad/s; T, K and B one after the other",
     ]
 
 
-def _text(array: Array) -> str:
+def _format_array(array: Array) -> str:
     rows = np.atleast_2d(array) if array.ndim == 2 else array[:, None]
     return "\n".join(" ".join(f"{x:.12g}" for x in row) for row in rows)

@@ -25,7 +25,7 @@ UNITS = {"acc": "m/s^2", "gyr": "rad/s"}
 
 
 def document(source: ExportSource) -> dict[str, Any]:
-    """Return the object."""
+    """Return the content of the file."""
     found = source.calibration
     triads = {
         name: _triad(source, sensor)
@@ -49,7 +49,7 @@ def document(source: ExportSource) -> dict[str, Any]:
         "parameters": parameters,
         "nominal": source.undetermined,
         "warnings": list(found.warnings),
-        "notes": source.says,
+        "notes": source.notices,
     }
 
 
@@ -63,7 +63,7 @@ def _triad(source: ExportSource, sensor: str) -> dict[str, Any]:
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
+    """Write the file; returns notices for the user."""
     text = json.dumps(document(source), indent=2, allow_nan=False)
     write_atomically(path, text + "\n")
-    return source.says
+    return source.notices

@@ -5,16 +5,16 @@ Kalibr predicts what the sensors say,
     U = M_a f + b_a                                                                (1)
     W = M_g C w + b_g,   C a rotation                                              (2)
 
-like fieldcal, so M_a = M is written as it is. Kalibr's M are lower triangular: for the
-gyroscopes M = M_g C is parted into such an M_g and a rotation C (exactly); M_a stays
-full where the recording says so. Biases stand beside, Kalibr estimates them anew.
+like fieldcal, so M_a = M is written unchanged, even if it is full. Kalibr's M are lower
+triangular: for the gyroscopes M = M_g C is split exactly into such an M_g and a
+rotation C. Biases are written for information, since Kalibr estimates them anew.
 
 The noise density is that of means over 1 s within the windows of the session,
 
     N^2 = <(y_k+1 - y_k)^2> / 2 * 1 s                                              (3)
 
-the largest axis of each triad. The random walk takes hours at rest to see: it is not
-filled in. Where the session has a noise.json, all four numbers are that one's. Units:
+of the noisiest axis of each triad. The random walk needs hours at rest and is not
+filled in. If the session has a noise.json, all four numbers are taken from it. Units:
 m/s^2, rad/s. Source: Kalibr wiki, IMU noise model and yaml formats.
 """
 
@@ -34,11 +34,11 @@ from fieldcal.session.noise_file import read_noise
 WHAT = "Kalibr's imu.yaml (noise, M, C, bias)"
 ENDING = "_imu.yaml"
 
-SECOND = 1.0
+MEAN_S = 1.0
 """Length of the means in (3), s."""
 
 
-def parted(matrix: Array) -> tuple[Array, Array]:
+def split_rotation(matrix: Array) -> tuple[Array, Array]:
     """Lower triangular M_g and rotation C with M_g C = matrix, (2)."""
     q, r = np.linalg.qr(matrix.T)
     # a negative diagonal would be a reflection
@@ -46,8 +46,8 @@ def parted(matrix: Array) -> tuple[Array, Array]:
     return (signs @ r).T, (q @ signs).T
 
 
-def density(session: Session) -> Array:
-    """Noise density of the six channels by (3), nan where no window is long enough."""
+def window_noise_density(session: Session) -> Array:
+    """Noise density of the six channels by (3); nan if no window is long enough."""
     squares, many = np.zeros(6), np.zeros(6)
     for window in session.windows:
         if window is None:
@@ -57,49 +57,53 @@ def density(session: Session) -> Array:
         squares += np.nansum(steps, axis=0)
         many += np.isfinite(steps).sum(axis=0)
     variance = squares / np.where(many > 0, 2 * many, np.nan)
-    return np.sqrt(variance * SECOND)  # (3)
+    return np.sqrt(variance * MEAN_S)  # (3)
 
 
 def _means(block: Block) -> Array:
-    """Means over 1 s, the last part left out, (k, 6)."""
+    """Means over 1 s without the last, incomplete one, (k, 6)."""
     if not len(block):
         return np.empty((0, 6))
-    cells = ((block.t - block.t[0]) / SECOND).astype(int)
+    cells = ((block.t - block.t[0]) / MEAN_S).astype(int)
     starts = np.searchsorted(cells, np.arange(cells[-1] + 1))
     whole = [part for part in np.split(block.six, starts[1:])[:-1] if len(part)]
     return np.array([part.mean(axis=0) for part in whole]).reshape(-1, 6)
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
-    says = list(source.says)
+    """Write the file; returns notices for the user."""
+    says = list(source.notices)
     acc_bias, acc = source.linear("acc")
     gyr_bias, gyr = source.linear("gyr")
-    lower, turn = parted(gyr)
+    lower, turn = split_rotation(gyr)
     lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
     found = read_noise(source.session.folder)
-    lines += _of_windows(source.session, says) if found is None else _at_rest(found)
+    lines += (
+        _densities_of_windows(source.session, says)
+        if found is None
+        else _densities_of_noise_file(found)
+    )
     rate = source.session.rate_hz
     lines += [
         "rostopic: /imu/raw",
         f"update_rate: {rate:.6g}" if np.isfinite(rate) else "# update_rate: unknown",
         "model: scale-misalignment",
         "accelerometers:",
-        f"  M: {written(acc)}",
-        f"  bias: {written(acc_bias)}",
+        f"  M: {yaml_array(acc)}",
+        f"  bias: {yaml_array(acc_bias)}",
         "gyroscopes:",
-        f"  M: {written(lower)}",
-        f"  C_gyro_i: {written(turn)}",
+        f"  M: {yaml_array(lower)}",
+        f"  C_gyro_i: {yaml_array(turn)}",
         "  A: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
-        f"  bias: {written(gyr_bias)}",
+        f"  bias: {yaml_array(gyr_bias)}",
     ]
     write_atomically(path, "\n".join(lines) + "\n")
     return says
 
 
-def _of_windows(session: Session, says: list[str]) -> list[str]:
-    """Noise densities of the session's own windows, (3)."""
-    noise, lines = density(session), []
+def _densities_of_windows(session: Session, says: list[str]) -> list[str]:
+    """Lines with the noise densities of the session's windows, (3)."""
+    noise, lines = window_noise_density(session), []
     for name, values in (("accelerometer", noise[:3]), ("gyroscope", noise[3:])):
         known = values[np.isfinite(values)]
         if len(known):
@@ -118,24 +122,24 @@ def _of_windows(session: Session, says: list[str]) -> list[str]:
     return lines
 
 
-def _at_rest(found: Mapping[str, Any]) -> list[str]:
-    """Kalibr's four numbers as `fieldcal noise` found them, with their ±."""
+def _densities_of_noise_file(found: Mapping[str, Any]) -> list[str]:
+    """Lines with Kalibr's four noise parameters of a noise.json, with their ±."""
     lines = []
     for name, told in found["for"]["kalibr"].items():
         sigma = told.get("sigma")
         how = "not exceeded in 95 of 100" if sigma is None else f"+- {sigma:.2g}"
-        lines.append(f"{name}: {_number(told['value'])}  # {how}")
+        lines.append(f"{name}: {_yaml_number(told['value'])}  # {how}")
     return lines
 
 
-def written(array: Array) -> str:
-    """Write an array as YAML; an exponent needs its point there."""
+def yaml_array(array: Array) -> str:
+    """An array as YAML, in which a number with an exponent needs a decimal point."""
     if array.ndim == 2:
-        return "[" + ", ".join(written(row) for row in array) + "]"
-    return "[" + ", ".join(_number(float(x)) for x in array) + "]"
+        return "[" + ", ".join(yaml_array(row) for row in array) + "]"
+    return "[" + ", ".join(_yaml_number(float(x)) for x in array) + "]"
 
 
-def _number(value: float) -> str:
+def _yaml_number(value: float) -> str:
     text = f"{value:.12g}"
     mantissa, e, exponent = text.partition("e")
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"

@@ -46,8 +46,8 @@ _UNKNOWN = [-1.0] + [0.0] * 8
 _NO_COVARIANCE = [0.0] * 9
 
 
-def _definition(text: str, parts: dict[str, str]) -> str:
-    """Definition of a message with those of its parts, as MCAP wants them."""
+def _message_definition(text: str, parts: dict[str, str]) -> str:
+    """Definition of a message followed by those of its parts, in MCAP's form."""
     rule = "\n" + "=" * 80 + "\n"
     return text + "".join(f"{rule}MSG: {n}\n{body}" for n, body in parts.items())
 
@@ -74,10 +74,10 @@ def write(source: ExportSource, path: Path) -> list[str]:
         with part.open("wb") as file:
             writer: Any = Writer(file)
             imu = writer.register_msgdef(
-                "sensor_msgs/msg/Imu", _definition(_IMU, _VECTORS | _PARTS)
+                "sensor_msgs/msg/Imu", _message_definition(_IMU, _VECTORS | _PARTS)
             )
             degrees = writer.register_msgdef(
-                "sensor_msgs/msg/Temperature", _definition(_TEMPERATURE, _PARTS)
+                "sensor_msgs/msg/Temperature", _message_definition(_TEMPERATURE, _PARTS)
             )
             shift = max(0.0, -float(raw.t[0]))
             for i, t in enumerate((raw.t + shift).tolist()):
@@ -87,9 +87,9 @@ def write(source: ExportSource, path: Path) -> list[str]:
                         "temperature": float(raw.temperature[i]),
                         "variance": 0.0,
                     }
-                    _put(writer, degrees, "/imu/temperature", t, said)
-                _sample(writer, imu, "/imu/raw", t, raw, i)
-                _sample(writer, imu, "/imu/calibrated", t, calibrated, i)
+                    _write_message(writer, degrees, "/imu/temperature", t, said)
+                _write_sample(writer, imu, "/imu/raw", t, raw, i)
+                _write_sample(writer, imu, "/imu/calibrated", t, calibrated, i)
             writer.finish()
         os.replace(part, path)
     except OSError as error:
@@ -97,7 +97,7 @@ def write(source: ExportSource, path: Path) -> list[str]:
     finally:
         part.unlink(missing_ok=True)
     moved = [f"times begin {shift:g} s later: MCAP has none before 0"] * (shift > 0)
-    return [*source.says, *moved]
+    return [*source.notices, *moved]
 
 
 def _header(t: float) -> dict[str, Any]:
@@ -105,7 +105,7 @@ def _header(t: float) -> dict[str, Any]:
     return {"stamp": {"sec": whole, "nanosec": nano}, "frame_id": FRAME}
 
 
-def _sample(
+def _write_sample(
     writer: Any, schema: Any, topic: str, t: float, block: Block, i: int
 ) -> None:
     acc, gyr = block.acc[i].tolist(), block.gyr[i].tolist()
@@ -119,10 +119,12 @@ def _sample(
         "linear_acceleration": dict(zip("xyz", acc, strict=True)),
         "linear_acceleration_covariance": _NO_COVARIANCE if known[0] else _UNKNOWN,
     }
-    _put(writer, schema, topic, t, said)
+    _write_message(writer, schema, topic, t, said)
 
 
-def _put(writer: Any, schema: Any, topic: str, t: float, said: dict[str, Any]) -> None:
+def _write_message(
+    writer: Any, schema: Any, topic: str, t: float, said: dict[str, Any]
+) -> None:
     stamp = round(t * 1e9)
     writer.write_message(
         topic=topic, schema=schema, message=said, log_time=stamp, publish_time=stamp

@@ -5,10 +5,10 @@ PX4 corrects a sample r of a sensor (topics sensor_accel, sensor_gyro)
     accelerometer  f = R (r - CAL_ACCn_OFF) CAL_ACCn_SCALE                         (1)
     gyroscope      w = R (r - CAL_GYROn_OFF)                                       (2)
 
-axis by axis in the sensor's frame, and turns it into the body's by R afterwards.
-fieldcal has U = b + s f (true -> raw), so OFF = b with the same sign and SCALE = 1 / s.
-Of samples of sensor_combined, which are behind (1), b and s are of what was left: they
-are put together with what was installed, see `mavlink_installed`.
+axis by axis in the sensor's frame, and R rotates it into the body frame. fieldcal has
+U = b + s f (true -> raw), so OFF = b with the same sign and SCALE = 1 / s. Samples of
+sensor_combined are already corrected by (1); their b and s are combined with the
+installed calibration, see `mavlink_installed`.
 
 Units: m/s^2, rad/s. Source: PX4's parameter reference, CAL_*.
 """
@@ -20,14 +20,14 @@ from pathlib import Path
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.drivers.mavlink_installed import PX4, InstalledCalibration
 from fieldcal.exporters import ExportSource
-from fieldcal.exporters.ardupilot import ArdupilotParameters, converted
+from fieldcal.exporters.ardupilot import ArdupilotParameters, autopilot_parameters
 from fieldcal.session.folder import write_atomically
 
 WHAT = "PX4 parameters (CAL_ACC, CAL_GYRO), for QGroundControl"
 ENDING = ".params"
 
-FLOAT = 9
-"""What a parameter file calls a parameter of 32 bits floating point."""
+FLOAT_TYPE = 9
+"""Type code of a 32 bit floating point parameter in a parameter file."""
 
 
 def parameters(
@@ -36,23 +36,23 @@ def parameters(
     installed: InstalledCalibration | None = None,
     instance: int = 0,
 ) -> ArdupilotParameters:
-    """Return the parameters that take this calibration out of what the sensor sends.
+    """Return the parameters by which PX4 corrects the sensor.
 
     Arguments and errors as of `ardupilot.parameters`.
     """
-    return converted(PX4, calibration, nominal, installed, instance)
+    return autopilot_parameters(PX4, calibration, nominal, installed, instance)
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
+    """Write the file; returns notices for the user."""
     found = parameters(
         source.calibration, source.nominal, source.installed, source.instance
     )
     lines = [
         "# fieldcal: true = R (raw - OFF) * SCALE, m/s^2 and rad/s, sensor axes",
-        *(f"# {sentence}" for sentence in found.says),
+        *(f"# {sentence}" for sentence in found.notices),
         "# Vehicle-Id Component-Id Name Value Type",
-        *(f"1\t1\t{n}\t{value:.9g}\t{FLOAT}" for n, value in found.values.items()),
+        *(f"1\t1\t{n}\t{value:.9g}\t{FLOAT_TYPE}" for n, value in found.values.items()),
     ]
     write_atomically(path, "\n".join(lines) + "\n")
-    return list(found.says)
+    return list(found.notices)

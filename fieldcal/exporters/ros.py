@@ -2,13 +2,13 @@
 
 imu_calib corrects  f = SM U - bias                                                (1)
 
-so that its bias is behind the matrix. fieldcal has U = b + M f, hence
+so that its bias is subtracted after the matrix. fieldcal has U = b + M f, hence
 
     SM = M^-1,  bias = M^-1 b                                                      (2)
 
-exactly. SM is written row by row. imu_calib itself reads the accelerometers' two keys;
-those of the gyroscopes, gyro_SM and gyro_bias, mean the same for nodes that take them.
-Where the session has a noise.json, the covariances of single samples stand behind.
+exactly. SM is written row by row. imu_calib itself reads the two keys of the
+accelerometers; gyro_SM and gyro_bias are for nodes that correct gyroscopes likewise. If
+the session has a noise.json, the covariances of single samples follow.
 Units: m/s^2, rad/s, as in sensor_msgs/Imu. Source: imu_calib's documentation.
 """
 
@@ -35,8 +35,8 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array]:
     return inverse, inverse @ bias  # (2)
 
 
-def _covariances(told: Mapping[str, Any]) -> list[str]:
-    """Row by row, as sensor_msgs/Imu has them, of single samples."""
+def _covariance_lines(told: Mapping[str, Any]) -> list[str]:
+    """Lines with covariances of single samples, row by row as in sensor_msgs/Imu."""
     lines = []
     for what in ("linear_acceleration", "angular_velocity"):
         name = f"{what}_covariance"
@@ -47,7 +47,7 @@ def _covariances(told: Mapping[str, Any]) -> list[str]:
 
 
 def write(source: ExportSource, path: Path) -> list[str]:
-    """Write the file; what the user must know."""
+    """Write the file; returns notices for the user."""
     lines = ["# fieldcal: true = SM raw - bias (raw -> true), m/s^2 and rad/s"]
     for sensor, prefix in (("acc", ""), ("gyr", "gyro_")):
         turned, bias = matrices(*source.linear(sensor))
@@ -55,6 +55,6 @@ def write(source: ExportSource, path: Path) -> list[str]:
             lines.append(f"{name}:")
             lines += [f"  - {x:.12f}" for x in values]
     if found := read_noise(source.session.folder):
-        lines += _covariances(found["for"]["ros"])
+        lines += _covariance_lines(found["for"]["ros"])
     write_atomically(path, "\n".join(lines) + "\n")
-    return source.says
+    return source.notices

@@ -178,7 +178,7 @@ class _Level:
         return means
 
     def sums(self) -> LevelSums:
-        """What the stretches had."""
+        """Summed powers of the stretches at this level."""
         count = np.outer(np.diff(self._edges), self._segments)
         return LevelSums(FACTOR**self.level, self._edges, self._power, count)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.chances import chi2_tail
+from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.physics.matched_filter import (
     AmplitudeNoise,

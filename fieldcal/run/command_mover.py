@@ -15,19 +15,19 @@ from typing import IO, Self
 from fieldcal.core.errors import MoverFailed, MoverGone, PlanError
 from fieldcal.core.positions import Position
 
-PLACES = ("alpha", "beta", "gamma", "position", "name")
-"""Placeholders of a command: angles in deg, number from 1, name."""
+PLACEHOLDERS = ("alpha", "beta", "gamma", "position", "name")
+"""Placeholders of a command: angles in deg, number from 1, name of the position."""
 
-LAST = 1.0
+TERMINATION_S = 1.0
 """Time for a command to end by itself before it is killed, s."""
 
 
 class CommandMover:
-    """A command that is called for each position: that of a turntable.
+    """Mover that calls a command for each position, such as that of a turntable.
 
     Parameters
     ----------
-    template : program and arguments, which may name `PLACES` in braces
+    template : program and arguments, which may name `PLACEHOLDERS` in braces
     timeout : how long it may take, s
 
     Raises
@@ -42,10 +42,10 @@ class CommandMover:
         self._process: subprocess.Popen[str] | None = None
         self._said: IO[str] | None = None
         self._began, self._done = 0.0, False
-        self._filled(Position.deg(0.0, 0.0), 0)
+        self._filled_command(Position.deg(0.0, 0.0), 0)
 
     def turn(self, position: Position, number: int = 0) -> None:
-        """Call it.
+        """Call the command.
 
         Raises
         ------
@@ -55,7 +55,7 @@ class CommandMover:
         """
         self.close()
         self._said = tempfile.TemporaryFile("w+")
-        command = self._filled(position, number)
+        command = self._filled_command(position, number)
         self._began, self._done = monotonic(), False
         try:
             self._process = subprocess.Popen(
@@ -73,7 +73,7 @@ class CommandMover:
             ) from error
 
     def busy(self) -> bool:
-        """Whether it still runs.
+        """Whether the command still runs.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class CommandMover:
         """
         if self._process is None or self._done:
             return False
-        name, code = self._template[0], self._code(self._process)
+        name, code = self._template[0], self._exit_code(self._process)
         if code is None:
             if monotonic() - self._began > self._timeout:
                 self.close()
@@ -96,17 +96,17 @@ class CommandMover:
             return True
         self._done = True
         if code != 0:
-            raise MoverGone(
-                f"the mover {name} ended with exit code {code}{self._last()}"
-            )
+            said = self._last_output_line()
+            raise MoverGone(f"the mover {name} ended with exit code {code}{said}")
         return False
 
     @staticmethod
-    def _code(process: subprocess.Popen[str]) -> int | None:
-        """Exit code; its number stays that of its process group until `close`.
+    def _exit_code(process: subprocess.Popen[str]) -> int | None:
+        """Exit code of the process, None while it runs.
 
-        Where a system cannot look without reaping, as macOS and Windows, the number is
-        free from then on, and what is left of its group has it all the same.
+        The process is not reaped, so that its number stays that of its process group
+        until `close`. macOS and Windows have no `waitid`: there the process is reaped,
+        and its number is free although its child processes still have it as group.
         """
         if not hasattr(os, "waitid"):
             return process.poll()
@@ -119,12 +119,12 @@ class CommandMover:
     def close(self) -> None:
         """End the command and its child processes; safe to call twice."""
         if self._process is not None:
-            if self._code(self._process) is None:
-                _signal(self._process, "SIGTERM")
-            deadline = monotonic() + LAST
-            while self._code(self._process) is None and monotonic() < deadline:
-                sleep(LAST / 20)
-            _signal(self._process, "SIGKILL")
+            if self._exit_code(self._process) is None:
+                _end_process_group(self._process, "SIGTERM")
+            deadline = monotonic() + TERMINATION_S
+            while self._exit_code(self._process) is None and monotonic() < deadline:
+                sleep(TERMINATION_S / 20)
+            _end_process_group(self._process, "SIGKILL")
             self._process.wait()
             self._process = None
         if self._said is not None:
@@ -137,31 +137,31 @@ class CommandMover:
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _last(self) -> str:
+    def _last_output_line(self) -> str:
         if self._said is None:
             return ""
         self._said.seek(0)
         lines = self._said.read().strip().splitlines()
         return f": {lines[-1]}" if lines else " and said nothing"
 
-    def _filled(self, position: Position, number: int) -> list[str]:
+    def _filled_command(self, position: Position, number: int) -> list[str]:
         angles = position.all_degrees or (0.0, 0.0, 0.0)
         values = (*(f"{a:g}" for a in angles), str(number + 1), position.name)
-        known = dict(zip(PLACES, values, strict=True))
+        known = dict(zip(PLACEHOLDERS, values, strict=True))
         for part in self._template:
             try:
                 odd = [n for _, n, _, _ in Formatter().parse(part) if n is not None]
             except ValueError:
                 odd = [part]
-            if unknown := [n for n in odd if n not in PLACES]:
+            if unknown := [n for n in odd if n not in PLACEHOLDERS]:
                 raise PlanError(
                     f"[run.mover] command: {{{unknown[0]}}} is none of"
-                    f" {', '.join(PLACES)}; write a brace that is meant as {{{{"
+                    f" {', '.join(PLACEHOLDERS)}; write a brace that is meant as {{{{"
                 )
         return [part.format(**known) for part in self._template]
 
 
-def _signal(process: subprocess.Popen[str], name: str) -> None:
+def _end_process_group(process: subprocess.Popen[str], name: str) -> None:
     """End a command and its child processes, by a signal where the system has them."""
     if hasattr(os, "killpg"):
         with suppress(ProcessLookupError):

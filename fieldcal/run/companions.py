@@ -1,15 +1,15 @@
 """Further devices on the same table, each recorded as a session of its own.
 
-The first device is led through the procedure; the others are only recorded, each by a
-thread of its own, so none waits for another. A window that the first one had holds for
-all of them: its ends go over the host's clock into each one's own time,
+The procedure is carried out on the first device. The others are only recorded, each in
+its own thread, so that none waits for another. A window of the first device holds for
+all of them: its ends are converted by the host's clock into the time of each device,
 
-    t_n = f_n^-1(f_1(t_1)),  f_k(t) = host time at which device k's sample t was had
+    t_n = f_n^-1(f_1(t_1)),  f_k(t) = host time of device k's sample at t
 
-piecewise straight between the batches that came. The host time is that at which they
-were read, so whoever records them may be late. The first device rests for a while
-before its window begins, and nobody turns it before the window is marked, so the few
-hundredths of a second by which batches are read late do not matter.
+piecewise linear between the batches of samples. The host time is that at which a batch
+was read, which may be some hundredths of a second late. This does not matter, since the
+device rests for a while before its window begins, and is not turned before the window
+is marked.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SHARED_KEYS = ("grade", *FACTORY_KEYS)
 """Keys of the first device's table that are copied to the further ones."""
 
 MOST_BATCHES = 1 << 17
-"""Batches whose times are kept: more than an hour."""
+"""Number of batches whose times are kept: more than an hour."""
 
 
 Span = tuple[float, float]
@@ -50,14 +50,14 @@ class ArrivalTimes:
         self._pairs: deque[tuple[float, float]] = deque(maxlen=MOST_BATCHES)
 
     def add(self, block: Block) -> None:
-        """Take samples that follow; those whose arrival is not known came just now."""
+        """Take samples that follow; unknown arrival times are set to the present."""
         arrived = float(block.t_host[-1])
         host = arrived if np.isfinite(arrived) else host_clock()
         self._pairs.append((float(block.t[-1]), host))
 
     @property
     def known(self) -> bool:
-        """Whether any samples have come."""
+        """Whether any samples have arrived."""
         return bool(self._pairs)
 
     def host_time(self, t: float) -> float:

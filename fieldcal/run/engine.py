@@ -140,7 +140,7 @@ class Engine:
                     average = self._hold(step)
                     self._taken[step.index] = average
                 else:
-                    self._display.taken_before(step, average)
+                    self._display.show_taken_before(step, average)
                 if step.position.oriented:
                     f = measured_force(average.mean[None, :3], self._about)
                     self._held = AcceptedPosition(step.position, f)
@@ -199,7 +199,7 @@ class Engine:
             try:
                 average = self._windows.average(hold, pieces)
                 if average is not None:
-                    self._say_if_cold()
+                    self._warn_if_warming_up()
                 return average
             except WindowDisturbed as disturbed:
                 moved, kept = disturbed.moved, disturbed.kept
@@ -221,7 +221,7 @@ class Engine:
         reason = self._incoming.note_silence()
         if reason:
             if self._hold_now:
-                self._display.silent(self._hold_now, reason)
+                self._display.show_silence(self._hold_now, reason)
             if self._incoming.silence == SILENCES_UNTIL_TOLD:
                 self._desk.alarm(reason)
         self._desk.stop_if_wanted()
@@ -254,9 +254,9 @@ class Engine:
                 insisted = False  # moved since: that place is not asked about
             waits = self._warm_up is not None and self._warm_up.must_wait
             reason = confirmation_question(waiting) if insisted else waiting.reason
-            if waiting.arrived and self._warm_up and self._warm_up.says and waits:
-                reason = WaitReason(WaitState.WARMING_UP, self._warm_up.says)
-            self._display.turning(hold, waiting, reason)
+            if waiting.arrived and self._warm_up and self._warm_up.notice and waits:
+                reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
+            self._display.show_turning(hold, waiting, reason)
             self._warn_of_unit()
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True
@@ -268,9 +268,9 @@ class Engine:
 
     def _warn_of_unit(self) -> None:
         """Say once that the gyroscopes are in another unit."""
-        if self._units.says and not self._warned_of_unit:
+        if self._units.notice and not self._warned_of_unit:
             self._warned_of_unit = True
-            self._desk.alarm(WaitReason(WaitState.WRONG_UNIT, self._units.says))
+            self._desk.alarm(WaitReason(WaitState.WRONG_UNIT, self._units.notice))
 
     def _report_wrong_place(
         self, hold: Hold, waiting: PositionWait, quiet: bool
@@ -294,6 +294,6 @@ class Engine:
             )
             raise WrongPosition(f"{hold.position.name}: {what}")
 
-    def _say_if_cold(self) -> None:
-        if self._warm_up and (said := self._warm_up.says):
+    def _warn_if_warming_up(self) -> None:
+        if self._warm_up and (said := self._warm_up.notice):
             self._desk.tell(said)

@@ -16,29 +16,29 @@ from fieldcal.importing.units.gravity_size import GravityReading
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import GYR_OUT, GYR_SCALES, fitting_scales
 
-PART = 0.05
-"""Device time of which one mean is kept, s."""
+MEAN_S = 0.05
+"""Length of each mean that is kept, s of device time."""
 
-MEMORY = 2400
+MEANS_KEPT = 2400
 """Means that are kept: two minutes."""
 
-EVERY = 2.0
-"""Device time between two looks, s."""
+CHECK_EVERY_S = 2.0
+"""Device time between two checks, s."""
 
-CALM = 0.1
-"""Scatter of means of the accelerometers that is rest, m/s^2."""
+ACC_REST_SCATTER = 0.1
+"""Largest scatter of means of the accelerometers at rest, m/s^2."""
 
-TURNED = 0.15
+LEAST_TURN = 0.15
 """Turn of gravity that shows the unit, as of `rate_size.TURNED`, rad: 45° within 9 s,
 or 22° within 4 s there and back. On a bench nothing else moves gravity, so a smaller
 turn is enough than in an unknown recording."""
 
-HINT = 5.0
+HINT_AFTER_S = 5.0
 """Rest by the accelerometers alone after which changing rates are reported, s."""
 
 
 class GyroUnitWatch:
-    """Samples as they come, and what the unit of the rates must be.
+    """Determines the unit of the angular rates from samples as they arrive.
 
     Parameters
     ----------
@@ -46,18 +46,18 @@ class GyroUnitWatch:
 
     Attributes
     ----------
-    says : what a turn has shown, one sentence; empty while nothing is wrong
-    unit : what the rates are in by a turn; empty until one was made
+    notice : sentence about a wrong unit that a turn has shown; empty without one
+    unit : unit of the rates by a turn; empty before the first turn
 
     """
 
     def __init__(self, gravity: float) -> None:
         self._gravity = GravityReading(gravity, np.zeros(3), False)
-        self._means: deque[Array] = deque(maxlen=MEMORY)
+        self._means: deque[Array] = deque(maxlen=MEANS_KEPT)
         self._part: list[Block] = []
         self._looked = -np.inf
         self._proved = False
-        self.says = self.unit = ""
+        self.notice = self.unit = ""
 
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs nothing once the unit is known."""
@@ -65,20 +65,20 @@ class GyroUnitWatch:
             return
         last = float(block.t[-1])
         self._part.append(block)
-        if last - self._part[0].t[0] >= PART:
+        if last - self._part[0].t[0] >= MEAN_S:
             rows = [np.column_stack([b.t, b.acc, b.gyr]) for b in self._part]
             self._means.append(np.vstack(rows).mean(axis=0))
             self._part = []
-        if last - self._looked >= EVERY and not self.says:
+        if last - self._looked >= CHECK_EVERY_S and not self.notice:
             self._looked = last
-            self.says = self._check_unit()
+            self.notice = self._check_unit()
 
     def _check_unit(self) -> str:
         if not self._means:
             return ""
         table = np.array(self._means)
         reads = estimate_rate_unit(
-            table[:, 0], table[:, 1:4], table[:, 4:], self._gravity, TURNED
+            table[:, 0], table[:, 1:4], table[:, 4:], self._gravity, LEAST_TURN
         )
         if reads is None:
             return ""
@@ -103,10 +103,15 @@ class GyroUnitWatch:
 
         Empty unless it rests by its accelerometers, and no turn has shown the unit.
         """
-        lately = np.array(self._means)[-int(HINT / PART) :]
-        if self.says or self._proved or moving < HINT or len(lately) < HINT / PART:
+        lately = np.array(self._means)[-int(HINT_AFTER_S / MEAN_S) :]
+        if (
+            self.notice
+            or self._proved
+            or moving < HINT_AFTER_S
+            or len(lately) < HINT_AFTER_S / MEAN_S
+        ):
             return ""
-        if not (lately[:, 1:4].std(axis=0) < CALM).all():
+        if not (lately[:, 1:4].std(axis=0) < ACC_REST_SCATTER).all():
             return ""
         size = float(np.nanmax(np.abs(lately[:, 4:]), initial=0.0))
         return (

@@ -16,7 +16,7 @@ from fieldcal.run.wait_reason import WaitReason, WaitState
 SILENCES_UNTIL_TOLD = 2
 """Half seconds of silence after which the operator is told."""
 
-PIECE = 0.1
+PIECE_S = 0.1
 """Longest stretch of samples that is processed at once, s."""
 
 
@@ -27,12 +27,12 @@ class IncomingSamples:
     ----------
     driver : the device
     recorder : the session folder being written
-    heard : called with every block once it is recorded
-    seen : called with every piece before it is handed on
+    on_block : called with every block after it is recorded
+    on_piece : called with every piece before it is handed on
 
     Attributes
     ----------
-    pieces : an iterator over the samples, `PIECE` at a time
+    pieces : an iterator over the samples, `PIECE_S` at a time
     breaks : number of gaps that are longer than `GAP`
     silence : half seconds since the last sample
 
@@ -42,11 +42,11 @@ class IncomingSamples:
         self,
         driver: Driver,
         recorder: MarkedRecorder,
-        heard: Callable[[Block], None],
-        seen: Callable[[Block], None],
+        on_block: Callable[[Block], None],
+        on_piece: Callable[[Block], None],
     ) -> None:
         self._driver, self._recorder = driver, recorder
-        self._heard, self._seen = heard, seen
+        self._on_block, self._on_piece = on_block, on_piece
         self._link = LinkMarks(driver, recorder)
         self._health, self._until_s = replace(driver.health), np.nan
         self.breaks = self.silence = 0
@@ -79,7 +79,7 @@ class IncomingSamples:
             self.breaks += bool(block.t[0] - self._until_s > GAP)
             self._until_s = float(block.t[-1])
             self._link.take(block)
-            self._heard(block)
-            for piece in split_by_time(block, PIECE):
-                self._seen(piece)
+            self._on_block(block)
+            for piece in split_by_time(block, PIECE_S):
+                self._on_piece(piece)
                 yield piece

@@ -1,4 +1,4 @@
-"""What ends a window other than motion: a gap, a restart, the operator."""
+"""Interruptions of a window other than motion: gaps, restarts, operator's wishes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from fieldcal.drivers.driver import Driver
 
 
 class RepeatPosition(Exception):
-    """The operator wants a position that was taken once more.
+    """The operator wants to repeat a position that was taken.
 
     Attributes
     ----------
-    index : its number
+    index : number of the position
 
     """
 
@@ -52,14 +52,14 @@ def kept_notice(
     return f"{said}hold still, it goes on by itself"
 
 
-OFTEN = 3
-"""Disturbed windows in one position from which a remedy is stated as well."""
+REMEDY_FROM = 3
+"""Number of disturbed windows in a position from which the notice states a remedy."""
 
 
 def restart_notice(moved: Moved, times: int) -> str:
-    """Sentence about a window that was disturbed so many times."""
+    """Sentence about a window that was disturbed for the n-th time, n = `times`."""
     said = f"{moved}; hold still, the window starts again"
-    if times < OFTEN:
+    if times < REMEDY_FROM:
         return said
     return (
         f"{said}, disturbed {times} times now: fix the device better, or shelter it"
@@ -70,9 +70,9 @@ def restart_notice(moved: Moved, times: int) -> str:
 GAP = 0.5
 """Longest time without samples that a window may have, s."""
 
-THIN = 2
-"""Most windows of a position that begin again because of missing samples: a link that
-always loses some will lose them in the next window as well."""
+MOST_LOSS_RESTARTS = 2
+"""Most windows of a position that begin again because of missing samples. A link that
+always loses some would lose them in the next window as well."""
 
 
 class SamplesLost(Moved):
@@ -85,7 +85,7 @@ class WindowWatch:
     Parameters
     ----------
     driver : of the device
-    seconds : that the window is to take
+    seconds : planned length of the window
     lost_share : share of its samples that may be missing
 
     """
@@ -99,7 +99,7 @@ class WindowWatch:
         self._samples = 0
 
     def check(self, block: Block) -> None:
-        """Look at samples that follow.
+        """Check the samples that follow.
 
         Raises
         ------

@@ -21,16 +21,16 @@ from fieldcal.run.position_check import NORM
 PLAIN_MOUNTING = ("+x", "+y", "+z")
 """The mounting unless another is declared."""
 
-ZERO = 3.0
-"""Standard errors within which all rates at rest are zero, which means no bias."""
+ZERO_SIGMAS = 3.0
+"""Rates at rest within so many standard errors of zero are taken as without bias."""
 
-ZEROED = (
+ZEROED_NOTICE = (
     "; its rates are zero at rest: it takes their bias out itself; switch that off"
     " (gyro bias estimation, zero velocity update), or the result is NO-GO"
 )
 """Notice about rates without a bias."""
 
-PIECE = 0.1
+PIECE_S = 0.1
 """Longest stretch that is processed at once, s."""
 
 
@@ -43,14 +43,14 @@ class DeviceIntroduction:
     up : device axis that is up, as in "+z"; empty if none is, or if it reads no gravity
     mounting : mounting with which the device is at home; the plain one by default
     rates_zeroed : whether its rates are zero at rest
-    says : one sentence
+    summary : one sentence about all of them
 
     """
 
     up: str
     mounting: tuple[str, ...]
     rates_zeroed: bool
-    says: str
+    summary: str
 
 
 def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
@@ -65,10 +65,10 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     f: Array = np.nanmean(block.acc, axis=0)
     size = float(np.linalg.norm(f))
     centred = _rates_are_zero(block.gyr)
-    zero = ZEROED * centred
+    zero = ZEROED_NOTICE * centred
     if not abs(size - gravity) <= NORM * gravity:
-        says = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
-        return DeviceIntroduction("", PLAIN_MOUNTING, centred, says + zero)
+        summary = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
+        return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
     mounting = fitting_mounting(f, specific_force_at_home(gravity), PLAIN_MOUNTING)
     if mounting is None:
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, "it stands askew" + zero)
@@ -83,7 +83,9 @@ def _rates_are_zero(gyr: Array) -> bool:
         return False
     noise = np.diff(known, axis=0).std(axis=0) / np.sqrt(2)
     error = noise / np.sqrt(len(known))
-    return bool((noise > 0).all() and (np.abs(known.mean(axis=0)) < ZERO * error).all())
+    return bool(
+        (noise > 0).all() and (np.abs(known.mean(axis=0)) < ZERO_SIGMAS * error).all()
+    )
 
 
 def rate_unit_from_turn(
@@ -101,7 +103,7 @@ def rate_unit_from_turn(
     watch, began = GyroUnitWatch(gravity), np.nan
     for block in blocks:
         began = float(block.t[0]) if np.isnan(began) else began
-        for piece in split_by_time(block, PIECE):
+        for piece in split_by_time(block, PIECE_S):
             watch.add(piece)
             if watch.unit:
                 return watch.unit

@@ -15,8 +15,8 @@ from fieldcal.core.escaping import escape_invisible
 from fieldcal.core.positions import Position
 from fieldcal.session.folder import write_atomically
 
-TROUBLE = ("wrong", "rejected", "kept")
-"""Marks of what went wrong in a position."""
+TROUBLE_MARKS = ("wrong", "rejected", "kept")
+"""Marks of faults in a position."""
 
 
 def write(
@@ -33,8 +33,8 @@ def write(
     ----------
     path : of the file
     name : of the procedure
-    positions : all that were to be held
-    marks : what happened
+    positions : planned and added
+    marks : of the session
     result : the object of result.json, None if the run broke off
     error : why it did
 
@@ -46,7 +46,7 @@ def write(
     """
     suite = Element("testsuite", name=f"fieldcal.{name}")
     for number, position in enumerate(positions):
-        _position(suite, number, position, marks)
+        _add_position_case(suite, number, position, marks)
     for check in (result or {}).get("decision", {}).get("checks", []):
         case = SubElement(suite, "testcase", classname="verdict", name=check["name"])
         if check["ok"] is None:
@@ -70,7 +70,7 @@ def write(
     write_atomically(path, tostring(suite, encoding="utf-8", xml_declaration=True))
 
 
-def _position(
+def _add_position_case(
     suite: Element, number: int, position: Position, marks: Sequence[Mapping[str, Any]]
 ) -> None:
     mine = [m for m in marks if m.get("position") == number]
@@ -84,9 +84,9 @@ def _position(
     elif "skipped" in events:
         SubElement(case, "skipped", message="left out by the operator")
     else:
-        said = [str(m["text"]) for m in mine if m["event"] in TROUBLE]
+        said = [str(m["text"]) for m in mine if m["event"] in TROUBLE_MARKS]
         message = said[-1] if said else "it was not taken"
         SubElement(case, "failure", message=message)
-    trouble = [str(m["text"]) for m in mine if m["event"] in TROUBLE]
+    trouble = [str(m["text"]) for m in mine if m["event"] in TROUBLE_MARKS]
     if trouble:
         SubElement(case, "system-out").text = "\n".join(trouble)

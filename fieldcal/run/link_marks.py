@@ -1,7 +1,8 @@
 """Events of the link as marks: gaps, restarts, the clock.
 
-A link in trouble would make a mark for every sample lost, and each is forced to the
-disk. So marks are joined over `EVERY` seconds; what is at least `LONG` is said at once.
+A bad link would make a mark for every lost sample, and each mark is forced to the disk.
+So losses are joined into one mark for `MARK_EVERY_S` seconds. A gap of `LONG_GAP_S` or
+more is marked at once.
 """
 
 from __future__ import annotations
@@ -15,17 +16,17 @@ import numpy as np
 from fieldcal.core.samples import Block, Grain
 from fieldcal.drivers.driver import Driver
 
-EVERY = 1.0
+MARK_EVERY_S = 1.0
 """Shortest time between two marks of the link, s of the host's clock."""
 
-LONG = 0.5
+LONG_GAP_S = 0.5
 """Gap that is marked at once, s of device time."""
 
-CLOCK = 30.0
+CLOCK_EVERY_S = 30.0
 """Time between two marks of the clock, s of the host's clock."""
 
-LIVE = ("rate_hz", "says")
-"""Notes of a driver that go with the samples."""
+CHANGING_NOTES = ("rate_hz", "says")
+"""Notes of a driver that change from sample to sample."""
 
 COUNTS = ("gaps", "missing", "repeated", "restarts", "bad", "skipped")
 
@@ -59,7 +60,7 @@ class LinkMarks:
         self._before = self._counts()
         self._last = self._from = self._to = float("nan")
         self._longest = 0.0
-        self._marked = -EVERY
+        self._marked = -MARK_EVERY_S
         self._clocked = monotonic()
         self._grain = Grain()
         self._facts = self._device_facts()
@@ -88,7 +89,7 @@ class LinkMarks:
             if steps[widest] > self._longest:
                 self._longest = float(steps[widest])
                 self._from, self._to = edges[widest], edges[widest + 1]
-        if self._longest >= LONG or monotonic() - self._marked >= EVERY:
+        if self._longest >= LONG_GAP_S or monotonic() - self._marked >= MARK_EVERY_S:
             self._mark()
 
     def end(self) -> None:
@@ -98,8 +99,8 @@ class LinkMarks:
         self._clock(at_once=True)
 
     def _device_facts(self) -> dict[str, Any]:
-        """Facts of the driver about the device, without those that change always."""
-        return {k: v for k, v in self._driver.notes.items() if k not in LIVE}
+        """Notes of the driver about the device, without those that always change."""
+        return {k: v for k, v in self._driver.notes.items() if k not in CHANGING_NOTES}
 
     def _counts(self) -> dict[str, int]:
         return {name: getattr(self._driver.health, name) for name in COUNTS}
@@ -117,7 +118,7 @@ class LinkMarks:
         clock = self._driver.health.clock
         if clock is None or not clock.real_time:
             return
-        if not (at_once or monotonic() - self._clocked >= CLOCK):
+        if not (at_once or monotonic() - self._clocked >= CLOCK_EVERY_S):
             return
         self._clocked = monotonic()
         self._recorder.mark("clock", **clock._asdict())

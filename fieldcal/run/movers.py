@@ -22,7 +22,7 @@ class Mover(Protocol):
         """Begin to turn to a position, numbered from 0; return at once."""
 
     def busy(self) -> bool:
-        """Whether it is still at work; MoverFailed if it went wrong."""
+        """Whether it is still turning. Raises MoverFailed if the turn failed."""
 
 
 class ManualMover:
@@ -32,7 +32,7 @@ class ManualMover:
         """Nothing to do: the operator turns the device."""
 
     def busy(self) -> bool:
-        """False: a person gives no signal."""
+        """False: a person does not signal the end of a turn."""
         return False
 
 
@@ -56,7 +56,7 @@ class RunningDevice:
         Raises
         ------
         DeviceError
-            If it is gone; the next request connects again.
+            If the connection is lost; the next request connects again.
 
         """
         if self._remote is None:
@@ -154,7 +154,7 @@ class VirtualMover(RunningDevice):
 
     @property
     def truth(self) -> Mapping[str, Any]:
-        """True parameters of the virtual device, which it conceals."""
+        """True parameters of the virtual device."""
         truth: Mapping[str, Any] = json.loads(self._truth.read_text(encoding="utf-8"))
         return truth
 

@@ -85,7 +85,7 @@ class PlanTask:
 
 
 @cache
-def schema() -> dict[str, Any]:
+def plan_schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, with the procedures that there are."""
     found = schemas.load_schema("plan")
     procedure = found["properties"]["run"]["properties"]["procedure"]
@@ -94,18 +94,18 @@ def schema() -> dict[str, Any]:
     return found
 
 
-def positions_of(procedure: str) -> list[dict[str, Any]]:
+def default_positions(procedure: str) -> list[dict[str, Any]]:
     """Default tables ``[[position]]`` of a procedure."""
     taken = procedures.load_procedure(procedure).POSITIONS
-    return [_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
+    return [_position_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
 
 
-def _table(name: str, degrees: tuple[float, float]) -> dict[str, Any]:
+def _position_table(name: str, degrees: tuple[float, float]) -> dict[str, Any]:
     alpha, beta = degrees
     return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
 
 
-def read(path: Path) -> dict[str, Any]:
+def read_plan(path: Path) -> dict[str, Any]:
     """Tables of a plan file.
 
     Raises
@@ -142,7 +142,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
     _check_schema(tables, name)
     run = tables.get("run", {})
     if "position" not in tables and "procedure" in run:
-        tables = {**tables, "position": positions_of(run["procedure"])}
+        tables = {**tables, "position": default_positions(run["procedure"])}
     try:
         about = description.parse_description(tables)
     except InputError as error:
@@ -155,7 +155,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
 
 
 def _check_schema(tables: Mapping[str, Any], name: str) -> None:
-    if wrong := schema_fault({"run": {}, **tables}, make_validator(schema())):
+    if wrong := schema_fault({"run": {}, **tables}, make_validator(plan_schema())):
         raise PlanError(f"{name}: {wrong}")
 
 

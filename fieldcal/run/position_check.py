@@ -1,15 +1,15 @@
-"""Whether the device is in the position asked for, by its accelerometers.
+"""Whether the device is in the requested position, by its accelerometers.
 
-At rest the specific force shows where the device is, but through a calibration that is
-not known yet and on a base that may be tilted. Both move all positions alike, so once a
-position has been held the *change* since then is judged, and that is known much better:
-a step of 2.5 degrees is detected.
+At rest the specific force shows the position, but the calibration is not known yet and
+the base may be tilted. Both shift all positions alike. After the first position,
+therefore, the *change* since the last one is judged. It is known much better, so that a
+step of 2.5 degrees is detected.
 
     |(f - f_held) - (f_wanted - f_held_wanted)| <= g (NEAR + TILT |change wanted| / g)
 
 f is specific force in procedure axes, m/s^2, corrected by the nominal calibration. A
-tilted base changes a turn in proportion to the turn. A place that a common slip
-explains twice as well as the position asked for is taken for the slip.
+tilted base changes a turn in proportion to the turn. If a common slip of the operator
+explains the force twice as well as the requested position, the slip is reported.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FIRST = np.deg2rad(8.0)
 """Tolerance for the first position, rad: base tilt and bias of a raw device."""
 
 NEAR, TILT = np.deg2rad(1.0), np.deg2rad(3.5)
-"""Tolerance for the others, rad: of the joints, and of the base for a unit turn."""
+"""Tolerance for later positions, rad: of the joints, of the base for a unit turn."""
 
 NORM = 0.15
 """Relative deviation of the norm from g beyond which unit or scale must be wrong."""
@@ -44,15 +44,15 @@ class AcceptedPosition:
 
 @dataclass(frozen=True, slots=True)
 class PositionCheck:
-    """Where the device is, and whether that is where it should be.
+    """Measured position of the device, compared with the requested one.
 
     Attributes
     ----------
     ok : whether averaging may begin
-    alpha_deg, beta_deg : angles the accelerometers show, offset of the base removed
-        where an earlier position tells it; of three angles, if the third is as asked
+    alpha_deg, beta_deg : angles by the accelerometers, less the offset that an earlier
+        position shows; of three angles, under the third one as requested
     problem : one sentence for the operator, empty when ok
-    limit_deg : how far it may be off; nan where only the norm is judged
+    limit_deg : tolerance; nan if only the norm is judged
 
     """
 
@@ -95,15 +95,15 @@ def check_position(
         return PositionCheck(False, *seen, problem)
     if not wanted.oriented:
         return PositionCheck(True, *seen)
-    chord = _chord(wanted, held.position, gravity) if held else 0.0
+    chord = _relative_force_change(wanted, held.position, gravity) if held else 0.0
     limit = NEAR + TILT * chord if held else FIRST
-    miss = _miss(wanted, f, gravity, held)
+    miss = _angle_off(wanted, f, gravity, held)
     slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
     slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
     within = float(np.rad2deg(limit))
     if miss <= limit and not slipped:
         return PositionCheck(True, *seen, limit_deg=within)
-    problem = _explain(wanted, seen, slip if slipped else "", np.rad2deg(miss))
+    problem = _problem_sentence(wanted, seen, slip if slipped else "", np.rad2deg(miss))
     return PositionCheck(False, *seen, problem, within)
 
 
@@ -120,7 +120,7 @@ def _force(position: Position, gravity: float) -> Array:
     return f
 
 
-def _chord(a: Position, b: Position, gravity: float) -> float:
+def _relative_force_change(a: Position, b: Position, gravity: float) -> float:
     """Change of the force between two positions over g, 0 to 2."""
     difference = _force(a, gravity) - _force(b, gravity)
     return float(np.linalg.norm(difference) / gravity)
@@ -133,7 +133,7 @@ def _without_offset(f: Array, gravity: float, held: AcceptedPosition | None) -> 
     return clean
 
 
-def _miss(
+def _angle_off(
     wanted: Position, f: Array, gravity: float, held: AcceptedPosition | None
 ) -> float:
     """Angle between the device and the wanted position, rad."""
@@ -150,7 +150,7 @@ def _nearest_slip(
 ) -> tuple[str, float]:
     """The operator's slip that best explains the position, and its error, rad."""
     before = held.position if held else None
-    said, there = _slips(wanted, before, tuple(others.items()), gravity)
+    said, there = _possible_slips(wanted, before, tuple(others.items()), gravity)
     if not said:
         return "", np.inf
     misses = np.linalg.norm(_without_offset(f, gravity, held) - there, axis=1) / gravity
@@ -159,15 +159,15 @@ def _nearest_slip(
 
 
 @lru_cache(maxsize=16)
-def _slips(
+def _possible_slips(
     wanted: Position,
     before: Position | None,
     others: tuple[tuple[str, Position], ...],
     gravity: float,
 ) -> tuple[tuple[str, ...], Array]:
-    """What an operator may have done instead, and the force there, (n, 3) m/s^2.
+    """Sentence and force, (n, 3) m/s^2, of each slip that an operator may have made.
 
-    It is the same for every block as long as one position is asked for.
+    Cached, since they are the same for every block in a position.
     """
     a, b, c = wanted.all_degrees or (0.0, 0.0, 0.0)
     turned = [
@@ -194,7 +194,7 @@ def _slips(
     return tuple(said for _, said in slips), there
 
 
-def _explain(
+def _problem_sentence(
     wanted: Position, seen: tuple[float, float], slip: str, off_by: float
 ) -> str:
     if wanted.all_degrees is None:

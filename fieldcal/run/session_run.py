@@ -1,8 +1,8 @@
 """A run from its first position to its last, across losses of the link.
 
-The link may break, the process may be killed, the operator may want a position once
-more: each time the plan starts again from its beginning, and what was taken is handed
-to it at once. So there is one way to go on, whether after a second or after a reboot.
+If the link breaks, the process is killed, or the operator repeats a position, the plan
+starts again from its beginning and gets the averages of earlier windows at once. So a
+run is resumed in the same way after a second and after a reboot.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from fieldcal.windows import Average, average
 MOST_REMEDIES = 3
 """Most remedies of a NO-GO in one run."""
 
-RETRY = 0.5
+RETRY_S = 0.5
 """Time between two attempts to open the device again, s."""
 
 
@@ -215,7 +215,7 @@ class SessionRun:
                 return driver
             if self._operator.wish() == "stop":
                 raise Stopped("stopped by the operator")
-            sleep(RETRY)
+            sleep(RETRY_S)
         raise lost
 
 

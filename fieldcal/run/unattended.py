@@ -49,7 +49,7 @@ def recalibrate(
     whole = {
         "format": description.FORMAT_VERSION,
         **known,
-        "position": plan_file.positions_of(procedure),
+        "position": plan_file.default_positions(procedure),
         "run": {"procedure": procedure, "seconds": seconds},
         **tables,
     }

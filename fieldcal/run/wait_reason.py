@@ -7,7 +7,7 @@ from enum import Enum, auto
 
 
 class WaitState(Enum):
-    """What a run waits for."""
+    """State of a run that waits."""
 
     NOTHING = auto()
     LISTENING = auto()
@@ -29,7 +29,7 @@ TEXTS = {
     WaitState.TURNING: "waiting for the turn",
     WaitState.TAKEN_BEFORE: "taken before",
 }
-"""What is shown of the states that need no explanation."""
+"""Texts of the states that need no explanation."""
 
 FOR_OPERATOR = {
     WaitState.MISPLACED,
@@ -61,12 +61,12 @@ class WaitReason:
 
     @property
     def text(self) -> str:
-        """What the operator reads; empty where nothing is waited for."""
+        """Text for the operator; empty if the run does not wait."""
         if self.state is WaitState.WARMING_UP:
             return f"{self.detail}; Enter goes on"
         return self.detail or TEXTS[self.state]
 
 
 def reminder(waited: float) -> str:
-    """What stands before a reason that has been shown for `waited` s already."""
+    """Prefix of a reason that has been shown for `waited` s already."""
     return f"still waiting, {waited:.0f} s: " if waited else ""

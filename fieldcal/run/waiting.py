@@ -26,27 +26,26 @@ from fieldcal.run.wait_reason import WaitReason, WaitState
 from fieldcal.session.description import Description
 from fieldcal.windows import Stillness
 
-SETTLE = 1.5
+SETTLE_S = 1.5
 """Rest before a window begins, s: a released joint still creeps."""
 
-SWUNG = 4.0
-"""Time in place before a window on a base that sways, s: the end of a small turn is no
-quicker than the swaying."""
+SWAY_SETTLE_S = 4.0
+"""Time in position before a window on a base that sways, s: the end of a small turn is
+as slow as the swaying."""
 
-PATIENCE = 3.0
-"""Rest in a wrong position before it is reported, s: a person stops in between."""
+REPORT_AFTER_S = 3.0
+"""Rest in a wrong position before it is reported, s: people pause during a turn."""
 
-REMIND = 60.0
-"""Time at the same wrong place after which it is said again, s."""
+REMIND_EVERY_S = 60.0
+"""Time in the same wrong position after which it is reported again, s."""
 
-UNTURNED = 20.0
-"""Time that a person has to begin to turn before the operator is called, s."""
+UNTURNED_ALARM_S = 20.0
+"""Time without a turn after which the operator is called, s."""
 
-LEAST = 10.0
-"""Wait by the host's clock before a position is given up, s.
+LEAST_HOST_WAIT_S = 10.0
+"""Least wait by the host's clock before a position is given up, s.
 
-A virtual device at 80 times the clock has waited for 90 s when the mover, and whoever
-reads it, have had 1.1 s.
+For a virtual device at 80 times the speed, 90 s of device time are 1.1 s for the mover.
 """
 
 
@@ -57,18 +56,18 @@ class PositionWait:
     ----------
     hold : what was asked for
     about : site, mounting and nominal calibration
-    held : a position that was accepted before, if any
-    left : whether a window here was broken off by a movement just before
-    units : what is known of the gyroscopes' unit
+    previous : the position that was accepted before, if any
+    interrupted : whether a motion has just broken off a window in this position
+    units : determines the gyroscopes' unit
 
     Attributes
     ----------
     meter : present motion as part of what is allowed; below 1 is rest
     arrival : where the device rests, None while it moves
-    where : where it is, as far as it is known while it moves
-    f : (3,) specific force there, procedure axes, m/s^2; None likewise
+    where : where it is, also while it moves; None while that is unknown
+    f : (3,) specific force at rest, procedure axes, m/s^2; None while it moves
     waited : s of samples since it was asked for, by the device's clock
-    waited_host : the same by the host's, which may have gone on less
+    waited_host : the same by the host's clock
 
     """
 
@@ -76,11 +75,12 @@ class PositionWait:
         self,
         hold: Hold,
         about: Description,
-        held: AcceptedPosition | None,
-        left: bool = False,
+        previous: AcceptedPosition | None,
+        interrupted: bool = False,
         units: GyroUnitWatch | None = None,
     ) -> None:
-        self._hold, self._about, self._held, self._left = hold, about, held, left
+        self._hold, self._about = hold, about
+        self._previous, self._interrupted = previous, interrupted
         self._units = units
         self._others = _other_positions(hold, about)
         self._began: float | None = None
@@ -145,19 +145,19 @@ class PositionWait:
 
     def _check_position(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity
-        return check_position(wanted, f, g, self._held, self._others)
+        return check_position(wanted, f, g, self._previous, self._others)
 
     @property
     def arrived(self) -> bool:
         """Whether the device rests in the requested position."""
         there = self.arrival is not None and self.arrival.ok
-        swung = not self._about.base_sways or self._last - self._there >= SWUNG
-        return there and swung and self.seconds >= SETTLE
+        swung = not self._about.base_sways or self._last - self._there >= SWAY_SETTLE_S
+        return there and swung and self.seconds >= SETTLE_S
 
     @property
     def may_insist(self) -> bool:
         """Whether the operator may insist on the position: at rest, about gravity."""
-        if self.f is None or self.seconds < SETTLE:
+        if self.f is None or self.seconds < SETTLE_S:
             return False
         off = abs(float(np.linalg.norm(self.f)) - self._about.gravity)
         return off <= NORM * self._about.gravity
@@ -167,12 +167,12 @@ class PositionWait:
         """The present reason for waiting."""
         if self._stillness.since is None:
             units, moving = self._units, self._last - self._stirred
-            if wrong := units and (units.says or units.question(moving)):
+            if wrong := units and (units.notice or units.question(moving)):
                 return WaitReason(WaitState.WRONG_UNIT, wrong)
             measured = np.isfinite(self.meter)
             return WaitReason(WaitState.MOVING if measured else WaitState.LISTENING)
         if self.arrival is not None and not self.arrival.ok:
-            if self.seconds < PATIENCE:
+            if self.seconds < REPORT_AFTER_S:
                 return WaitReason(WaitState.TURNING)
             return WaitReason(WaitState.MISPLACED, self.problem)
         return WaitReason(WaitState.SETTLING)
@@ -183,10 +183,10 @@ class PositionWait:
         if self.arrival is None or self.arrival.ok or self.f is None:
             return ""
         problem = self.arrival.problem
-        if self._held is None and self.may_insist:
+        if self._previous is None and self.may_insist:
             problem = self._wrong_mounting() or problem
         number = self._hold.index + 1
-        if self._left:
+        if self._interrupted:
             problem = f"turned too early, position {number} is not done: {problem}"
         return problem
 
@@ -207,7 +207,8 @@ class PositionWait:
 
     def has_waited_enough(self, give_up: float) -> bool:
         """Whether the wait exceeds `give_up` s by device and by host time."""
-        return self.waited > give_up and self.waited_host > min(give_up, LEAST)
+        least = min(give_up, LEAST_HOST_WAIT_S)
+        return self.waited > give_up and self.waited_host > least
 
     def alarm_due(self) -> float | None:
         """Whether to call the operator now: once per wrong position, then every minute.
@@ -218,9 +219,9 @@ class PositionWait:
         if self.reason.state is not WaitState.MISPLACED or self.f is None:
             return None
         again = not self._has_moved_from(self._told_of)
-        if again and self._last - self._told < REMIND:
+        if again and self._last - self._told < REMIND_EVERY_S:
             return None
-        if not self._turned and self.waited < UNTURNED:
+        if not self._turned and self.waited < UNTURNED_ALARM_S:
             return None
         self._told, self._told_of = self._last, self.f
         return self.waited if again else 0.0

@@ -88,7 +88,7 @@ class WarmUpWatch:
         return 60 * slope, 60 * float(np.sqrt(variance))
 
     @property
-    def says(self) -> str:
+    def notice(self) -> str:
         """Notice about the change; empty if the temperature is steady or unknown."""
         rate, sigma = self.rate
         if not abs(rate) - 2 * sigma > self._limit:
@@ -104,4 +104,4 @@ class WarmUpWatch:
         """Whether a window must wait: the temperature changes, or is not known yet."""
         if self.waived or self._until is None or self._last >= self._until:
             return False
-        return len(self._seconds) < FEWEST or bool(self.says)
+        return len(self._seconds) < FEWEST or bool(self.notice)

@@ -9,7 +9,7 @@ from fieldcal.drivers.driver import Driver
 from fieldcal.planning.steps import Hold
 from fieldcal.run.incoming import IncomingSamples
 from fieldcal.run.interruptions import (
-    THIN,
+    MOST_LOSS_RESTARTS,
     DeviceChanged,
     SamplesLost,
     WindowDisturbed,
@@ -115,13 +115,17 @@ class WindowTaker:
         if pieces.gaps:
             where["without_s"] = pieces.gaps
         self._recorder.mark("window", position=hold.index, **where)
-        self._noise = pieces.noise and pieces.noise.without_wander
-        self._display.taken(hold, pieces)
+        self._noise = pieces.noise and pieces.noise.spectrum_shape_only
+        self._display.show_taken(hold, pieces)
         return average
 
     def _fill(self, hold: Hold, pieces: PiecedWindow) -> bool:
         """Take samples until a window is long enough; False to begin it again."""
-        share = self._lost_share if self._thin.get(hold.index, 0) < THIN else np.inf
+        share = (
+            self._lost_share
+            if self._thin.get(hold.index, 0) < MOST_LOSS_RESTARTS
+            else np.inf
+        )
         watch = WindowWatch(self._driver, hold.seconds, share)
         looked = -np.inf
         for block in self._incoming.pieces:
@@ -136,7 +140,7 @@ class WindowTaker:
             looked = now
             if moved := pieces.disturbance:
                 raise moved
-            self._display.averaging(hold, pieces)
+            self._display.show_averaging(hold, pieces)
             early = not self._about.base_sways and pieces.reason_to_stop(hold.sigma)
             if full or early:
                 break

@@ -1,15 +1,21 @@
-"""Calibrations at several temperatures as one model: parameters over temperature.
+"""Combines calibrations at several temperatures into a model over temperature.
 
-Here live what a calibration says of one temperature (`points`), the polynomials that
-several of them make (`curves`, fitted in `fit`), and what a change of temperature costs
-in words (`wording`). What follows temperature within one recording is an effect of the
-catalogue, and parameters of autopilots are written in `install`.
+`points` makes a calibration independent of what an autopilot had installed, `curves`
+are polynomials over temperature, `fit` and `group_fit` fit them, and `wording` states
+the change between two temperatures. Effects of temperature within one recording are in
+the catalogue, and parameters of autopilots are written in `install`.
 """
 
 from __future__ import annotations
 
 from fieldcal.thermal.curves import ThermalCurve, ThermalModel
 from fieldcal.thermal.fit import thermal_model
-from fieldcal.thermal.points import ThermalPoint, point
+from fieldcal.thermal.points import ThermalPoint, thermal_point
 
-__all__ = ["ThermalCurve", "ThermalModel", "ThermalPoint", "point", "thermal_model"]
+__all__ = [
+    "ThermalCurve",
+    "ThermalModel",
+    "ThermalPoint",
+    "thermal_point",
+    "thermal_model",
+]

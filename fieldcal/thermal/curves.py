@@ -1,12 +1,12 @@
-"""Parameters of a device over temperature.
+"""Parameters of a device as polynomials over temperature.
 
     theta(T) = sum_{n=0}^{3} a_n (T - T_ref)^n                                      (1)
     var theta(T) = t^T V t,   t = (1, T - T_ref, (T - T_ref)^2, (T - T_ref)^3)      (2)
     theta(T) - theta(T') = sum_{n=1}^{3} a_n ((T - T_ref)^n - (T' - T_ref)^n)       (3)
 
-with V the covariance of a. It holds between the coldest and the warmest session, and
-nothing is said of other temperatures: a polynomial of third order leaves the range at
-once. Units: the parameter's per K^n; T deg C.
+with V the covariance of a. The model holds between the coldest and the warmest session
+only, since a polynomial of third order diverges outside of them. Units: the parameter's
+per K^n; T deg C.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 
 TERMS = 4
-"""Terms of (1): autopilots take third order."""
+"""Terms of (1): autopilots accept polynomials of third order."""
 
 EDGE_K = 0.05
-"""Temperatures are shown to a tenth: so far beyond an end is that end."""
+"""Tolerance at both ends of the range, K, since temperatures are shown to 0.1 K."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,8 @@ class ThermalCurve:
     covariance : V, (4, 4)
     orders : probability of the orders 0 to 3, (4,), of the parameter's group
     spread : standard deviation from run to run beyond the uncertainties
-    held_out : each session's value less what the others predict, in its ±, (n,); nan
-        where it has none
+    held_out : each session's value less the prediction from the others, over its
+        standard uncertainty, (n,); nan where there is none
 
     """
 
@@ -52,19 +52,19 @@ class ThermalCurve:
 
     @property
     def order(self) -> int:
-        """The likeliest order."""
+        """The most probable order."""
         return int(np.argmax(self.orders))
 
-    def value(self, warmer: float) -> tuple[float, float]:
+    def value(self, offset_k: float) -> tuple[float, float]:
         """Value and standard uncertainty at T - T_ref, K, (1), (2)."""
-        return self._of(np.power(warmer, np.arange(TERMS)))
+        return self._value_and_sigma(np.power(offset_k, np.arange(TERMS)))
 
-    def change(self, warmer: float, than: float) -> tuple[float, float]:
+    def change(self, offset_k: float, from_k: float) -> tuple[float, float]:
         """Difference and its uncertainty between two T - T_ref, K, (3)."""
         n = np.arange(TERMS)
-        return self._of(np.power(warmer, n) - np.power(than, n))
+        return self._value_and_sigma(np.power(offset_k, n) - np.power(from_k, n))
 
-    def _of(self, t: Array) -> tuple[float, float]:
+    def _value_and_sigma(self, t: Array) -> tuple[float, float]:
         return float(t @ self.coefficients), float(np.sqrt(t @ self.covariance @ t))
 
 
@@ -77,7 +77,7 @@ class ThermalModel:
     curves : by the full name of the parameter
     reference : T_ref, deg C
     low, high : of the coldest and the warmest session, deg C
-    sessions : name and temperature of each
+    sessions : name and temperature of each session
 
     """
 
@@ -93,26 +93,26 @@ class ThermalModel:
         Raises
         ------
         InputError
-            If no session was near it.
+            If the temperature is outside of the range of the sessions.
 
         """
-        warmer = self._inside(temperature)
-        return {name: curve.value(warmer) for name, curve in self.curves.items()}
+        offset_k = self._inside(temperature)
+        return {name: curve.value(offset_k) for name, curve in self.curves.items()}
 
     def change(self, to: float, since: float) -> dict[str, tuple[float, float]]:
-        """What parameters change by between two temperatures, deg C, with their ±.
+        """Changes of all parameters between two temperatures, deg C, with their ±.
 
         Raises
         ------
         InputError
-            If one of them is beyond the sessions.
+            If a temperature is outside of the range of the sessions.
 
         """
         warm, cold = self._inside(to), self._inside(since)
         return {name: curve.change(warm, cold) for name, curve in self.curves.items()}
 
     def of(self, group: str) -> list[ThermalCurve] | None:
-        """Curves of the x, y and z of a group; None where one is lacking."""
+        """Curves of the x, y and z of a group; None if one is missing."""
         every = [self.curves.get(f"{group}.{axis}") for axis in "xyz"]
         return None if None in every else [c for c in every if c is not None]
 
@@ -123,7 +123,9 @@ class ThermalModel:
             "reference_degc": self.reference,
             "range_degc": [self.low, self.high],
             "sessions": [{"name": n, "temperature_degc": t} for n, t in self.sessions],
-            "parameters": {n: _document(curve) for n, curve in self.curves.items()},
+            "parameters": {
+                n: _curve_document(curve) for n, curve in self.curves.items()
+            },
         }
 
     def _inside(self, temperature: float) -> float:
@@ -135,7 +137,7 @@ class ThermalModel:
         return float(np.clip(temperature, self.low, self.high)) - self.reference
 
 
-def _document(curve: ThermalCurve) -> dict[str, Any]:
+def _curve_document(curve: ThermalCurve) -> dict[str, Any]:
     told = [None if not np.isfinite(z) else float(z) for z in curve.held_out]
     return {
         "unit": curve.unit,

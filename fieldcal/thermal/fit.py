@@ -1,7 +1,8 @@
-"""Sessions at several temperatures to polynomials, each group of parameters by itself.
+"""Fits polynomials over temperature to sessions, for each group of parameters.
 
-Which orders, sizes, shares and spreads are tried is said here; what they are, and how
-each counts by its evidence, in `group_fit`: v of (2), tau of (4), theta' of (3) there.
+This module defines the grid of orders, sizes, shares and spreads. `group_fit` defines
+their meaning and weighs them by their evidence: v of (2), theta' of (3) and tau of (4)
+are in its equations.
 """
 
 from __future__ import annotations
@@ -18,38 +19,38 @@ from fieldcal.core.samples import Array
 from fieldcal.effects.temperature_bias import TemperatureBias
 from fieldcal.effects.temperature_scale import TemperatureScale
 from fieldcal.thermal.curves import TERMS, ThermalCurve, ThermalModel
-from fieldcal.thermal.group_fit import SHARES, GroupData, fitted, missed
+from fieldcal.thermal.group_fit import SHARES, GroupData, fit_group, held_out_residual
 from fieldcal.thermal.points import ThermalPoint
 
 FEWEST, NARROWEST_K = 3, 10.0
-"""So many temperatures over so wide a range; ArduPilot asks for the same range."""
+"""Least number of temperatures, and least range; ArduPilot needs the same range."""
 
-DISTINCT = 0.1
-"""Temperatures are two from this share of the range on."""
+DISTINCT_SHARE = 0.1
+"""Least distance of distinct temperatures, as a share of the range."""
 
 SIZES = tuple(float(v) for v in np.geomspace(0.01, 10.0, 10))
-"""v of (2), in what the catalogue calls typical times h."""
+"""v of (2), over h times the typical size of the effect in the catalogue."""
 
 SPREADS = tuple(float(v) for v in np.geomspace(1e-3, 3.0, 11))
-"""tau of (4), in what is usual from run to run for the grade."""
+"""tau of (4), over the usual spread from run to run of the grade."""
 
-ALIKE = {"cross_coupling": "acc_scale", "gyro_cross_coupling": "gyr_scale"}
-"""Whose run-to-run spread is that of a group that no grade has one for."""
+SPREAD_OF_GROUP = {"cross_coupling": "acc_scale", "gyro_cross_coupling": "gyr_scale"}
+"""Group whose spread from run to run is taken for a group that has no limit."""
 
 NEGLIGIBLE = 1e-4
-"""Weight from which a set is tried again where sessions are held out."""
+"""Least weight of a set that is fitted again with a session held out."""
 
 PASSES = 2
-"""How often theta' in (3) is taken from the fit before."""
+"""Number of fits, each with theta' of (3) from the one before."""
 
 
 def thermal_model(points: Sequence[ThermalPoint], limits: GradeLimits) -> ThermalModel:
-    """Polynomials of every group of parameters that all sessions have.
+    """Fit polynomials to every group of parameters that all sessions have.
 
     Parameters
     ----------
-    points : a session each, of one device
-    limits : of its grade
+    points : one for each session of a device
+    limits : of the device's grade
 
     Raises
     ------
@@ -59,20 +60,22 @@ def thermal_model(points: Sequence[ThermalPoint], limits: GradeLimits) -> Therma
 
     """
     warm = np.array([p.temperature for p in points])
-    _refuse_few(warm)
+    _check_temperatures(warm)
     low, high = float(warm.min()), float(warm.max())
     middle, half = (low + high) / 2, (high - low) / 2
     curves: dict[str, ThermalCurve] = {}
-    for names in common(points):
+    for names in common_parameters(points):
         group = group_of(names[0])
-        usual = limits.repeat(ALIKE.get(group, group)) or 0.0
-        sets = _sets(_typical(group) * half, usual)
-        data = _data(points, names, (warm - middle) / half, half)
+        usual = limits.repeat(SPREAD_OF_GROUP.get(group, group)) or 0.0
+        sets = _hyperparameter_grid(_typical_change(group) * half, usual)
+        data = _group_data(points, names, (warm - middle) / half, half)
         for _ in range(PASSES):
-            found = fitted(data, sets)
-            data = data.tilted(found.slopes(data.x) / half)
+            found = fit_group(data, sets)
+            data = data.with_slope(found.slopes(data.x) / half)
         some = sets[found.weights > NEGLIGIBLE]
-        left_out = np.array([missed(data, some, i) for i in range(len(points))])
+        left_out = np.array(
+            [held_out_residual(data, some, i) for i in range(len(points))]
+        )
         unit = GROUPS[group][2]
         for j, name in enumerate(names):
             curves[name] = found.curve(j, half, unit, left_out[:, j])
@@ -84,8 +87,8 @@ def thermal_model(points: Sequence[ThermalPoint], limits: GradeLimits) -> Therma
     return ThermalModel(curves, middle, low, high, where)
 
 
-def common(points: Sequence[ThermalPoint]) -> list[list[str]]:
-    """Names of the parameters of each group that all points have, whole."""
+def common_parameters(points: Sequence[ThermalPoint]) -> list[list[str]]:
+    """Parameter names of each group that is complete in all points."""
     sets = [p.calibration.names for p in points]
     groups: dict[str, list[str]] = {}
     for name in dict.fromkeys(n for names in sets for n in names):
@@ -94,12 +97,12 @@ def common(points: Sequence[ThermalPoint]) -> list[list[str]]:
     return [g for g in groups.values() if all(set(g) <= set(names) for names in sets)]
 
 
-def _refuse_few(warm: Array) -> None:
-    """Refuse temperatures that tell no curve."""
+def _check_temperatures(warm: Array) -> None:
+    """Refuse temperatures that are too few or too close to each other."""
     wide = float(np.ptp(warm)) if len(warm) else 0.0
     count, last = 0, -np.inf
     for t in np.sort(warm):
-        if t - last >= DISTINCT * wide:
+        if t - last >= DISTINCT_SHARE * wide:
             count, last = count + 1, float(t)
     if count < FEWEST or wide < NARROWEST_K:
         listed = ", ".join(f"{t:.1f}" for t in warm)
@@ -109,8 +112,8 @@ def _refuse_few(warm: Array) -> None:
         )
 
 
-def _typical(group: str) -> float:
-    """What the catalogue calls typical of a group's change in a kelvin."""
+def _typical_change(group: str) -> float:
+    """Typical change of a group's parameters per kelvin, from the catalogue."""
     if group == "acc_bias":
         return TemperatureBias.params[0].typical
     if group == "gyr_bias":
@@ -118,10 +121,11 @@ def _typical(group: str) -> float:
     return TemperatureScale.params[0].typical
 
 
-def _sets(size: float, usual: float) -> Array:
-    """Every n, v, r, tau that is tried, (m, 4).
+def _hyperparameter_grid(size: float, usual: float) -> Array:
+    """Grid of n, v, r and tau, (m, 4).
 
-    All four orders always: what too few temperatures cannot tell is wide in the ±.
+    It always has all four orders. Terms that few temperatures do not determine have
+    large uncertainties.
     """
     grid = np.meshgrid(
         np.arange(TERMS), np.array(SIZES) * size, [*SHARES], np.array(SPREADS) * usual
@@ -129,10 +133,10 @@ def _sets(size: float, usual: float) -> Array:
     return np.stack([g.ravel() for g in grid], axis=1)
 
 
-def _data(
+def _group_data(
     points: Sequence[ThermalPoint], names: Sequence[str], x: Array, half: float
 ) -> GroupData:
-    """Rows of a group; theta' is that of a straight line to begin with."""
+    """Values of a group in all sessions, with the slope of a straight line."""
     every = [p.calibration for p in points]
     at = [[c.names.index(n) for n in names] for c in every]
     y = np.array([c.values[i] for c, i in zip(every, at, strict=True)])
@@ -141,6 +145,6 @@ def _data(
     )
     offset = y.mean(axis=0)
     slope = np.polynomial.polynomial.polyfit(x, y - offset, 1)[1] / half
-    wander = np.array([p.wander for p in points])
-    tilt = np.broadcast_to(slope, y.shape)
-    return GroupData(x, y - offset, offset, covariance, wander, tilt)
+    temperature_sd = np.array([p.temperature_sd for p in points])
+    slope = np.broadcast_to(slope, y.shape)
+    return GroupData(x, y - offset, offset, covariance, temperature_sd, slope)

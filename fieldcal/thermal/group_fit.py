@@ -1,4 +1,4 @@
-"""A group of parameters in several sessions as one polynomial over temperature.
+"""Fits a group of parameters in several sessions by polynomials over temperature.
 
 The values theta_s of a group's parameters in session s, with their covariance C_s, are
 
@@ -7,20 +7,20 @@ The values theta_s of a group's parameters in session s, with their covariance C
     u ~ N(0, r I),   e_s ~ N(0, (1 - r) C_s + (theta'(T_s) w_s)^2)                  (3)
     d_s ~ N(0, tau^2)                                                               (4)
 
-P_k are Legendre's polynomials of x = (T - T_ref) / h, so that no order changes what a
-lower one says; T_ref and h are middle and half of the range. u is what all sessions
-have in common, with D_s D_s = C_s: the same base, gravity and latitude are wrong alike
-in each, move the constant alone, and leave differences between temperatures as sharp as
-they are. d_s is what changes from run to run, w_s how far the temperature wandered
-within a session. The order n, the size v, the share r and the spread tau are not known:
-each set of them counts by its evidence,
+P_k are the Legendre polynomials of x = (T - T_ref) / h, so that a higher order hardly
+changes the lower coefficients; T_ref and h are middle and half width of the range. u is
+the error that all sessions have in common, with D_s D_s = C_s: errors of base, gravity
+and latitude are equal in each session, and do not affect differences between
+temperatures. d_s changes from run to run, and w_s is the standard deviation of the
+temperature within a session. The order n, the size v, the share r and the spread tau
+are unknown. Each set of them is weighed by its evidence,
 
     ln Z = -(y^T R^-1 y - b^T L M^-1 L b + ln |R| + ln |M|) / 2                     (5)
     M = I + L G L,   G = H^T R^-1 H,   b = H^T R^-1 y                               (6)
 
 with H the columns of (1), R the covariance of d + e, and L the square roots of the
-priors (2), (3); the answer is the mean over all sets, so that its ± holds whatever the
-order is. Source: D. MacKay, Neural Computation 4, 415 (1992).
+priors (2), (3). The result is the mean over all sets, so that its uncertainty includes
+that of the order. Source: D. MacKay, Neural Computation 4, 415 (1992).
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from fieldcal.core.samples import Array
 from fieldcal.thermal.curves import TERMS, ThermalCurve
 
 SHARES = {0.0: 0.5, 0.3: 1 / 6, 0.7: 1 / 6, 0.95: 1 / 6}
-"""r of (3) and its probability: as likely nothing in common as something."""
+"""Prior probability of each r of (3): a common error is as likely as none."""
 
-FALL = 2.0
-"""Each order is so much smaller than the one below, (2)."""
+ORDER_RATIO = 2.0
+"""Ratio of the sizes of successive orders, (2)."""
 
-ANY = 100.0
-"""Prior of c_0 in what the sessions differ by."""
+UNBOUNDED = 100.0
+"""Prior standard deviation of c_0, over the largest difference between sessions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class GroupData:
     ----------
     x : (s,) temperature over the range, -1 to 1
     y : (s, p) values less their mean `offset`, (p,)
-    covariance : (s, p, p)
-    wander : (s,) of the temperature, K
-    tilt : (s, p) theta' of (3), per K
+    covariance : (s, p, p) of the values
+    temperature_sd : (s,) standard deviation of the temperature in a session, K
+    slope : (s, p) theta' of (3), per K
 
     """
 
@@ -61,23 +61,25 @@ class GroupData:
     y: Array
     offset: Array
     covariance: Array
-    wander: Array
-    tilt: Array
+    temperature_sd: Array
+    slope: Array
 
-    def tilted(self, tilt: Array) -> GroupData:
-        """With another theta'."""
-        return replace(self, tilt=tilt)
+    def with_slope(self, slope: Array) -> GroupData:
+        """The data with another theta'."""
+        return replace(self, slope=slope)
 
     def without(self, i: int) -> GroupData:
-        """Without a session."""
+        """The data without session i."""
         keep = np.arange(len(self.x)) != i
-        some = (self.y, self.covariance, self.wander, self.tilt)
-        y, covariance, wander, tilt = (part[keep] for part in some)
-        return GroupData(self.x[keep], y, self.offset, covariance, wander, tilt)
+        some = (self.y, self.covariance, self.temperature_sd, self.slope)
+        y, covariance, temperature_sd, slope = (part[keep] for part in some)
+        return GroupData(
+            self.x[keep], y, self.offset, covariance, temperature_sd, slope
+        )
 
     @property
     def columns(self) -> Array:
-        """H of (1): orders by parameters, then what is common, (s, p, 5 p)."""
+        """H of (1): orders by parameters, then the common error, (s, p, 5 p)."""
         p = self.y.shape[1]
         legendre = np.polynomial.legendre.legvander(self.x, TERMS - 1)
         orders = np.einsum("sk,ij->sikj", legendre, np.eye(p)).reshape(-1, p, TERMS * p)
@@ -89,20 +91,23 @@ class GroupData:
     def noise(self, share: Array, spread: Array) -> Array:
         """R of (5) of each session, (m, s, p, p), for m shares and spreads."""
         own = (1 - share)[:, None, None, None] * self.covariance
-        diagonal = (self.tilt * self.wander[:, None]) ** 2 + spread[:, None, None] ** 2
+        diagonal = (self.slope * self.temperature_sd[:, None]) ** 2 + spread[
+            :, None, None
+        ] ** 2
         return own + diagonal[..., None] * np.eye(self.y.shape[1])
 
 
 @dataclass(frozen=True, slots=True)
 class GroupFit:
-    """What all sets of n, v, r, tau say together.
+    """Fits of a group with all sets of n, v, r and tau, and their weights.
 
     Attributes
     ----------
     weights : (m,) of the sets, sum 1
-    sets : (m, 4)
-    means : (m, 5 p) of c and u; `covariances` (m, 5 p, 5 p)
-    offset : (p,) taken off before
+    sets : (m, 4) n, v, r and tau
+    means : (m, 5 p) of c and u
+    covariances : (m, 5 p, 5 p) of c and u
+    offset : (p,) subtracted from the values before the fit
 
     """
 
@@ -114,12 +119,12 @@ class GroupFit:
 
     @property
     def mean(self) -> Array:
-        """Of c and u, (5 p,)."""
+        """Mean of c and u over all sets, (5 p,)."""
         return np.asarray(self.weights @ self.means)
 
     @property
     def covariance(self) -> Array:
-        """Of c and u, (5 p, 5 p): that of the sets, and how they differ."""
+        """Covariance of c and u, within and between the sets, (5 p, 5 p)."""
         off = self.means - self.mean
         within = np.einsum("m,mij->ij", self.weights, self.covariances)
         return np.asarray(within + np.einsum("m,mi,mj->ij", self.weights, off, off))
@@ -131,10 +136,10 @@ class GroupFit:
         return np.asarray(np.polynomial.legendre.legval(x, derivative).T)
 
     def curve(self, j: int, half: float, unit: str, held_out: Array) -> ThermalCurve:
-        """The parameter numbered j in powers of kelvins."""
+        """Curve of parameter j, in powers of K; `half` is h in K."""
         p = len(self.offset)
         mine = np.arange(TERMS) * p + j
-        to = _powers(half)
+        to = _legendre_to_powers(half)
         a = to @ self.mean[mine]
         a[0] += self.offset[j]
         covariance = to @ self.covariance[np.ix_(mine, mine)] @ to.T
@@ -145,8 +150,8 @@ class GroupFit:
         return ThermalCurve(unit, a, covariance, orders, spread, held_out)
 
 
-def _powers(half: float) -> Array:
-    """Matrix from coefficients of Legendre's polynomials of K / half to powers of K."""
+def _legendre_to_powers(half: float) -> Array:
+    """Matrix that converts coefficients of Legendre polynomials of x to powers of K."""
     out = np.zeros((TERMS, TERMS))
     for k in range(TERMS):
         series: Array = np.asarray(Legendre.basis(k).convert(kind=Polynomial).coef)
@@ -154,8 +159,8 @@ def _powers(half: float) -> Array:
     return out
 
 
-def fitted(data: GroupData, sets: Array) -> GroupFit:
-    """Mean, covariance and weight of each set, (5), (6)."""
+def fit_group(data: GroupData, sets: Array) -> GroupFit:
+    """Fit a group with each set: mean, covariance and weight, (5), (6)."""
     h, p = data.columns, data.y.shape[1]
     pairs, which = np.unique(sets[:, 2:], axis=0, return_inverse=True)
     noise = data.noise(*pairs.T)
@@ -165,7 +170,7 @@ def fitted(data: GroupData, sets: Array) -> GroupFit:
     b = np.einsum("msia,si->ma", weighted, data.y)[which]
     square = np.einsum("si,msij,sj->m", data.y, inverse, data.y)
     log_noise = np.linalg.slogdet(noise)[1].sum(axis=1)
-    root = _priors(
+    root = _prior_roots(
         sets, p, float(np.abs(data.y).max() + np.sqrt(data.covariance.max()))
     )
     m = np.eye(h.shape[2]) + root[:, :, None] * g * root[:, None, :]
@@ -178,19 +183,19 @@ def fitted(data: GroupData, sets: Array) -> GroupFit:
     return GroupFit(weights / weights.sum(), sets, means, covariances, data.offset)
 
 
-def _priors(sets: Array, p: int, wide: float) -> Array:
+def _prior_roots(sets: Array, p: int, wide: float) -> Array:
     """L of (6): square roots of the priors of c and u, (m, 5 p)."""
     k = np.arange(TERMS)
     order, size, share = sets[:, 0, None], sets[:, 1, None], sets[:, 2, None]
-    terms = np.where(k <= order, size * FALL ** (1.0 - k), 0.0)
-    terms[:, 0] = ANY * wide
+    terms = np.where(k <= order, size * ORDER_RATIO ** (1.0 - k), 0.0)
+    terms[:, 0] = UNBOUNDED * wide
     each = [np.repeat(terms, p, axis=1), np.repeat(np.sqrt(share), p, axis=1)]
     return np.concatenate(each, axis=1)
 
 
-def missed(data: GroupData, sets: Array, i: int) -> Array:
-    """Session i less what the others predict of it, in the ± of that, (p,)."""
-    found = fitted(data.without(i), sets)
+def held_out_residual(data: GroupData, sets: Array, i: int) -> Array:
+    """Session i less the prediction from the others, over its uncertainty, (p,)."""
+    found = fit_group(data.without(i), sets)
     h = data.columns[i]
     off = data.y[i] - found.means @ h.T
     noise = data.noise(sets[:, 2], sets[:, 3])[:, i]

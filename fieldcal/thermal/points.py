@@ -1,11 +1,11 @@
-"""What one calibration says of a device at one temperature.
+"""Calibration of a device at one temperature, independent of installed parameters.
 
 An autopilot sends U = (r - o) k of its sensor's output r, and U = b + M f was found, so
 
     r = (o + b / k) + (M / k) f                        a row of M by its own k      (1)
 
-which is the same device whatever the autopilot had installed. Temperatures are in deg
-C, by the thermometer of the device.
+which does not depend on what the autopilot had installed. Temperatures are in deg C, by
+the thermometer of the device.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from fieldcal.calibration.names import ParameterName
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import InstalledCalibration, parameter_names
 
-CROSS = {"cross_coupling": "acc", "gyro_cross_coupling": "gyr"}
+TRIAD_OF_GROUP = {"cross_coupling": "acc", "gyro_cross_coupling": "gyr"}
 
 
 @dataclass(frozen=True, slots=True)
 class ThermalPoint:
-    """A calibration of the sensor's own output, and how warm the device was.
+    """Calibration of the sensor's own output, and the temperature of the device.
 
     Attributes
     ----------
-    name : of the session, for sentences
-    temperature : that the values are of, deg C
-    wander : standard deviation of the temperature meanwhile, K
+    name : of the session, for messages
+    temperature : to which the values belong, deg C
+    temperature_sd : standard deviation of the temperature in the session, K
     calibration : of the sensor's own output, (1)
 
     """
 
     name: str
     temperature: float
-    wander: float
+    temperature_sd: float
     calibration: Calibration
 
 
-def point(name: str, found: Calibration) -> ThermalPoint:
-    """A calibration as a point of the temperature.
+def thermal_point(name: str, found: Calibration) -> ThermalPoint:
+    """Make a thermal point of a calibration.
 
     Raises
     ------
     InputError
-        If it has no temperature, is bad, or was found behind a correction for
-        temperature.
+        If the calibration has no temperature, is bad, or was found with the
+        autopilot's temperature correction enabled.
 
     """
     if not found.good:
@@ -58,18 +58,22 @@ def point(name: str, found: Calibration) -> ThermalPoint:
         )
     conditions = found.info.get("conditions", {})
     warm = found.info.get("carried", {}).get("as_of", {}).get("temperature_degc")
-    wander = 0.0 if warm is not None else conditions.get("temperature_sd_k") or 0.0
+    temperature_sd = (
+        0.0 if warm is not None else conditions.get("temperature_sd_k") or 0.0
+    )
     warm = conditions.get("temperature_degc") if warm is None else warm
     if warm is None:
         raise InputError(
             f"{name}: the device told no temperature; record from an output that has"
             " one, or import with --columns … temperature"
         )
-    return ThermalPoint(name, float(warm), float(wander), _own_output(name, found))
+    return ThermalPoint(
+        name, float(warm), float(temperature_sd), _own_output(name, found)
+    )
 
 
 def _own_output(name: str, found: Calibration) -> Calibration:
-    """The calibration of what the sensor puts out, (1)."""
+    """Calibration of the sensor's own output, (1)."""
     table: Any = found.info.get("installed")
     if not table:
         return found
@@ -87,7 +91,7 @@ def _own_output(name: str, found: Calibration) -> Calibration:
     more: np.ndarray[Any, Any] = np.zeros(len(found.names))
     per: np.ndarray[Any, Any] = np.ones(len(found.names))
     for i, parameter in enumerate(map(ParameterName.of, found.names)):
-        sensor = parameter.sensor or CROSS.get(parameter.group)
+        sensor = parameter.sensor or TRIAD_OF_GROUP.get(parameter.group)
         if sensor is None:
             continue
         row = parameter.axis if parameter.sensor else parameter.entry[0]

@@ -1,4 +1,4 @@
-"""What a change of temperature costs, in words."""
+"""Sentences about the change of parameters between two temperatures."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from fieldcal.calibration.names import group_of
 from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
 from fieldcal.core.gravity import G0
 
-TOLD = 3.0
-"""A change is told from so many of its standard uncertainties on: a device has twenty
-parameters, of which one would reach 2 by chance."""
+REPORTED_SIGMAS = 3.0
+"""Least change that is reported, in standard uncertainties. Of the twenty parameters of
+a device, one would exceed 2 by chance."""
 
 
-def costs(
+def change_sentences(
     changes: Mapping[str, tuple[float, float]],
 ) -> tuple[list[str], list[str]]:
-    """Sentences on parameters that change, and names of those that do not show it.
+    """Sentences about significant changes, and names of the other parameters.
 
     Parameters
     ----------
@@ -28,16 +28,17 @@ def costs(
 
     """
     told = [
-        f"{parameter_title(name)} {_signed(change, sigma, GROUPS[group_of(name)][2])}"
-        f"{_means(group_of(name), change)}"
+        f"{parameter_title(name)}"
+        f" {_format_change(change, sigma, GROUPS[group_of(name)][2])}"
+        f"{_consequence(group_of(name), change)}"
         for name, (change, sigma) in changes.items()
-        if abs(change) >= TOLD * sigma
+        if abs(change) >= REPORTED_SIGMAS * sigma
     ]
-    rest = [name for name, (c, s) in changes.items() if abs(c) < TOLD * s]
+    rest = [name for name, (c, s) in changes.items() if abs(c) < REPORTED_SIGMAS * s]
     return told, rest
 
 
-def document(changes: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def change_document(changes: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Changes as an object: value, sigma and unit by name."""
     return {
         name: {"change": change, "sigma": sigma, "unit": GROUPS[group_of(name)][2]}
@@ -45,14 +46,14 @@ def document(changes: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     }
 
 
-def _signed(change: float, sigma: float, unit: str) -> str:
+def _format_change(change: float, sigma: float, unit: str) -> str:
     value, around = format_with_sigma(change, sigma)
     sign = "" if value.startswith("-") else "+"
     return f"{sign}{value} ± {around} {format_unit(unit)}".rstrip()
 
 
-def _means(group: str, change: float) -> str:
-    """What the change does to who uses the old value."""
+def _consequence(group: str, change: float) -> str:
+    """Error that the change causes if the old value is used."""
     size = abs(change)
     if group == "acc_bias":
         return f", a level wrong by {np.rad2deg(size / G0):.2g}°"

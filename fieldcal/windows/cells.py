@@ -105,8 +105,8 @@ class CellTable:
         trust = np.sqrt(np.minimum(1.0, counts / np.where(usual > 0, usual, 1.0)))
         if (trust == 1.0).all():
             return means
-        laid = robust_lines(hold_last(means))
-        steady: Array = laid + trust * np.where(counts > 0, means - laid, 0.0)
+        lines = robust_lines(fill_with_previous(means))
+        steady: Array = lines + trust * np.where(counts > 0, means - lines, 0.0)
         return steady
 
     @property
@@ -301,7 +301,7 @@ def _ratio(sums: Array, counts: Array) -> Array:
     return ratio
 
 
-def hold_last(means: Array, before: Array | None = None) -> Array:
+def fill_with_previous(means: Array, before: Array | None = None) -> Array:
     """Means (m, c) with the one before where one is missing, 0 before the first.
 
     Parameters

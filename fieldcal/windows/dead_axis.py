@@ -33,13 +33,13 @@ class DeadSensor(NamedTuple):
     ----------
     channels : its three, in `CHANNELS`
     axes : those without a signal, in `CHANNELS`
-    says : a sentence for the user
+    message : a sentence for the user
 
     """
 
     channels: slice
     axes: tuple[int, ...]
-    says: str
+    message: str
 
     @property
     def absent(self) -> bool:
@@ -68,9 +68,9 @@ def dead_sensors(six: Array) -> list[DeadSensor]:
         what = "never change, or are missing"
         if len(names) == 1:
             what = "never changes, or is missing"
-        says = f"the {sensor} are not used: {join_words(names)} {what}"
+        message = f"the {sensor} are not used: {join_words(names)} {what}"
         numbers = tuple(channels.start + axis for axis in axes)
-        found.append(DeadSensor(channels, numbers, says))
+        found.append(DeadSensor(channels, numbers, message))
     return found
 
 

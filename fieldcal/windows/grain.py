@@ -25,16 +25,16 @@ import numpy as np
 from fieldcal.core.samples import Array, Grain
 from fieldcal.windows import rounding
 
-AROUND = np.linspace(-1.0, 1.0, 21)
+MEAN_OFFSETS = np.linspace(-1.0, 1.0, 21)
 """Possible differences of the true mean from the mean of the values, steps."""
 
-SHARP = 1e-3
+LEAST_NOISE = 1e-3
 """Least noise, steps: an output without noise is always on the same side of an edge."""
 
-ZERO = 2.0
+AROUND_ZERO = 2.0
 """Means below this are around zero, steps."""
 
-WIDE = 1.5
+STEPS_HIDDEN_NOISE = 1.5
 """Noise, in steps, below which single steps show around zero."""
 
 
@@ -69,17 +69,19 @@ def visible_step(grain: Grain, mean: Array, sampled: Array) -> Array:
     fine = rounding.visible_steps(q, sampled)
     if not grain.cut:
         return fine
-    around = (np.abs(np.nan_to_num(mean)) < ZERO * q) & (sampled < WIDE * q)
+    around = (np.abs(np.nan_to_num(mean)) < AROUND_ZERO * q) & (
+        sampled < STEPS_HIDDEN_NOISE * q
+    )
     return np.where(around, 2 * q, fine)
 
 
 def _variance_around_zero(mean: Array, noise: Array) -> Array:
     """Variance from the wide step around zero, (3), in steps, (c,)."""
     found = np.zeros(len(mean))
-    for i in np.flatnonzero(np.abs(mean) < ZERO + 3 * noise):
-        s = max(float(noise[i]), SHARP)
+    for i in np.flatnonzero(np.abs(mean) < AROUND_ZERO + 3 * noise):
+        s = max(float(noise[i]), LEAST_NOISE)
         found[i] = np.mean(
-            [_offset_of_cut_values(mean[i] + u, s) ** 2 for u in AROUND]
+            [_offset_of_cut_values(mean[i] + u, s) ** 2 for u in MEAN_OFFSETS]
         )  # (3)
     return found
 

@@ -20,19 +20,19 @@ from numpy.typing import NDArray
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, Block, concat
 
-HALF = 5
+MEDIAN_ROWS = 5
 """Rows of a median in (1)."""
 
-FAR = 8.0
+JUMP_OVER_NOISE = 8.0
 """Times the noise of a row that a jump is at least."""
 
-FEWEST_ROWS, FEWEST = 20, 3
+FEWEST_ROWS, FEWEST_POSITIONS = 20, 3
 """Fewest rows of a position, and fewest positions, of such a recording."""
 
-ALIKE = 5.0
+LARGEST_SCATTER_RATIO = 5.0
 """Largest ratio of the scatter of rows in one position to that in another."""
 
-MOSTLY = 0.95
+LEAST_SHARE = 0.95
 """Least part of the changes that are jumps, and of the positions that are at rest."""
 
 
@@ -70,30 +70,32 @@ class JumpFinder:
         """Take in the block that follows."""
         self._rows += len(block)
         block = concat([self._held, block])
-        self._held = block[max(len(block) - 2 * HALF + 1, 0) :]
-        if len(block) < 2 * HALF or not np.isfinite(block.acc).any(axis=0).all():
+        self._held = block[max(len(block) - 2 * MEDIAN_ROWS + 1, 0) :]
+        if len(block) < 2 * MEDIAN_ROWS or not np.isfinite(block.acc).any(axis=0).all():
             return
         if np.isnan(self._size).any():
             whole = block.acc[np.isfinite(block.acc).all(axis=1)]
             apart = np.abs(np.diff(whole, axis=0))
-            self._size = FAR * _noise(apart)
+            self._size = JUMP_OVER_NOISE * _noise(apart)
             self._least_jump = float(
                 np.nan_to_num(_least_jump(apart), posinf=0.0).sum()
             )
-        view = np.lib.stride_tricks.sliding_window_view(block.acc, HALF, axis=0)
+        view = np.lib.stride_tricks.sliding_window_view(block.acc, MEDIAN_ROWS, axis=0)
         middle = np.median(view, axis=-1)
         if np.isnan(self._begin[0]):
             self._begin = float(block.t[0]), middle[0]
         self._end = float(block.t[-1]), middle[-1]
-        before, after = middle[:-HALF], middle[HALF:]
+        before, after = middle[:-MEDIAN_ROWS], middle[MEDIAN_ROWS:]
         far: NDArray[np.bool_] = np.any(np.abs(after - before) > self._size, axis=1)
         at = np.flatnonzero(far)  # (1)
-        row = at + HALF + self._rows - len(block)
-        step = np.nan_to_num(np.abs(np.diff(block.acc[HALF - 1 : 1 - HALF], axis=0)))
+        row = at + MEDIAN_ROWS + self._rows - len(block)
+        step = np.nan_to_num(
+            np.abs(np.diff(block.acc[MEDIAN_ROWS - 1 : 1 - MEDIAN_ROWS], axis=0))
+        )
         steps = self._steps + np.cumsum(np.minimum(step, self._size).sum(axis=1))
         self._steps = float(steps[-1])
         self._changes.append(
-            JumpRows(row, block.t[at + HALF], before[at], after[at], steps[at])
+            JumpRows(row, block.t[at + MEDIAN_ROWS], before[at], after[at], steps[at])
         )
 
     @property
@@ -106,7 +108,7 @@ class JumpFinder:
             return []
         parts = np.flatnonzero(np.diff(some.row) > 1) + 1
         first, last = np.append(0, parts), np.append(parts, len(some.row)) - 1
-        if np.mean(last - first <= HALF) < MOSTLY:
+        if np.mean(last - first <= MEDIAN_ROWS) < LEAST_SHARE:
             return []
         begins = np.vstack([self._begin[1], some.after[last]])
         closes = np.vstack([some.before[first], self._end[1]])
@@ -121,11 +123,11 @@ class JumpFinder:
         time = some.time
         rows = np.diff(np.concatenate([[0], some.row, [self._rows]]))
         long = rows >= FEWEST_ROWS
-        if long.sum() < FEWEST or rests[long].mean() < MOSTLY:
+        if long.sum() < FEWEST_POSITIONS or rests[long].mean() < LEAST_SHARE:
             return []
         differ = np.diff(np.concatenate([[0.0], some.steps, [self._steps]])) / rows
         quiet = max(float(differ[long].min()), self._least_jump)
-        if (differ[long] > ALIKE * quiet).mean() > 1 - MOSTLY:
+        if (differ[long] > LARGEST_SCATTER_RATIO * quiet).mean() > 1 - LEAST_SHARE:
             return []
         starts = np.append(self._begin[0], time)
         ends = np.append(time, self._end[0])

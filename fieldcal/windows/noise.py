@@ -41,7 +41,7 @@ KEEP = 0.9
 KEPT = 0.62302
 """Second moment of a unit normal inside its central nine tenths."""
 
-MOST = 200_000
+MOST_DIFFERENCES = 200_000
 """Most differences that are used: they give a level to a third of a percent."""
 
 STEP_SAMPLES = 2000
@@ -119,7 +119,7 @@ def quickest_noise(pieces: Sequence[Array]) -> Array:
     pieces : (n_i, c) samples of each window, nan where not to be used
 
     """
-    most = max(MOST // max(len(pieces), 1), 1)
+    most = max(MOST_DIFFERENCES // max(len(pieces), 1), 1)
     steps = [np.diff(p[:most], 4, axis=0) for p in pieces]
     square: Array = np.nanmean(np.concatenate(steps) ** 2, axis=0) / 70  # (3)
     return np.sqrt(square)
@@ -152,7 +152,7 @@ def _least_change(values: Array) -> Array:
 
 def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     """s^2(m) of each channel and its relative standard error, (1)."""
-    most = max(MOST // len(pieces), 1)
+    most = max(MOST_DIFFERENCES // len(pieces), 1)
     steps = [_second_differences(p, m, most) for p in pieces if len(p) >= 3 * m]
     if not steps:
         nothing = np.full(pieces[0].shape[1], np.nan)

@@ -102,7 +102,7 @@ class PiecedWindow:
             return self._now.reason_to_stop(target)
         if target is None or not np.nanmax(self.sigma[:3]) <= target:
             return None
-        return self._whole(self._kept, self._now).reason_to_stop(target)
+        return self._joined_window(self._kept, self._now).reason_to_stop(target)
 
     def keep_undisturbed(self, moved: Moved) -> float:
         """Keep the undisturbed part before a disturbance; returns the seconds kept.
@@ -141,7 +141,7 @@ class PiecedWindow:
         if self._kept is None:
             return self._now.average()
         before = self._kept
-        whole = self._together(before, self._now)
+        whole = self._merged(before, self._now)
         if whole is not None:
             self._gaps.append(_gap_between(before, self._now))
             return whole.average()
@@ -152,7 +152,7 @@ class PiecedWindow:
     def _join(self, piece: Window) -> None:
         """Add a piece; earlier ones are discarded if they do not agree with it."""
         before = self._kept
-        whole = self._together(before, piece) if before else None
+        whole = self._merged(before, piece) if before else None
         if before is not None and whole is not None:
             self._gaps.append(_gap_between(before, piece))
             self._kept = whole
@@ -160,14 +160,14 @@ class PiecedWindow:
         self.dropped = before.seconds if before else 0.0
         self._kept, self._gaps = piece, []
 
-    def _together(self, before: Window, after: Window) -> Window | None:
+    def _merged(self, before: Window, after: Window) -> Window | None:
         """Two pieces as one window; None if they do not agree."""
-        whole = self._whole(before, after)
+        whole = self._joined_window(before, after)
         return (
             whole if self._agree(before, after) and whole.disturbance is None else None
         )
 
-    def _whole(self, before: Window, after: Window) -> Window:
+    def _joined_window(self, before: Window, after: Window) -> Window:
         return Window(self._limits, self._noise, self._grain, (before, after))
 
     @staticmethod

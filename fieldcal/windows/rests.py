@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array, runs_of_true
-from fieldcal.windows.cells import CELL, CellRows, CellTable, hold_last
+from fieldcal.windows.cells import CELL, CellRows, CellTable, fill_with_previous
 
 SPAN = 10
 """Cells whose spread tells rest from motion: 1 s."""
@@ -75,7 +75,7 @@ def cell_index(rows: CellRows, t: float) -> int:
     return low
 
 
-class _Typical(NamedTuple):
+class _TypicalCells(NamedTuple):
     """Usual values of the cells of a recording.
 
     Attributes
@@ -91,7 +91,7 @@ class _Typical(NamedTuple):
     flips: Array
 
 
-def _spans(rows: CellRows, usual: _Typical) -> Iterator[SpanSpreads]:
+def _spans(rows: CellRows, usual: _TypicalCells) -> Iterator[SpanSpreads]:
     """Spread and mean of the spans of each part, with the index of its first span.
 
     The mean of a cell with few values is replaced by that of the cell before. Unlike
@@ -102,7 +102,7 @@ def _spans(rows: CellRows, usual: _Typical) -> Iterator[SpanSpreads]:
     for first in range(0, len(rows) - SPAN + 1, _PART):
         part = rows[first : first + _PART + SPAN - 1]
         cells = cell_table(part, np.zeros(6))
-        means = hold_last(
+        means = fill_with_previous(
             np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
         )
         before = means[_PART - 1 : _PART]
@@ -113,7 +113,7 @@ def _spans(rows: CellRows, usual: _Typical) -> Iterator[SpanSpreads]:
         yield first, spread, view.mean(axis=-1)
 
 
-def _typical(rows: CellRows) -> _Typical:
+def _typical_cells(rows: CellRows) -> _TypicalCells:
     """Usual values of the cells, by their medians."""
     every = -(-len(rows) // _SAMPLE)
     counts, steps = [], []
@@ -125,7 +125,7 @@ def _typical(rows: CellRows) -> _Typical:
         steps.append(np.diff(part[:, 0])[-first % every :: every])
     pause = PAUSES * max(float(np.median(np.concatenate(steps))), SPAN * CELL / PAUSES)
     flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
-    return _Typical(np.median(np.concatenate(counts), axis=0), pause, flips)
+    return _TypicalCells(np.median(np.concatenate(counts), axis=0), pause, flips)
 
 
 def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
@@ -133,7 +133,7 @@ def find_rest_runs(rows: CellRows, bound: Array) -> list[RestRun]:
 
     `bound` (6,) is the largest spread at rest of any device.
     """
-    usual = _typical(rows)
+    usual = _typical_cells(rows)
     every = -(-len(rows) // _SAMPLE)
     # all spans of a long recording do not fit into memory: they are calculated twice
     short = list(_spans(rows, usual)) if len(rows) <= _PART else []

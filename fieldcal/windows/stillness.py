@@ -153,5 +153,5 @@ class Stillness:
 
 
 def _zero_as_inf(allowed: Array) -> Array:
-    """What is allowed; a channel without noise is not judged."""
+    """Allowed motion, infinite for a channel without noise, which is not judged."""
     return np.where(allowed > 0, allowed, np.inf)

@@ -47,20 +47,20 @@ def stretch_end_reasons(
         before, after = rows[max(0, first - k) : first], rows[last + 1 : last + 1 + k]
         out.append(
             (
-                _reason(before[::-1], inside, origin, -1),
-                _reason(after, inside, origin, 1),
+                _end_reason(before[::-1], inside, origin, -1),
+                _end_reason(after, inside, origin, 1),
             )
         )
     return out
 
 
-def _reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
-    """What lies beyond one end; `beyond` are the cells there, nearest first."""
+def _end_reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
+    """Reason of one end of a stretch; `beyond` are the cells outside, nearest first."""
     edge = inside.times[-1 if side > 0 else 0]
     steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - CELL
     paused = np.flatnonzero(steps > PAUSE)
     near = beyond[: paused[0]] if len(paused) else beyond
-    if said := _motion(near, inside, origin):
+    if said := _motion_phrase(near, inside, origin):
         return said
     if len(paused):
         return f"a pause of {steps[paused[0]]:.3g} s"
@@ -69,8 +69,8 @@ def _reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
     return "it is cut, for it changes slowly"
 
 
-def _motion(near: Array, inside: CellTable, origin: Array) -> str:
-    """What moves in some cells beside a stretch; "" if nothing does."""
+def _motion_phrase(near: Array, inside: CellTable, origin: Array) -> str:
+    """Phrase about the motion in cells beside a stretch; "" without motion."""
     if not len(near):
         return ""
     cells = CellTable(near[:, 0], near[:, 1:], origin)

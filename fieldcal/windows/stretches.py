@@ -27,7 +27,7 @@ from fieldcal.windows.verdict import judge_window
 FEWEST = 3
 """Number of stretches below which rests may be too short for the usual margin."""
 
-SEAM = 2 * CELL
+SEAM_S = 2 * CELL
 """Largest gap between two parts of one rest that are evaluated separately, s."""
 
 _CLEARLY = 0.98
@@ -126,7 +126,7 @@ def _join_at_seams(
     out: list[tuple[float, float]] = []
     for some, same in zip(found, goes_on, strict=True):
         rest = list(some)
-        if same and out and rest and rest[0][0] - out[-1][1] < SEAM:
+        if same and out and rest and rest[0][0] - out[-1][1] < SEAM_S:
             out[-1] = (out[-1][0], rest.pop(0)[1])
         out += rest
     return out

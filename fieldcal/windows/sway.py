@@ -30,20 +30,20 @@ from fieldcal.windows.sway_waves import PERIODS, POINTS, SwayWaves
 LOWEST, HIGHEST = 0.06, 1.5
 """Frequencies at which bases sway, Hz: a long swell, a stiff tripod."""
 
-WIDEST = 40.0
+LONGEST_STRETCH_S = 40.0
 """Seconds that are evaluated together: longer windows are divided."""
 
-LEAST = 16
+FEWEST_CELLS = 16
 """Fewest cells that are evaluated."""
 
 ARM, GAUGE, LONGEST = 3.0, 0.02, 30.0
 """Typical arm r, m; typical error of scale factors; and the longest arm, m: at the
 length of a pendulum of the same period the part of gravity does not show."""
 
-WEAK = 0.01
+LEAST_POWER_SHARE = 0.01
 """Part of the strongest wave's power below which a wave counts as noise."""
 
-SMALLEST = float(np.deg2rad(0.1))
+LEAST_ROTATION = float(np.deg2rad(0.1))
 """Least rotation that is evaluated, rad: a smaller one changes the mean of gravity by
 less than 1e-5 m/s^2."""
 
@@ -67,13 +67,15 @@ def find_sway(t: Array, six: Array, scale: Array) -> list[SwayWaves]:
 
     Returns
     -------
-    Waves of each stretch of up to `WIDEST` seconds; empty where nothing sways.
+    Waves of each stretch of up to `LONGEST_STRETCH_S` s; empty if nothing sways.
 
     """
     seen = six if np.isfinite(six[:, 3:]).any() else six[:, :3]
     known = np.isfinite(seen).all(axis=1)
     t, six = t[known], seen[known]
-    parts = max(1, int(np.ceil((t[-1] - t[0]) / WIDEST))) if len(t) > 1 else 1
+    parts = (
+        max(1, int(np.ceil((t[-1] - t[0]) / LONGEST_STRETCH_S))) if len(t) > 1 else 1
+    )
     if parts > len(t):  # samples minutes apart, or times in another unit
         return []
     found = [
@@ -118,12 +120,12 @@ def _waves_of_stretch(t: Array, six: Array, scale: Array) -> SwayWaves | None:
 
 def _cells(t: Array, six: Array) -> tuple[Array, Array, float] | None:
     """Middles and means (m, c) of complete cells, and their length, s."""
-    if len(t) < LEAST:
+    if len(t) < FEWEST_CELLS:
         return None
     step = float(np.median(np.diff(t)))
     each = max(1, round(CELL / step))
     count = len(t) // each
-    if count < LEAST:
+    if count < FEWEST_CELLS:
         return None
     y = six[: count * each].reshape(count, each, -1).mean(axis=1)
     own = t[: count * each].reshape(count, each)
@@ -141,7 +143,7 @@ def _turn_angle(y: Array, scale: Array, length: float) -> Array:
 def _oscillates(angle: Array) -> bool:
     """Whether the rotation (m, 3), rad, oscillates enough to be evaluated."""
     about = without_waves(np.arange(float(len(angle))), angle, ())
-    return float((about**2).sum(axis=1).mean()) > SMALLEST**2 / 2
+    return float((about**2).sum(axis=1).mean()) > LEAST_ROTATION**2 / 2
 
 
 def _fit_arm(found: SwayWaves) -> SwayWaves | None:
@@ -172,5 +174,5 @@ def _significant(found: SwayWaves) -> SwayWaves:
     """The waves above noise: second derivatives of fast noise would dominate."""
     pulse = 2 * np.pi * found.hz
     power = (found.cos[:, 3:] ** 2 + found.sin[:, 3:] ** 2).sum(axis=1) / pulse**2
-    kept = power > WEAK * power.max()
+    kept = power > LEAST_POWER_SHARE * power.max()
     return replace(found, hz=found.hz[kept], cos=found.cos[kept], sin=found.sin[kept])

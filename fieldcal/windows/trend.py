@@ -29,8 +29,8 @@ def robust_lines(values: Array, step: Array | None = None) -> Array:
     return np.concatenate([_robust_line(section, step) for section in sections])
 
 
-def drift_course(values: Array, laid: Array) -> Array:
-    """Drift (m, c) of `values` (m, c), given the robust lines `laid` through them.
+def drift_course(values: Array, lines: Array) -> Array:
+    """Drift (m, c) of `values` (m, c), given the robust lines `lines` through them.
 
     Two neighbouring means cannot distinguish a drift from a step. In each section the
     one with the smaller residual is used: the line, or two means before and after the
@@ -39,7 +39,7 @@ def drift_course(values: Array, laid: Array) -> Array:
     rates = []
     sections = max(1, -(-len(values) // SECTION))
     for part, line in zip(
-        np.array_split(values, sections), np.array_split(laid, sections), strict=True
+        np.array_split(values, sections), np.array_split(lines, sections), strict=True
     ):
         drifts = ((part - line) ** 2).sum(axis=0) < _squares_beside_step(part)
         rate = np.where(drifts, line[-1] - line[0], 0.0) / max(1, len(line) - 1)
@@ -69,8 +69,8 @@ def _robust_line(values: Array, step: Array) -> Array:
     i, j = np.triu_indices(_PIECES, 1)
     slopes = (medians[j] - medians[i]) / ((j - i) * size)[:, None]
     tilt = np.arange(m)[:, None] * np.median(slopes, axis=0)
-    laid: Array = tilt + _median(values - tilt, step)
-    return laid
+    lines: Array = tilt + _median(values - tilt, step)
+    return lines
 
 
 def _median(values: Array, step: Array) -> Array:

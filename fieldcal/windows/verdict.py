@@ -104,11 +104,12 @@ def judge_window(
     cells: CellTable,
     limits: StillnessLimits,
     before: QuietNoise | None = None,
-    shows: Array | None = None,
+    visible_steps: Array | None = None,
 ) -> WindowVerdict:
     """Test the samples so far for rest, by their noise and that of earlier windows.
 
-    `shows` (6,) are the jumps by rounding alone, where the device states its rounding.
+    `visible_steps` (6,) are the jumps by rounding alone, where the device states its
+    rounding.
     """
     m = cells.complete_count
     if m < limits.unjudged_s / CELL:
@@ -117,18 +118,22 @@ def judge_window(
     means = cells.steady_means[:m]
     noise = estimate_quiet_noise(means, before)
     allowed = _threshold(m) * (1 + (EARLY / (CELL * noise.cells)) ** 2)
-    jumps = cells.rounding if shows is None else np.maximum(cells.rounding, shows)
-    laid = robust_lines(
+    jumps = (
+        cells.rounding
+        if visible_steps is None
+        else np.maximum(cells.rounding, visible_steps)
+    )
+    lines = robust_lines(
         means, cells.resolution / np.maximum(_samples_per_cell(cells), 1.0)
     )
     least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
     tests = _disturbance_statistics(
-        cells, means, laid, noise, _least_spreads(cells, least)
+        cells, means, lines, noise, _least_spreads(cells, least)
     )
     worst = [_worst_departure(cells, test, allowed) for test in tests] + _stuck_runs(
         cells
     )
-    worst.append(_drift_departure(cells, laid, noise, limits))
+    worst.append(_drift_departure(cells, lines, noise, limits))
     worst.append(_noise_departure(cells, noise.spread[0], limits))
     recent = [test.z[-_PRESENT:].max() for test in tests if test.cells < _PRESENT]
     return WindowVerdict(
@@ -147,12 +152,12 @@ def _threshold(cells: int) -> float:
 
 
 def _disturbance_statistics(
-    cells: CellTable, means: Array, laid: Array, noise: QuietNoise, least: LeastSpread
+    cells: CellTable, means: Array, lines: Array, noise: QuietNoise, least: LeastSpread
 ) -> list[DisturbanceStatistic]:
     m = len(means)
     return [
-        *pushes(means - laid, noise, least),
-        *steps(means - drift_course(means, laid), noise, least),
+        *pushes(means - lines, noise, least),
+        *steps(means - drift_course(means, lines), noise, least),
         *shakes(
             np.nan_to_num(cells.short_lag_variance[:m]), cells.step_counts[:m], least
         ),
@@ -221,10 +226,10 @@ def _worst_departure(
 
 
 def _drift_departure(
-    cells: CellTable, laid: Array, noise: QuietNoise, limits: StillnessLimits
+    cells: CellTable, lines: Array, noise: QuietNoise, limits: StillnessLimits
 ) -> Departure:
     """Change of the line over the window, against the limit and the noise."""
-    change = laid[-1] - laid[0]
+    change = lines[-1] - lines[0]
     ratio = np.abs(change) / (limits.drift + THRESHOLD * noise.allan[-1])
     channel = int(np.argmax(ratio))
     return Departure(

@@ -23,15 +23,15 @@ from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable, join_cells
 from fieldcal.windows.grain import rounding_variance, visible_step
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.longrun import MeanError, error_of_mean
 from fieldcal.windows.mean import Average
+from fieldcal.windows.mean_error import MeanError, error_of_mean
 from fieldcal.windows.quiet import QuietNoise
 from fieldcal.windows.verdict import WindowVerdict, judge_window
 
-FEWEST = 10
+FEWEST_CELLS = 10
 """Cells a window must have for its mean to have an error: 1 s of samples."""
 
-SETTLED = 15.0
+SETTLED_S = 15.0
 """Device time from which the gain of further averaging is judged, s."""
 
 GAIN_OF_DOUBLING = 0.9
@@ -54,7 +54,7 @@ class LearnedNoise:
     shape_likelihood: Array
 
     @property
-    def without_wander(self) -> LearnedNoise:
+    def spectrum_shape_only(self) -> LearnedNoise:
         """The shape of the spectrum alone, which also holds in more wind or by hand."""
         return replace(self, quiet=None)
 
@@ -97,9 +97,9 @@ class Window:
     def add(self, block: Block) -> None:
         """Take in the block that follows; costs as much as the block is long."""
         self._sum.add(block)
-        self._changed()
+        self._rebuild_cells()
 
-    def _changed(self) -> None:
+    def _rebuild_cells(self) -> None:
         own = self._sum.table.with_values
         self._cells = reduce(join_cells, (*(p.cells for p in self._pieces), own))
         self._error = self._verdict = self._covariance = None
@@ -112,7 +112,7 @@ class Window:
     def truncate(self, at: float) -> None:
         """Discard the cells that end after an instant, s of device time."""
         self._sum.truncate(at)
-        self._changed()
+        self._rebuild_cells()
 
     @property
     def start(self) -> float:
@@ -159,16 +159,18 @@ class Window:
     def covariance(self) -> Array:
         """Covariance of the mean so far, (6, 6); nan in the first second."""
         if self._covariance is None:
-            self._covariance = self._widened()
+            self._covariance = self._mean_covariance()
         return self._covariance
 
-    def _widened(self) -> Array:
+    def _mean_covariance(self) -> Array:
         """Covariance, increased for rounding and for missing samples."""
-        if len(self._cells) < FEWEST:
+        if len(self._cells) < FEWEST_CELLS:
             return np.full((6, 6), np.nan)
         whole = self._mean_error().covariance
-        along = _with_variance_along(whole[:6, :6], self._along, float(whole[6, 6]))
-        covariance = along + np.diag(self._rounding())
+        along = _with_variance_along(
+            whole[:6, :6], self._force_direction, float(whole[6, 6])
+        )
+        covariance = along + np.diag(self._rounding_variance())
         known = np.isfinite(self._cells.means).mean(axis=0)
         share = np.where(known > 0, known, np.nan)
         widened: Array = covariance / np.outer(share, share)
@@ -177,23 +179,23 @@ class Window:
     @property
     def motion_now(self) -> float:
         """Motion in the last second over the allowed motion; above 1 it moves."""
-        return self._judged().ratio_now
+        return self._current_verdict().ratio_now
 
     @property
     def largest_motion(self) -> float:
         """Largest departure from rest over the allowed one; above 1 it moved."""
-        return self._judged().worst.ratio
+        return self._current_verdict().worst.ratio
 
     @property
     def disturbance(self) -> Moved | None:
         """The disturbance, if there was one; None while the window is good."""
-        worst = self._judged().worst
+        worst = self._current_verdict().worst
         return worst.as_error(self.start) if worst.ratio > 1 else None
 
     @property
     def noise(self) -> LearnedNoise | None:
         """Noise learned for the next window, if any."""
-        quiet = self._judged().quiet
+        quiet = self._current_verdict().quiet
         return (
             LearnedNoise(quiet, self._mean_error().shape_likelihood)
             if quiet
@@ -211,10 +213,10 @@ class Window:
                 f"each accelerometer mean is known to {np.nanmax(sigma):.2g} m/s², "
                 f"{target:.2g} m/s² was wanted"
             )
-        if self.elapsed < SETTLED or not np.isfinite(sigma).any():
+        if self.elapsed < SETTLED_S or not np.isfinite(sigma).any():
             return None
         twice = np.sqrt(
-            self._mean_error().sigma_of_doubled[:6] ** 2 + self._rounding()
+            self._mean_error().sigma_of_doubled[:6] ** 2 + self._rounding_variance()
         )[:3]
         open_ = np.isfinite(sigma) & (sigma > (target or 0.0))
         if (twice[open_] > GAIN_OF_DOUBLING * sigma[open_]).all():
@@ -236,17 +238,17 @@ class Window:
             If it is too short for its mean to have an error.
 
         """
-        if len(self._cells) < FEWEST:
+        if len(self._cells) < FEWEST_CELLS:
             raise InputError(
                 f"a window of {self.n} samples over {self.elapsed:.2g} s is too short "
-                f"for its mean to have an error: take {FEWEST * CELL:g} s or more"
+                f"for its mean to have an error: take {FEWEST_CELLS * CELL:g} s or more"
             )
         if moved := self.disturbance:
             raise moved
         start, end = self.start, self.end
         return Average(self.mean, self.covariance, self.temperature, self.n, start, end)
 
-    def _judged(self) -> WindowVerdict:
+    def _current_verdict(self) -> WindowVerdict:
         if self._verdict is None:
             before = self._before.quiet if self._before else None
             sampled = np.nan_to_num(self._cells.noise)
@@ -258,18 +260,18 @@ class Window:
         if self._error is None:
             before = self._before.shape_likelihood if self._before else None
             means = self._cells.steady_means
-            seven = np.column_stack([means, means @ self._along])
+            seven = np.column_stack([means, means @ self._force_direction])
             self._error = error_of_mean(seven, self._cells.spacing, before)
         return self._error
 
     @property
-    def _along(self) -> Array:
+    def _force_direction(self) -> Array:
         """Direction of the mean specific force among the channels, (6,)."""
         f = np.nan_to_num(self.mean) * (np.arange(6) < 3)
         length = np.linalg.norm(f)
         return f / length if length > 0 else f
 
-    def _rounding(self) -> Array:
+    def _rounding_variance(self) -> Array:
         sampled = np.nan_to_num(self._cells.noise)
         return rounding_variance(
             self._grain, self.mean, sampled, self._cells.resolution

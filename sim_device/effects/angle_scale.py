@@ -14,13 +14,13 @@ from fieldcal.sim_device.effect import Example, SimulatedEffect
 
 
 class SimulatedAngleScale(SimulatedEffect):
-    """The scale of each gauge."""
+    """Scale error of each joint's gauge."""
 
     VECTOR = ("alpha", "beta")
     ORDER = 0
     EXAMPLE = Example({"alpha": 8e-3, "beta": -6e-3})
 
     def joint_setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
-        """The scale of each gauge."""
+        """Scale error of each joint's gauge."""
         scale = self.column(self.VECTOR)[:, 0]
         return lambda angles: angles * (1 + scale)

@@ -14,13 +14,13 @@ from fieldcal.sim_device.effect import NOT_NEGATIVE, Example, Number, SimulatedE
 
 
 class SimulatedAngleSetting(SimulatedEffect):
-    """The scatter of the hand that sets the angles."""
+    """Random error of the angles that are set by hand."""
 
     NUMBERS = {"sigma_deg": Number(range=NOT_NEGATIVE)}
     ORDER = 2
     EXAMPLE = Example({"sigma_deg": 0.15})
 
     def joint_setting(self, rng: np.random.Generator) -> Callable[[Array], Array]:
-        """The scatter of the hand that sets the angles."""
+        """Random error of the angles that are set by hand."""
         sigma = np.deg2rad(self["sigma_deg"])
         return lambda angles: angles + sigma * rng.standard_normal(2)

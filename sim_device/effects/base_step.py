@@ -20,7 +20,7 @@ LASTS_S = 0.2
 
 
 class SimulatedBaseStep(SimulatedEffect):
-    """The tilt that stays."""
+    """Tilt of the base after the step."""
 
     VECTOR = ("about_x_deg", "about_z_deg")
     NUMBERS = {"at_s": Number()}

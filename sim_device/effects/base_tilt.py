@@ -12,7 +12,7 @@ from fieldcal.sim_device.quaternion import multiply, turn
 
 
 class SimulatedBaseTilt(SimulatedEffect):
-    """The tilt of the base."""
+    """Tilt of the base."""
 
     VECTOR = ("about_x_deg", "about_z_deg")
     EXAMPLE = Example({"about_x_deg": 0.5, "about_z_deg": -0.7})

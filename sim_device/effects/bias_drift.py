@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedBiasDrift(SimulatedEffect):
-    """What has drifted since the device was switched on."""
+    """Drift of the biases since the device was switched on."""
 
     VECTOR = SIX
     EXAMPLE = Example({"ax": 5e-5, "gy": 2e-6, "az": -4e-5})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What has drifted since the device was switched on."""
+        """Drift of the biases since the device was switched on."""
         more: Array = self.column(SIX) * conditions.t
         return more

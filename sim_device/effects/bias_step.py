@@ -13,7 +13,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedBiasStep(SimulatedEffect):
-    """What has come by the step."""
+    """Step of the biases."""
 
     VECTOR = SIX
     NUMBERS = {"at_s": Number()}
@@ -21,7 +21,7 @@ class SimulatedBiasStep(SimulatedEffect):
     EXAMPLE = Example({"ax": 0.01, "az": -0.008, "at_s": 101.0})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What has come by the step."""
+        """Step of the biases."""
         more: Array = self.column(SIX) * np.where(
             conditions.t >= self["at_s"], 1.0, 0.0
         )

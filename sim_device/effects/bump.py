@@ -23,7 +23,7 @@ PEAK = 6**3 / 7**3 / np.sqrt(7)
 
 
 class SimulatedBump(SimulatedEffect):
-    """The bump of the base."""
+    """Single disturbance of the base."""
 
     NUMBERS = {
         "at_s": Number(),

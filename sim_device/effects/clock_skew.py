@@ -6,7 +6,7 @@ from fieldcal.sim_device.effect import Example, Number, Range, SimulatedEffect
 
 
 class SimulatedClockSkew(SimulatedEffect):
-    """How fast, in parts per million."""
+    """Rate error of the device's clock, parts per million."""
 
     NUMBERS = {
         "ppm": Number(range=Range("between -100000 and 100000", lambda v: abs(v) < 1e5))

@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedCrossCoupling(SimulatedEffect):
-    """What the axes across add to the accelerometers."""
+    """Cross-coupling of the accelerometers."""
 
     VECTOR = matrix_names("k", diagonal=False)
     EXAMPLE = Example({"k13": 3e-3, "k21": -2e-3, "k32": 4e-3})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the axes across add to the accelerometers."""
+        """Cross-coupling of the accelerometers."""
         more: Array = of_acc(self.matrix("k", conditions.f))
         return more

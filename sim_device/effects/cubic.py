@@ -13,13 +13,13 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedCubic(SimulatedEffect):
-    """What the cube of the force adds."""
+    """Output by the cube of the force."""
 
     VECTOR = AXES
     EXAMPLE = Example({"x": 2e-5, "y": -3e-5, "z": 2e-5})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the cube of the force adds."""
+        """Output by the cube of the force."""
         more: Array = of_acc(
             self.column(AXES) * conditions.f * conditions.f * conditions.f
         )

@@ -37,7 +37,7 @@ WRAPPED_ACC, WRAPPED_GYR = 8.0, 0.2
 
 
 class SimulatedDecodeFault(SimulatedEffect):
-    """The kind of fault, and the output or several."""
+    """Kind of the decoding fault, and the affected outputs."""
 
     NUMBERS = {"full_scale": Number(0.0, NOT_NEGATIVE)}
     WORDS = {"channel": CHANNEL, "kind": Word("|".join(KINDS))}

@@ -11,7 +11,7 @@ from fieldcal.sim_device.effect import Example, Number, Range, SimulatedEffect
 
 
 class SimulatedDropped(SimulatedEffect):
-    """The fraction that gets lost."""
+    """Fraction of samples that are lost."""
 
     NUMBERS = {
         "fraction": Number(range=Range("0 or more, below 1", lambda v: 0 <= v < 1))

@@ -10,7 +10,7 @@ from fieldcal.sim_device.effect import Example, SimulatedEffect
 
 
 class SimulatedEarthRate(SimulatedEffect):
-    """A device that is on the Earth."""
+    """Rotation of the Earth, which the gyroscopes measure."""
 
     REPEATS = True
     FEELS_EARTH = True

@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedG2Sensitivity(SimulatedEffect):
-    """What the square of the force adds to the gyroscopes."""
+    """Gyroscope output by the square of the force."""
 
     VECTOR = AXES
     EXAMPLE = Example({"x": 4e-6, "y": -5e-6, "z": 5e-6})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the square of the force adds to the gyroscopes."""
+        """Gyroscope output by the square of the force."""
         more: Array = of_gyr(self.column(AXES) * conditions.f**2)
         return more

@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGSensitivity(SimulatedEffect):
-    """What the force adds to the gyroscopes."""
+    """Gyroscope output by the force."""
 
     VECTOR = matrix_names("g")
     EXAMPLE = Example({"g12": 5e-5, "g23": -6e-5, "g31": 7e-5})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the force adds to the gyroscopes."""
+        """Gyroscope output by the force."""
         more: Array = of_gyr(self.matrix("g", conditions.f))
         return more

@@ -9,7 +9,7 @@ from fieldcal.sim_device.effect import Example, Number, Range, SimulatedEffect
 
 
 class SimulatedGravityError(SimulatedEffect):
-    """Another gravity."""
+    """Gravity that differs from the site's nominal value."""
 
     NUMBERS = {
         "relative": Number(

@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroCrossCoupling(SimulatedEffect):
-    """What the axes across add to the gyroscopes."""
+    """Cross-coupling of the gyroscopes."""
 
     VECTOR = matrix_names("s", diagonal=False)
     EXAMPLE = Example({"s13": 1e-2, "s31": -1.2e-2, "s23": 1.5e-2})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the axes across add to the gyroscopes."""
+        """Cross-coupling of the gyroscopes."""
         more: Array = of_gyr(self.matrix("s", conditions.w))
         return more

@@ -19,12 +19,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroProducts(SimulatedEffect):
-    """What products of the rates add."""
+    """Gyroscope output by products of the rates."""
 
     VECTOR = matrix_names("p")
     EXAMPLE = Example({"p11": 5e-3, "p22": -6e-3, "p33": 4e-3}, turntable=True)
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What products of the rates add."""
+        """Gyroscope output by products of the rates."""
         more: Array = of_gyr(self.matrix("p", pairs(conditions.w)))
         return more

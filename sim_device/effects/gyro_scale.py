@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedGyroScale(SimulatedEffect):
-    """What the gyroscopes show too much."""
+    """Scale factor error of the gyroscopes."""
 
     VECTOR = ("s1", "s2", "s3")
     EXAMPLE = Example({"s1": 2e-2, "s2": -1e-2, "s3": 1.5e-2})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the gyroscopes show too much."""
+        """Scale factor error of the gyroscopes."""
         more: Array = of_gyr(self.column(self.VECTOR) * conditions.w)
         return more

@@ -16,7 +16,7 @@ from fieldcal.sim_device.quaternion import multiply, turn
 
 
 class SimulatedHeadingError(SimulatedEffect):
-    """The turn of the base about the vertical."""
+    """Rotation of the base about the vertical."""
 
     NUMBERS = {"psi_deg": Number()}
     NEEDS_EARTH = True

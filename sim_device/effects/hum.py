@@ -13,7 +13,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedHum(SimulatedEffect):
-    """The line in each output."""
+    """Oscillation at one frequency in each output."""
 
     VECTOR = SIX
     NUMBERS = {"hz": Number(range=ABOVE_ZERO), "phase_deg": Number(0.0)}
@@ -21,7 +21,7 @@ class SimulatedHum(SimulatedEffect):
     EXAMPLE = Example({"ax": 0.01, "ay": 0.008, "hz": 7.0})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """The line in each output."""
+        """Oscillation at one frequency in each output."""
         phase = 2 * np.pi * self["hz"] * conditions.t + np.deg2rad(self["phase_deg"])
         wave: Array = np.sin(phase)
         return self.column(SIX) * wave

@@ -19,7 +19,7 @@ STEP = 1e-3
 
 
 class SimulatedIncrements(SimulatedEffect):
-    """What increments have beside means."""
+    """Sculling and coning terms of increments."""
 
     NUMBERS = {"sculling": Number(0.0), "coning": Number(0.0)}
     EXAMPLE = Example({"sculling": 0.005, "coning": 4e-4}, in_motion=True)

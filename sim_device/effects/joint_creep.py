@@ -18,7 +18,7 @@ from fieldcal.sim_device.joints import Creep
 
 
 class SimulatedJointCreep(SimulatedEffect):
-    """How far alpha and beta overshoot, and how slowly they relax."""
+    """Overshoot of alpha and beta, and time constant of their relaxation."""
 
     VECTOR = ("alpha_deg", "beta_deg")
     NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}

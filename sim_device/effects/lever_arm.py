@@ -14,7 +14,7 @@ from fieldcal.sim_device.motion import Installation
 
 
 class SimulatedLeverArm(SimulatedEffect):
-    """The way from the turning centre to the sensors, m."""
+    """Vector from the centre of rotation to the sensors, m."""
 
     VECTOR = AXES
     EXAMPLE = Example({"x": 0.2, "y": -0.15, "z": 0.1})

@@ -29,7 +29,7 @@ UNITS = {
 
 
 class SimulatedMounting(SimulatedEffect):
-    """Axes and unit as they are."""
+    """True axes and unit, which session.toml states wrongly."""
 
     WORDS = {
         "axes": Word(r"(?:[+-][xyz]){3}", "", "like +x-z+y"),

@@ -16,7 +16,7 @@ from fieldcal.sim_device.effect import (
 
 
 class SimulatedNoiseLevel(SimulatedEffect):
-    """The ratio of one output, or of some."""
+    """Ratio of the noise of some outputs to their noise figures."""
 
     NUMBERS = {"ratio": Number(range=ABOVE_ZERO)}
     WORDS = {"channel": CHANNEL}

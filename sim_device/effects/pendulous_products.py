@@ -19,12 +19,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedPendulousProducts(SimulatedEffect):
-    """What products of the forces add."""
+    """Accelerometer output by products of the forces."""
 
     VECTOR = matrix_names("l")
     EXAMPLE = Example({"l11": 2e-4, "l22": -2e-4, "l33": 2e-4})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What products of the forces add."""
+        """Accelerometer output by products of the forces."""
         more: Array = of_acc(self.matrix("l", pairs(conditions.f)))
         return more

@@ -13,12 +13,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedQuadratic(SimulatedEffect):
-    """What the square of the force adds."""
+    """Accelerometer output by the square of the force."""
 
     VECTOR = AXES
     EXAMPLE = Example({"x": 1e-4, "y": -8e-5, "z": 1.2e-4})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the square of the force adds."""
+        """Accelerometer output by the square of the force."""
         more: Array = of_acc(self.column(AXES) * conditions.f**2)
         return more

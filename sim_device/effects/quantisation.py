@@ -9,7 +9,7 @@ from fieldcal.sim_device.effect import Example, SimulatedEffect, Stage, rows
 
 
 class SimulatedQuantisation(SimulatedEffect):
-    """The least significant bits."""
+    """Least significant bit of each triad."""
 
     VECTOR = ("acc", "gyr")
     ORDER = 2

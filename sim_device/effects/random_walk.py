@@ -9,11 +9,11 @@ from fieldcal.sim_device.random_process import Walk
 
 
 class SimulatedRandomWalk(SimulatedEffect):
-    """The walk of each bias."""
+    """Random walk of each bias."""
 
     VECTOR = SIX
     EXAMPLE = Example({"ax": 8e-4, "ay": 8e-4, "az": 8e-4})
 
     def random_bias(self, rate: float, rng: np.random.Generator) -> Walk:
-        """The walk of each bias."""
+        """Random walk of each bias."""
         return Walk(self.column(SIX)[:, 0], rate, rng)

@@ -17,7 +17,7 @@ from fieldcal.sim_device.effect import (
 
 
 class SimulatedSaturation(SimulatedEffect):
-    """The limit of an output, or of some."""
+    """Limit at which some outputs are clipped."""
 
     NUMBERS = {"limit": Number(range=ABOVE_ZERO)}
     WORDS = {"channel": CHANNEL}

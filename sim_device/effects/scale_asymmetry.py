@@ -15,12 +15,12 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedScaleAsymmetry(SimulatedEffect):
-    """What the size of the force adds."""
+    """Accelerometer output by the magnitude of the force."""
 
     VECTOR = AXES
     EXAMPLE = Example({"x": 3e-3, "y": -2e-3, "z": 2e-3})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the size of the force adds."""
+        """Accelerometer output by the magnitude of the force."""
         more: Array = of_acc(self.column(AXES) * np.abs(conditions.f))
         return more

@@ -15,7 +15,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedSettling(SimulatedEffect):
-    """What is left of the last turn."""
+    """Remaining bias change since the last turn."""
 
     VECTOR = SIX
     NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}
@@ -23,7 +23,7 @@ class SimulatedSettling(SimulatedEffect):
     EXAMPLE = Example({"ax": 0.03, "ay": 0.02, "az": -0.03, "tau_s": 4.0})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What is left of the last turn."""
+        """Remaining bias change since the last turn."""
         after = np.exp(-np.maximum(conditions.since_turn, 0.0) / self["tau_s"])
         turned = np.where(conditions.turn_progress > 0, 1.0, 0.0)
         left: Array = turned * np.where(

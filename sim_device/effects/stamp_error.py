@@ -16,7 +16,7 @@ from fieldcal.sim_device.effect import NOT_NEGATIVE, Example, Number, SimulatedE
 
 
 class SimulatedStampError(SimulatedEffect):
-    """Share of the errors that is none of the samples', their rms and steps, s."""
+    """Share of the stamps' unevenness that is their error, its rms and steps, s."""
 
     NUMBERS = {
         "share": Number(1.0),

@@ -16,7 +16,7 @@ from fieldcal.sim_device.effect import (
 
 
 class SimulatedStuck(SimulatedEffect):
-    """The stretch of time, and the output or several."""
+    """Stretch of time, and the affected outputs."""
 
     NUMBERS = {"from_s": Number(), "to_s": Number()}
     WORDS = {"channel": CHANNEL}

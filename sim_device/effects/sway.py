@@ -33,7 +33,7 @@ GOLDEN = (1 + 5**0.5) / 2
 
 
 class SimulatedSway(SimulatedEffect):
-    """The swaying of the base."""
+    """Oscillation of the base."""
 
     NUMBERS = {
         "amplitude_deg": Number(),

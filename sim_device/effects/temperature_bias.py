@@ -13,7 +13,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedTemperatureBias(SimulatedEffect):
-    """What the change of temperature adds."""
+    """Bias change by the change of temperature."""
 
     VECTOR = SIX
     EXAMPLE = Example(
@@ -22,6 +22,6 @@ class SimulatedTemperatureBias(SimulatedEffect):
     )
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the change of temperature adds."""
+        """Bias change by the change of temperature."""
         more: Array = self.column(SIX) * conditions.temperature_rise
         return more

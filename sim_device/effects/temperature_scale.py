@@ -13,7 +13,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedTemperatureScale(SimulatedEffect):
-    """What the change of temperature adds to the force."""
+    """Scale factor change by the change of temperature."""
 
     VECTOR = AXES
     EXAMPLE = Example(
@@ -21,7 +21,7 @@ class SimulatedTemperatureScale(SimulatedEffect):
     )
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the change of temperature adds to the force."""
+        """Scale factor change by the change of temperature."""
         more: Array = of_acc(
             self.column(AXES) * conditions.temperature_rise * conditions.f
         )

@@ -18,7 +18,7 @@ CYCLING = [[float(t), 20 + 6 * math.sin(t / 35.0)] for t in range(0, 400, 5)]
 
 
 class SimulatedThermalHysteresis(SimulatedEffect):
-    """What the rate of the temperature adds."""
+    """Bias change by the rate of the temperature."""
 
     VECTOR = SIX
     EXAMPLE = Example(
@@ -26,6 +26,6 @@ class SimulatedThermalHysteresis(SimulatedEffect):
     )
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the rate of the temperature adds."""
+        """Bias change by the rate of the temperature."""
         more: Array = self.column(SIX) * conditions.temperature_rate
         return more

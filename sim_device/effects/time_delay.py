@@ -6,7 +6,7 @@ from fieldcal.sim_device.effect import Example, Number, Range, SimulatedEffect
 
 
 class SimulatedTimeDelay(SimulatedEffect):
-    """How late, s."""
+    """Delay of the gyroscopes, s."""
 
     NUMBERS = {
         "seconds": Number(range=Range("between -1 and 1", lambda v: abs(v) <= 1))
@@ -14,5 +14,5 @@ class SimulatedTimeDelay(SimulatedEffect):
     EXAMPLE = Example({"seconds": 0.03})
 
     def lag(self) -> float:
-        """How late, s."""
+        """Delay of the gyroscopes, s."""
         return self["seconds"]

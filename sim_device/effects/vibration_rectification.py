@@ -23,14 +23,14 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedVibrationRectification(SimulatedEffect):
-    """What the vibration is rectified to."""
+    """Accelerometer output by rectified vibration."""
 
     VECTOR = AXES
     NUMBERS = {"level": Number(0.3, NOT_NEGATIVE)}
     EXAMPLE = Example({"x": 0.08, "y": -0.09, "z": 0.08}, window_s=25.0, vibration=1.5)
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What the vibration is rectified to."""
+        """Accelerometer output by rectified vibration."""
         more: Array = of_acc(self.column(AXES) * conditions.vibration**2)
         return more
 

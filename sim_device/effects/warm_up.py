@@ -15,7 +15,7 @@ from fieldcal.sim_device.sensor_conditions import SensorConditions
 
 
 class SimulatedWarmUp(SimulatedEffect):
-    """What is left of the start."""
+    """Remaining bias change since the device was switched on."""
 
     VECTOR = SIX
     NUMBERS = {"tau_s": Number(range=ABOVE_ZERO)}
@@ -23,6 +23,6 @@ class SimulatedWarmUp(SimulatedEffect):
     EXAMPLE = Example({"ax": 0.03, "ay": -0.02, "gx": 4e-4, "tau_s": 90.0})
 
     def added_output(self, conditions: SensorConditions) -> Array:
-        """What is left of the start."""
+        """Remaining bias change since the device was switched on."""
         more: Array = self.column(SIX) * np.exp(-conditions.t / self["tau_s"])
         return more

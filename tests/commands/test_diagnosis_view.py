@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fieldcal.commands.diagnosis_view import show
+from fieldcal.commands.diagnosis_view import show_diagnosis
 from fieldcal.diagnosis.result import (
     CalibrationGroup,
     Diagnosis,
@@ -88,7 +88,7 @@ def screen(
     found: Diagnosis, width: int, details: bool = False, height: int | None = None
 ) -> str:
     out = io.StringIO()
-    show(found, out=out, details=details, width=width, height=height)
+    show_diagnosis(found, out=out, details=details, width=width, height=height)
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines()) + "\n"
 
 

@@ -19,12 +19,8 @@ from rich.table import Table
 from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
-from fieldcal.commands.console import ShownConsole
-from fieldcal.core.escaping import (
-    INVISIBLE_CATEGORIES,
-    escape_invisible,
-    escape_line,
-)
+from fieldcal.commands.console import EscapingConsole
+from fieldcal.core.escaping import INVISIBLE_CATEGORIES, escape_invisible, escape_line
 from fieldcal.run import junit
 from fieldcal.session import description
 from fieldcal.sim_device.profile import Profile
@@ -65,7 +61,7 @@ def test_nothing_unseen_is_left_and_what_is_shown_stays(text: str) -> None:
 
 def test_a_console_draws_and_carries_out_nothing() -> None:
     out = io.StringIO()
-    console = ShownConsole(file=out, force_terminal=True, width=200)
+    console = EscapingConsole(file=out, force_terminal=True, width=200)
     console.print(EVIL, style="bold")
     table = Table("name")
     table.add_row(EVIL)

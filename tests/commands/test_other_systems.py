@@ -129,7 +129,7 @@ def test_letters_that_a_terminal_lacks_are_spelled(
     plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stdout", out)
     monkeypatch.setattr(sys, "stderr", plain)
-    spelling.spell_out()
+    spelling.use_spellings()
     for stream in (out, plain):
         stream.write("α = 22.5° ± 0.1° → β, χ² ≤ 3 σ ╭─┐ █")
         stream.flush()

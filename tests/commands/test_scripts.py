@@ -75,7 +75,7 @@ def test_the_last_event_has_the_exit_code_of_what_nobody_foresaw(
     def broken(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(run, "_shown_on", broken)
+    monkeypatch.setattr(run, "_run_and_show", broken)
     url = f"replay:{session}/samples.parquet?speed=max"
     call = ["run", "two_position", "--device", url, "--headless"]
     assert main([*call, "-o", str(tmp_path / "r")]) == 70

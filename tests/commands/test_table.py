@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from calibrations import calibration
 
-from fieldcal.commands.table import concealed_values, show
+from fieldcal.commands.table import show_calibration, true_values
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_an_estimate_that_nothing_checks_is_not_called_good(
 ) -> None:
     found = calibration(np.random.default_rng(1), 0.0)
     out = io.StringIO()
-    show(replace(found, chi2=chi2, dof=dof, good=good), out=out)
+    show_calibration(replace(found, chi2=chi2, dof=dof, good=good), out=out)
     (verdict,) = [line for line in out.getvalue().splitlines() if "verdict" in line]
     assert says in verdict
 
@@ -37,7 +37,7 @@ def test_words_of_an_effect_are_no_values() -> None:
             "cross_coupling": {"k12": 0.003},
         },
     }
-    assert concealed_values(truth) == {
+    assert true_values(truth) == {
         "acc_bias.x": 0.1, "acc_bias.y": 0.2, "acc_bias.z": 0.3,
         "decode_fault.full_scale": 0.0, "cross_coupling.k12": 0.003,
     }  # fmt: skip

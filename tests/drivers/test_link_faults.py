@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from processes import TWO_POSITION, steady, turned, wait_for_samples
 
-from fieldcal.commands.virtual import address
+from fieldcal.commands.virtual_address import driver_address
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
@@ -70,7 +70,12 @@ class Run:
         self.truth = self._device.truth
         self._process = subprocess.Popen(
             [*TWO_POSITION, f"--seconds={seconds}", "--latitude=50.45", "--json"]
-            + ["--device", address(options, self._device.port), "-o", str(self.folder)],
+            + [
+                "--device",
+                driver_address(options, self._device.port),
+                "-o",
+                str(self.folder),
+            ],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -235,7 +240,7 @@ def ended(folder: Path, link: str, fault: str) -> tuple[Path, int, str]:
     """Session, exit code and last line of a run that a fault ends."""
     options = [*LINKS[link].format(folder).split(), "--speed", "20"]
     with VirtualMover(options) as device:
-        url = address(options, device.port) + "&reconnect=0"
+        url = driver_address(options, device.port) + "&reconnect=0"
         code, said = failed(device, url, folder / "s", {fault: 1e6})
     return folder / "s", code, said
 

@@ -26,7 +26,7 @@ from fieldcal.drivers.mavlink_installed import (
     InstalledCalibration,
     parameter_names,
 )
-from fieldcal.exporters import ExportSource, ardupilot, exporter, formats, px4
+from fieldcal.exporters import ExportSource, ardupilot, format_names, load_exporter, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
 from fieldcal.session.schemas import load_schema
@@ -62,7 +62,7 @@ def test_an_autopilot_corrects_raw_samples_as_apply_does(
         acc, gyr = corrected(dict(found.values), number, instance, raw)
         np.testing.assert_allclose(acc, cal.apply(raw).acc, atol=1e-12)
         np.testing.assert_allclose(gyr, cal.apply(raw).gyr, atol=1e-12)
-        assert not found.says
+        assert not found.notices
 
 
 @pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
@@ -102,11 +102,11 @@ def test_what_an_autopilot_has_no_place_for_is_said_with_its_size() -> None:
         acc, _ = corrected(dict(found.values), ARDUPILOT, 0, raw)
         true = cal.apply(raw).acc
         error = np.abs(acc - true).max(axis=1) / np.linalg.norm(true, axis=1)
-        (said,) = [s for s in found.says if s.startswith("cross_coupling")]
+        (said,) = [s for s in found.notices if s.startswith("cross_coupling")]
         bound = float(said.split(" m/s^2")[0].rpartition(" ")[2]) / 9.80665
         assert error.max() <= bound * 1.01
         assert error.max() > 0.3 * bound
-        assert any(s.startswith("gyr_scale") for s in found.says)
+        assert any(s.startswith("gyr_scale") for s in found.notices)
 
 
 def test_parameters_of_another_program_or_a_turned_board_are_refused() -> None:
@@ -143,7 +143,7 @@ def made(tmp_path: Path) -> tuple[ExportSource, Block, Block]:
 
 
 def written(made: ExportSource, name: str, folder: Path) -> Path:
-    module = exporter(name)
+    module = load_exporter(name)
     path = folder / f"out{module.ENDING}"
     module.write(made, path)
     return path
@@ -282,21 +282,21 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     )
     some = replace(made[0], calibration=few)
     for name in ("imu_tk", "kalibr", "ros", "json"):
-        says = exporter(name).write(some, tmp_path / name)
+        says = load_exporter(name).write(some, tmp_path / name)
         assert any("gyr_scale.y" in sentence for sentence in says)
-    says = exporter("ardupilot").write(some, tmp_path / "a.param")
+    says = load_exporter("ardupilot").write(some, tmp_path / "a.param")
     assert "gyr_bias was not determined: not written" in says
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", format_names())
 def test_the_command_writes_every_format_and_overwrites_none(
     name: str,
     made: tuple[ExportSource, Block, Block],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    module = exporter(name)
+    module = load_exporter(name)
     assert "raw" in (module.__doc__ or "") and module.WHAT
     call = ["export", str(tmp_path / "s"), "--format", name, "-o", str(tmp_path / "o")]
     assert main(call) == 0

@@ -139,4 +139,4 @@ def test_wrong_calls_are_refused(tree: Path, tmp_path: Path) -> None:
         [str(tree), "--jobs", "0"],
     ):
         assert main(["batch", *wrong]) == 2
-    assert command.TABLE.endswith(".parquet")
+    assert command.DEFAULT_TABLE.endswith(".parquet")

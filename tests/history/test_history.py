@@ -15,8 +15,8 @@ import pytest
 from fieldcal.acceptance.assessment import assess, store_in_history
 from fieldcal.calibration import Calibration, limits
 from fieldcal.cli import main
-from fieldcal.commands.history import lines
-from fieldcal.commands.report import write
+from fieldcal.commands.history import trend_lines
+from fieldcal.commands.report import write_report
 from fieldcal.core.errors import InputError
 from fieldcal.evaluation.observations import observe, usable_windows
 from fieldcal.history.location import default_location
@@ -188,7 +188,7 @@ def test_a_run_out_of_family_is_flagged_and_the_next_is_not(tmp_path: Path) -> N
     points = parameter_trend(history.runs("A1"), "acc_bias.x", BOUNDS)
     assert [p.run.number for p in points if p.out_of_family] == [13]
     assert 0.01 < points[-1].spread < 0.05
-    shown = lines(points)
+    shown = trend_lines(points)
     assert max(map(len, shown)) <= 80
     assert [i for i, line in enumerate(shown) if line.endswith("OUT")] == [12]
     columns = [line.index("o", line.index("|")) for line in shown]
@@ -222,7 +222,7 @@ def test_the_report_shows_what_the_history_of_the_device_has(tmp_path: Path) -> 
     session = bench(tmp_path / "s")
     assert main(["solve", str(session.folder)]) in (0, 1)
     filled(tmp_path / "h.sqlite", 0.2, 0.21)
-    page = write(session.folder, history=tmp_path / "h.sqlite").read_text()
+    page = write_report(session.folder, history=tmp_path / "h.sqlite").read_text()
     assert "2026-03-01" in page and "2026-03-02" in page
-    alone = write(session.folder, history=tmp_path / "none.sqlite").read_text()
+    alone = write_report(session.folder, history=tmp_path / "none.sqlite").read_text()
     assert "2026-03-01" not in alone

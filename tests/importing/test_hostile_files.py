@@ -15,7 +15,7 @@ from mcap.writer import Writer
 from small_files import SMALL
 
 from fieldcal.cli import main
-from fieldcal.commands.import_recording import folders_of
+from fieldcal.commands.import_recording import stream_folders
 from fieldcal.session.marks import mark_line
 
 NAMES = "t,ax,ay,az,gx,gy,gz"
@@ -197,7 +197,9 @@ def test_a_pipe_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_topics_that_differ_in_signs_have_folders_of_their_own() -> None:
-    assert len({*folders_of(["/a/b", "/a_b", "/A_b", "a b", "..", "/"]).values()}) == 6
+    assert (
+        len({*stream_folders(["/a/b", "/a_b", "/A_b", "a b", "..", "/"]).values()}) == 6
+    )
 
 
 def test_what_a_killed_import_left_is_named_and_removed(

@@ -21,7 +21,7 @@ from processes import FIELDCAL, simulated
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
-from fieldcal.commands.write import prepared
+from fieldcal.commands.write import propose_changes
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
@@ -255,7 +255,7 @@ def test_a_session_of_no_autopilot_is_refused(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", about) as recorder:
         recorder.mark("device", serial="7")
     with pytest.raises(InputError, match="not recorded from an autopilot"):
-        prepared(Session.open(tmp_path / "s"), calibration())
+        propose_changes(Session.open(tmp_path / "s"), calibration())
 
 
 @pytest.mark.parametrize("scale", [float("nan"), 0.0, -1.0])

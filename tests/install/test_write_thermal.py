@@ -22,7 +22,7 @@ from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.thermal import id_names, thermal_parameters
 from fieldcal.sim_device.autopilot import Autopilot
-from fieldcal.thermal import ThermalModel, point, thermal_model
+from fieldcal.thermal import ThermalModel, thermal_model, thermal_point
 
 PROGRAMS = {"ardupilot": ARDUPILOT, "px4": PX4}
 WARM = (2.0, 12.0, 21.0, 33.0, 41.0, 48.0)
@@ -38,7 +38,8 @@ def device(seed: int = 1) -> Warming:
 def model(of: Warming) -> ThermalModel:
     covariance = exact(of) * 1e-4
     every = [
-        point("s", session(of, t, np.zeros(len(covariance)), covariance)) for t in WARM
+        thermal_point("s", session(of, t, np.zeros(len(covariance)), covariance))
+        for t in WARM
     ]
     return thermal_model(every, limits.read("tactical"))
 
@@ -87,7 +88,7 @@ def test_the_uncertainty_is_that_of_many_sessions_errors() -> None:
     for _ in range(20):
         errors = rng.normal(0, sigma, (len(WARM), len(sigma)))
         pairs = zip(WARM, errors, strict=True)
-        every = [point("s", session(of, t, e, covariance)) for t, e in pairs]
+        every = [thermal_point("s", session(of, t, e, covariance)) for t, e in pairs]
         made = thermal_parameters(ARDUPILOT, thermal_model(every, bounds)).values
         found.append([made[f"INS_TCAL1_ACC1_{x}"] for x in "XYZ"])
     spread = np.std([[p.value for p in row] for row in found], axis=0)

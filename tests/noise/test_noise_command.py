@@ -241,9 +241,9 @@ def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
         },
     ) as recorder:
         recorder.append(recording(values, 0.1))
-    from fieldcal.commands.noise import result
+    from fieldcal.commands.noise import noise_result
 
-    found: NoiseResult = result([Session.open(tmp_path / "turned")])
+    found: NoiseResult = noise_result([Session.open(tmp_path / "turned")])
     assert found.model.stretches == 2
     for channel in found.model.channels.values():
         assert channel.processes["N"].value == pytest.approx(N, rel=0.1)

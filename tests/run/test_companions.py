@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from processes import RUN, steady, turned
 
-from fieldcal.commands.virtual import address
+from fieldcal.commands.virtual_address import driver_address
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
@@ -65,7 +65,7 @@ def started(
         options += ["--latitude=50.45", "--height=0"]
         options += last if link == LINKS[-1] else ()
         devices.append(stack.enter_context(VirtualMover(options, once)))
-        urls.append(address(options, devices[-1].port))
+        urls.append(driver_address(options, devices[-1].port))
     return devices, urls
 
 

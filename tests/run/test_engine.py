@@ -512,7 +512,7 @@ def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None
         warm_up = WarmUpWatch(0.5, 600.0)
         for block in _temperatures(seed, step, rate):
             warm_up.add(block)
-            assert not warm_up.says
+            assert not warm_up.notice
 
 
 @pytest.mark.parametrize(("step", "within"), [(0.0, 15.0), (1.0, 70.0)])
@@ -522,7 +522,7 @@ def test_warming_up_is_noticed_also_in_whole_degrees(
     warm_up, said = WarmUpWatch(0.5, 600.0), np.inf
     for block in _temperatures(1, step, 4.0):
         warm_up.add(block)
-        if warm_up.says:
+        if warm_up.notice:
             said = min(said, float(block.t[-1]))
     assert said < within
     rate, sigma = warm_up.rate
@@ -616,7 +616,7 @@ def test_gyroscopes_in_degrees_are_told_by_a_turn(scale: float, wrong: bool) -> 
     block = Block.of(t, acc + 0.02 * rng.standard_normal((1200, 3)), scale * gyr)
     for piece in split_by_time(block, 0.1):
         units.add(piece)
-    assert ("they are in deg/s and not in rad/s" in units.says) == wrong
+    assert ("they are in deg/s and not in rad/s" in units.notice) == wrong
     assert not units.question(99.0)
 
 
@@ -657,7 +657,7 @@ def test_rates_that_move_where_nothing_is_felt_ask_for_their_unit() -> None:
         acc = [0.0, -9.81, 0.0] + 0.01 * rng.standard_normal((10, 3))
         gyr = 2.0 + 0.3 * rng.standard_normal((10, 3))
         wait.add(Block.of(t, acc, gyr))
-        assert not wait.says
+        assert not wait.notice
         assert not wait.question(float(t[-1])) or t[-1] > 4.9
     assert "if they are in deg/s" in wait.question(20.0) and not wait.question(3.0)
 

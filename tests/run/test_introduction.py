@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fieldcal.commands import ports
-from fieldcal.commands.introduce import introduce
+from fieldcal.commands.find_device import find_device
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, split_by_time
 from fieldcal.run.introduction import introduce_device, rate_unit_from_turn
@@ -42,22 +42,24 @@ def test_gravity_says_which_way_is_up(
     known = introduce_device(at_rest(np.array(f), np.array([0.01, -0.02, 0.03])), 9.81)
     assert known.up == up and not known.rates_zeroed
     assert mounting is None or known.mounting == mounting
-    assert (f"{up} is up" if up else "it stands askew") in known.says
+    assert (f"{up} is up" if up else "it stands askew") in known.summary
 
 
 def test_units_that_are_not_g_are_said() -> None:
     known = introduce_device(
         at_rest(np.array([0.0, -1.0, 0.0]), np.full(3, 0.01)), 9.81
     )
-    assert not known.up and "m/s² at rest, and gravity is 9.81 m/s²" in known.says
+    assert not known.up and "m/s² at rest, and gravity is 9.81 m/s²" in known.summary
 
 
 def test_a_device_that_takes_its_bias_out_is_seen() -> None:
     f = np.array([0.0, -9.81, 0.0])
     centred = at_rest(f, np.zeros(3))
     centred = Block.of(centred.t, centred.acc, centred.gyr - centred.gyr.mean(axis=0))
-    assert "takes their bias out itself" in introduce_device(centred, 9.81).says
-    assert "bias out" not in introduce_device(at_rest(f, np.full(3, 0.01)), 9.81).says
+    assert "takes their bias out itself" in introduce_device(centred, 9.81).summary
+    assert (
+        "bias out" not in introduce_device(at_rest(f, np.full(3, 0.01)), 9.81).summary
+    )
 
 
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "rad/s"), (180 / np.pi, "deg/s")])
@@ -83,7 +85,7 @@ def devices(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         stack.callback(device.close)
         there = [device.port]
         named = lambda: [{"port": p, "what": "", "serial": ""} for p in there]  # noqa: E731
-        monkeypatch.setattr(ports, "plugged_in", named)
+        monkeypatch.setattr(ports, "serial_ports", named)
         yield there
 
 
@@ -98,7 +100,7 @@ def test_the_one_that_answers_is_taken_and_said(
     devices: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     args = options()
-    introduce(args)
+    find_device(args)
     assert args.device.startswith(f"serial:{devices[0]}?format=witmotion&baud=")
     assert args.mounting == "+x,-z,+y"
     said = capsys.readouterr().err
@@ -111,17 +113,17 @@ def test_none_and_too_many_are_questions(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("fieldcal.commands.introduce.LISTEN", 0.3)
+    monkeypatch.setattr("fieldcal.commands.find_device.LISTEN_S", 0.3)
     devices.append("/dev/nowhere")
-    introduce(options())
+    find_device(options())
     said = capsys.readouterr().err
     assert "not taken: /dev/nowhere: cannot open /dev/nowhere: there is no" in said
     devices[1] = devices[0]
     with pytest.raises(InputError, match='2 devices answer, say which: --device "ser'):
-        introduce(options())
+        find_device(options())
     devices[:] = ["/dev/nowhere"]
     with pytest.raises(InputError, match="no device answers ./dev/nowhere: "):
-        introduce(options())
+        find_device(options())
     devices.clear()
     with pytest.raises(InputError, match="no serial port is plugged in: plug"):
-        introduce(options())
+        find_device(options())

@@ -13,10 +13,10 @@ from processes import HANGS, script
 
 from fieldcal.core.errors import MoverFailed, MoverGone
 from fieldcal.core.positions import FIVE_POSITIONS, Position
-from fieldcal.run import patient_mover
+from fieldcal.run import retrying_mover
 from fieldcal.run.command_mover import CommandMover
 from fieldcal.run.movers import RunningDevice
-from fieldcal.run.patient_mover import PatientMover
+from fieldcal.run.retrying_mover import RetryingMover
 from fieldcal.sim_device.control import Control
 
 
@@ -113,9 +113,9 @@ def test_a_mover_that_is_gone_is_tried_again_like_a_device(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = [0.0]
-    monkeypatch.setattr(patient_mover, "monotonic", lambda: now[0])
+    monkeypatch.setattr(retrying_mover, "monotonic", lambda: now[0])
     gone, told = Gone([True, True] + [False] * 20), list[str]()
-    mover = PatientMover(gone, 20.0)
+    mover = RetryingMover(gone, 20.0)
     mover.tell = told.append
     mover.turn(FIVE_POSITIONS[0], 0)
     looks = []
@@ -124,7 +124,7 @@ def test_a_mover_that_is_gone_is_tried_again_like_a_device(
         now[0] += 1.0
     assert gone.turned == 3 and looks[-1] is False and not all(looks)
     assert told == ["no answer; tried again for 20 s"]
-    for_ever = PatientMover(Gone([True] * 50), 20.0)
+    for_ever = RetryingMover(Gone([True] * 50), 20.0)
     for_ever.turn(FIVE_POSITIONS[0], 0)
     with pytest.raises(MoverGone, match="no answer"):
         for _ in range(60):

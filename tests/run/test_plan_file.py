@@ -35,7 +35,7 @@ def plan(**run: Any) -> dict[str, Any]:
 
 
 def test_the_schema_is_one() -> None:
-    schema = plan_file.schema()
+    schema = plan_file.plan_schema()
     Draft202012Validator.check_schema(schema)
     assert set(schema["required"]) <= set(schema["properties"])
 
@@ -280,7 +280,7 @@ def test_a_third_angle_wants_somebody_who_turns_it() -> None:
     assert of().positions[2].all_degrees == (10.0, 5.0, 30.0)  # by hand
     whole = of(kind="command", command=["tt", "{alpha}", "{beta}", "{gamma}"])
     turned = CommandMover(whole.mover["command"], 1.0)
-    assert turned._filled(whole.positions[2], 2) == ["tt", "10", "5", "30"]
+    assert turned._filled_command(whole.positions[2], 2) == ["tt", "10", "5", "30"]
     with pytest.raises(PlanError, match=r"write \{gamma\}"):
         of(kind="command", command=["tt", "{alpha}", "{beta}"])
     assert of(kind="virtual").positions[2].gamma

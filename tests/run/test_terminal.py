@@ -21,7 +21,7 @@ from fieldcal.run.operator.box import FIRST, draw_box, draw_joints
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
-from fieldcal.run.operator.widgets import HALF, RULER, inclinometer, link_state
+from fieldcal.run.operator.widgets import HALF_WIDTH, RULER, inclinometer, link_state
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -304,7 +304,7 @@ def test_the_scale_is_always_the_same() -> None:
         drawn = inclinometer(0.0, off, 1.0, ok=False).plain
         places.append(drawn.index("|") - drawn.index("o") if off else 0)
     assert places == sorted(places) and len(set(places[3:7])) >= 2
-    assert places[-1] == HALF
+    assert places[-1] == HALF_WIDTH
     bar = inclinometer(-45.0, 0.0, 1.0, ok=False).plain
     assert RULER[bar.index("o") - 1 : bar.index("o") + 2] == "-45"
     assert RULER.index("0") == bar.index("|")
@@ -343,10 +343,10 @@ def test_what_a_second_press_no_longer_does_is_not_shown(
     monkeypatch.setattr(terminal, "monotonic", lambda: now[0])
     operator = sized(80, 24, "skip")
     assert operator.wish() is None
-    now[0] += 0.9 * terminal.ASKED_AGAIN
+    now[0] += 0.9 * terminal.CONFIRM_WITHIN_S
     assert operator.wish() is None
     assert "press s once more" in screen(operator)
-    now[0] += 0.2 * terminal.ASKED_AGAIN
+    now[0] += 0.2 * terminal.CONFIRM_WITHIN_S
     assert operator.wish() is None
     assert "press s" not in screen(operator)
     operator._keyboard = Keys("skip")

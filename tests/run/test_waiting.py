@@ -8,7 +8,7 @@ import pytest
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.planning.steps import Hold
-from fieldcal.run.waiting import SETTLE, SWUNG, PositionWait
+from fieldcal.run.waiting import SETTLE_S, SWAY_SETTLE_S, PositionWait
 from fieldcal.session import description
 
 G, RATE, TURN_S = 9.81, 100.0, 3.0
@@ -44,7 +44,9 @@ def turning_to(alpha_deg: float, sways: bool) -> float:
 @pytest.mark.parametrize("sways", [False, True])
 def test_no_window_begins_in_a_turn(sways: bool) -> None:
     """Of 2.5 degrees in three seconds, slower than what sways may be."""
-    assert turning_to(2.5, sways) > (SWUNG - TURN_S if sways else SETTLE - 0.5)
+    assert turning_to(2.5, sways) > (
+        SWAY_SETTLE_S - TURN_S if sways else SETTLE_S - 0.5
+    )
 
 
 @pytest.mark.parametrize(("creeps", "calls"), [(0.0, [20.0]), (4.0, [8.0])])

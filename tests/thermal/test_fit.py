@@ -10,8 +10,8 @@ from thermal_devices import SIGMA, Warming, drawn, exact, session
 
 from fieldcal.calibration import limits
 from fieldcal.core.errors import InputError
-from fieldcal.thermal import ThermalPoint, point, thermal_model
-from fieldcal.thermal.group_fit import GroupData, fitted
+from fieldcal.thermal import ThermalPoint, thermal_model, thermal_point
+from fieldcal.thermal.group_fit import GroupData, fit_group
 
 BOUNDS = limits.read("tactical")
 SEVEN = (1.0, 8.0, 17.0, 25.0, 33.0, 42.0, 49.0)
@@ -29,7 +29,7 @@ def points(
     sigma = np.sqrt(np.diag(covariance))
     common = np.sqrt(share) * rng.normal(0, sigma)
     return [
-        point(
+        thermal_point(
             f"s{i}",
             session(
                 device,
@@ -92,7 +92,7 @@ def test_one_set_is_generalised_least_squares() -> None:
         x, y, np.zeros(p), covariance, np.full(s, 0.3), np.full((s, p), 2.0)
     )
     order, size, share, spread = 2, 3.0, 0.3, 0.5
-    found = fitted(data, np.array([[order, size, share, spread]]))
+    found = fit_group(data, np.array([[order, size, share, spread]]))
     roots = []
     for c in covariance:
         values, vectors = np.linalg.eigh(c)
@@ -123,7 +123,8 @@ def test_what_all_sessions_have_in_common_stays_in_the_constant() -> None:
     device = drawn(np.random.default_rng(1), "acc_bias")
     covariance = exact(device) * 100
     every = [
-        point("s", session(device, t, np.full(3, 0.012), covariance)) for t in SEVEN
+        thermal_point("s", session(device, t, np.full(3, 0.012), covariance))
+        for t in SEVEN
     ]
     made = thermal_model(every, BOUNDS)
     value, sigma = made.at(25.0)["acc_bias.x"]
@@ -134,7 +135,7 @@ def test_what_all_sessions_have_in_common_stays_in_the_constant() -> None:
 def test_temperature_that_wanders_within_a_session_widens_it() -> None:
     device = Warming({"acc_bias": np.outer([0.1, 5e-3, 0, 0], np.ones(3))})
     still = points(device, np.random.default_rng(2))
-    wandering = [replace(p, wander=1.0) for p in still]
+    wandering = [replace(p, temperature_sd=1.0) for p in still]
     narrow, wide = (thermal_model(p, BOUNDS) for p in (still, wandering))
     assert wide.at(25.0)["acc_bias.x"][1] > 1.5 * narrow.at(25.0)["acc_bias.x"][1]
 

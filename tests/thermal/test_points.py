@@ -15,7 +15,7 @@ from fieldcal.drivers.mavlink_installed import (
     InstalledCalibration,
     parameter_names,
 )
-from fieldcal.thermal import point
+from fieldcal.thermal import thermal_point
 
 WARM = {"conditions": {"temperature_degc": 21.5, "temperature_sd_k": 0.2}}
 
@@ -36,7 +36,7 @@ def test_a_point_is_of_the_sensors_own_output(program: int) -> None:
     found = calibration(rng, cross=0.01, gyr_scale=0.01)
     there = installed(program)
     info = {**WARM, "installed": there.as_table()}
-    made = point("s", replace(found, info=info)).calibration
+    made = thermal_point("s", replace(found, info=info)).calibration
     for sensor, o, k in (
         ("acc", there.vector("acc_offset"), there.vector("acc_scale")),
         ("gyr", there.vector("gyr_offset"), np.ones(3)),
@@ -53,25 +53,27 @@ def test_a_point_is_of_the_sensors_own_output(program: int) -> None:
 
 def test_samples_with_nothing_taken_out_are_the_sensors_own() -> None:
     found = replace(calibration(np.random.default_rng(2), 0.0), info=WARM)
-    made = point("s", found)
-    assert made.temperature == 21.5 and made.wander == 0.2
+    made = thermal_point("s", found)
+    assert made.temperature == 21.5 and made.temperature_sd == 0.2
     np.testing.assert_array_equal(made.calibration.values, found.values)
 
 
 def test_where_values_are_of_the_end_so_is_the_temperature() -> None:
     as_of = {"since_start_s": 300.0, "temperature_degc": 31.0}
     info = {**WARM, "carried": {"as_of": as_of}}
-    made = point("s", replace(calibration(np.random.default_rng(2), 0.0), info=info))
-    assert made.temperature == 31.0 and made.wander == 0.0
+    made = thermal_point(
+        "s", replace(calibration(np.random.default_rng(2), 0.0), info=info)
+    )
+    assert made.temperature == 31.0 and made.temperature_sd == 0.0
 
 
 def test_what_makes_no_point_is_refused() -> None:
     found = replace(calibration(np.random.default_rng(3), 0.0), info=WARM)
     with pytest.raises(InputError, match="s: the calibration is bad"):
-        point("s", replace(found, good=False))
+        thermal_point("s", replace(found, good=False))
     with pytest.raises(InputError, match="s: the device told no temperature"):
-        point("s", replace(found, info={}))
+        thermal_point("s", replace(found, info={}))
     for program, name in ((ARDUPILOT, "INS_TCAL2_ENABLE"), (PX4, "TC_A_ENABLE")):
         table = installed(program, **{name: 1.0}).as_table()
         with pytest.raises(InputError, match=f"s: {name} was 1.*set it to 0"):
-            point("s", replace(found, info={**WARM, "installed": table}))
+            thermal_point("s", replace(found, info={**WARM, "installed": table}))

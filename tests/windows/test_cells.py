@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import cells
-from fieldcal.windows.cells import CellAccumulator, CellTable, hold_last, resolution
+from fieldcal.windows.cells import (
+    CellAccumulator,
+    CellTable,
+    fill_with_previous,
+    resolution,
+)
 
 
 def block(n: int = 400, seed: int = 0, lost: float = 0.1) -> Block:
@@ -227,7 +232,9 @@ def test_coarse_steps_show() -> None:
 def test_a_missing_mean_is_the_one_before() -> None:
     nan = np.nan
     means = np.array([[nan, 1.0], [2.0, nan], [nan, nan], [3.0, 4.0]])
-    np.testing.assert_array_equal(hold_last(means), [[0, 1], [2, 1], [2, 1], [3, 4]])
+    np.testing.assert_array_equal(
+        fill_with_previous(means), [[0, 1], [2, 1], [2, 1], [3, 4]]
+    )
     before = np.array([[7.0, 8.0]])
     expected = [[7, 1], [2, 1], [2, 1], [3, 4]]
-    np.testing.assert_array_equal(hold_last(means, before), expected)
+    np.testing.assert_array_equal(fill_with_previous(means, before), expected)

@@ -49,7 +49,7 @@ def test_a_sensor_goes_with_one_axis(value: float) -> None:
     six[3, 4] = np.nan
     (found,) = dead_sensors(six)
     assert (found.channels, found.absent) == (ACC, False)
-    assert found.says.endswith("not used: az never changes, or is missing")
+    assert found.message.endswith("not used: az never changes, or is missing")
 
 
 def test_a_sensor_that_sends_zeros_is_absent_and_one_not_recorded_is_none() -> None:
@@ -57,7 +57,7 @@ def test_a_sensor_that_sends_zeros_is_absent_and_one_not_recorded_is_none() -> N
     six[:, :3], six[:, 3:] = np.nan, 0.0
     (found,) = dead_sensors(six)
     assert (found.channels, found.absent) == (GYR, True)
-    assert "gx, gy and gz never change, or are missing" in found.says
+    assert "gx, gy and gz never change, or are missing" in found.message
 
 
 def test_rows_of_either_sensor_in_turn_are_both_alive() -> None:

@@ -7,7 +7,7 @@ from scipy.stats import norm
 from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import Average, average
-from fieldcal.windows.grain import AROUND, rounding_variance, visible_step
+from fieldcal.windows.grain import MEAN_OFFSETS, rounding_variance, visible_step
 from fieldcal.windows.rounding import variance_of_few_values, variance_of_mean
 
 STEP = np.repeat([9.80665e-3, 1e-3], 3)
@@ -101,7 +101,7 @@ def test_what_is_cut_is_off_around_zero_by_as_much_as_is_stated(
     mean: float, noise: float
 ) -> None:
     """With this noise rounding itself leaves nothing: all that is off is the zero."""
-    expected = np.mean([off(mean + u, noise) ** 2 for u in AROUND])
+    expected = np.mean([off(mean + u, noise) ** 2 for u in MEAN_OFFSETS])
     np.testing.assert_allclose(stated(mean, noise), expected, rtol=0.02, atol=1e-6)
 
 

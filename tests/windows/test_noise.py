@@ -197,12 +197,12 @@ def test_of_many_samples_some_evenly_spread_ones_tell(
     # what lies in one place only must not be missed or be taken for the whole
     x[30_000:] *= 3.0
     whole = measure_noise([x], RATE).quick
-    monkeypatch.setattr(noise, "MOST", 2000)
+    monkeypatch.setattr(noise, "MOST_DIFFERENCES", 2000)
     some = measure_noise([x], RATE).quick
     np.testing.assert_allclose(some, whole, rtol=0.1)
     assert (some != whole).any()
     three = [x[k : k + 9].reshape(3, 3, 2).mean(axis=1) for k in range(0, 900, 9)]
-    monkeypatch.setattr(noise, "MOST", 99)
+    monkeypatch.setattr(noise, "MOST_DIFFERENCES", 99)
     bends = np.diff([x[k : k + 3] for k in range(0, 900, 9)], 2, axis=1)[:, 0]
     assert len(three) == len(bends) == 100
     squares = np.sort(bends**2 / 6, axis=0)[:90]

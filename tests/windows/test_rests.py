@@ -32,7 +32,7 @@ def test_spans_are_spreads_and_means_of_a_second(
         mean = row[7:13] / np.maximum(row[1:7], 1.0)
         last = np.where(row[1:7] >= usual / 2, mean, last)
         means.append(last)
-    parts = list(rests._spans(rows, rests._Typical(usual, np.inf, np.zeros(6))))
+    parts = list(rests._spans(rows, rests._TypicalCells(usual, np.inf, np.zeros(6))))
     assert [first for first, _, _ in parts] == list(range(0, m - 9, 16))
     spread, level = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     assert len(spread) == len(level) == m - 9
@@ -52,11 +52,11 @@ def test_what_is_usual_is_the_median_of_evenly_spread_cells(
     every = 4 if sample == 40 else 1
     expected = np.median(rows[::every, 1:7], axis=0)
     rows[:, 0] = 0.1 * np.arange(150) + 7.0 * (np.arange(150) >= 75)
-    usual = rests._typical(rows)
+    usual = rests._typical_cells(rows)
     np.testing.assert_array_equal(usual.counts, expected)
     assert usual.pause == pytest.approx(1.0)
     rows[:, 0] *= 10
-    assert rests._typical(rows).pause == pytest.approx(5.0)
+    assert rests._typical_cells(rows).pause == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("at", [1, 15, 16, 17, 140, 149])
@@ -64,7 +64,7 @@ def test_no_span_goes_over_a_pause(monkeypatch: pytest.MonkeyPatch, at: int) -> 
     monkeypatch.setattr(rests, "_PART", 16)
     rows = rows_of(4)
     rows[:, 0] = 0.1 * np.arange(150) + 1.5 * (np.arange(150) >= at)
-    parts = rests._spans(rows, rests._typical(rows))
+    parts = rests._spans(rows, rests._typical_cells(rows))
     spread = np.concatenate([spread for _, spread, _ in parts])
     over = [i < at <= i + 9 for i in range(141)]
     np.testing.assert_array_equal(np.isinf(spread).all(axis=1), over)

@@ -15,7 +15,7 @@ from fieldcal.core.samples import CHANNELS, Array, Block, Grain, concat
 from fieldcal.windows import Average, StillnessLimits, Window, average
 from fieldcal.windows.cells import CellAccumulator
 from fieldcal.windows.grain import rounding_variance
-from fieldcal.windows.longrun import error_of_mean
+from fieldcal.windows.mean_error import error_of_mean
 from windows.signals import HOME, UNIT, block_of, flicker, low_passed, markov, white
 
 
@@ -385,16 +385,16 @@ def test_what_a_window_taught_is_the_noise_and_its_shape() -> None:
     first = filled(block_of(flicker(2.0)(rng, 6000)))
     learned = first.noise
     assert learned and learned.quiet and learned.quiet.cells == 600
-    assert learned.without_wander.quiet is None
+    assert learned.spectrum_shape_only.quiet is None
     np.testing.assert_array_equal(
-        learned.without_wander.shape_likelihood, learned.shape_likelihood
+        learned.spectrum_shape_only.shape_likelihood, learned.shape_likelihood
     )
     assert (
         learned.shape_likelihood.shape[1] == 7 and learned.shape_likelihood.max() == 0
     )
     # the shape is learnt on: it makes the error of a short window a longer one's
     block = block_of(flicker(2.0)(rng, 1000))
-    alone, after = filled(block), filled(block, noise=learned.without_wander)
+    alone, after = filled(block), filled(block, noise=learned.spectrum_shape_only)
     assert (np.abs(after.sigma / alone.sigma - 1) > 0.02).sum() >= 4
     assert after.largest_motion == pytest.approx(alone.largest_motion)
     assert after.noise and after.noise.quiet and after.noise.quiet.cells == 100

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.against.sensor_model import LINEAR, SensorModel
-from fieldcal.exporters.kalibr import parted, written
+from fieldcal.exporters.kalibr import split_rotation, yaml_array
 
 WHAT = "Kalibr and OpenVINS, imu.yaml"
 ENDING = "_imu.yaml"
@@ -40,15 +40,15 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
 
 def _linear(model: SensorModel) -> list[str]:
     """Matrices and biases."""
-    lower, turn = parted(model.matrix("gyr"))
+    lower, turn = split_rotation(model.matrix("gyr"))
     return [
         "model: scale-misalignment",
         "accelerometers:",
-        f"  M: {written(model.matrix('acc'))}",
-        f"  bias: {written(model.group('acc_bias'))}",
+        f"  M: {yaml_array(model.matrix('acc'))}",
+        f"  bias: {yaml_array(model.group('acc_bias'))}",
         "gyroscopes:",
-        f"  M: {written(lower)}",
-        f"  C_gyro_i: {written(turn)}",
+        f"  M: {yaml_array(lower)}",
+        f"  C_gyro_i: {yaml_array(turn)}",
         "  A: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]",
-        f"  bias: {written(model.group('gyr_bias'))}",
+        f"  bias: {yaml_array(model.group('gyr_bias'))}",
     ]

@@ -97,7 +97,7 @@ def check_chain(block: Block, about: Description) -> CheckedRecording:
         samples = samples_to_check(block, usable, about)
     for name in _ids_by_treatment("note"):
         faults += [(name, fault) for fault in _find(name, samples)]
-    unused = tuple(sensor.says for sensor in dead)
+    unused = tuple(sensor.message for sensor in dead)
     return CheckedRecording(
         block, usable, tuple(_without_rail_runs(faults)), samples.noise, unused
     )

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.windows.cells import CellTable, SamplesBetween
 from fieldcal.windows.jumps import JumpFinder
-from fieldcal.windows.knocks import RestPeriod, join_rests
+from fieldcal.windows.same_attitude import RestPeriod, join_rests
 from fieldcal.windows.stretch_ends import stretch_end_reasons
 from fieldcal.windows.stretches import (
     cell_rows,

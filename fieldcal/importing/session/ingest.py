@@ -29,7 +29,7 @@ from fieldcal.session.lock import SessionLock
 from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.windows.cells import CellAccumulator
 from fieldcal.windows.jumps import JumpFinder
-from fieldcal.windows.knocks import RestPeriod
+from fieldcal.windows.same_attitude import RestPeriod
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.stretches import cell_rows
 

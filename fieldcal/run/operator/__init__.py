@@ -1,5 +1,5 @@
-"""What the engine shows to whoever moves the device, and what it asks of them.
+"""Operators: they move the device, show the state of the run and return wishes.
 
-`protocol` says what an operator is; the terminal and the script are two. To add one,
-write a class with its methods in a module here.
+`protocol` defines the interface; `terminal` and `script` implement it. To add an
+operator, write a class with the same methods in a module here.
 """

@@ -1,4 +1,4 @@
-"""What every display shows of a run, console and page alike."""
+"""Content of the displays of a run, the same on console and page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import reminder
 
-TOLD = 2
+SENTENCES_SHOWN = 2
 """Number of sentences that are shown."""
 
 
@@ -57,7 +57,7 @@ class RunContent:
 
     def sentence_told(self, text: str) -> None:
         """A sentence was told that must not be missed."""
-        self._told = [*(t for t in self._told if t != text), text][-TOLD:]
+        self._told = [*(t for t in self._told if t != text), text][-SENTENCES_SHOWN:]
 
     def sentence_withdrawn(self, text: str) -> None:
         """A sentence no longer applies."""
@@ -81,7 +81,7 @@ class RunContent:
 
     @property
     def phase(self) -> str:
-        """What the engine waits for; empty before there is a view."""
+        """Phase of the engine; empty before the first view."""
         return self.view.phase if self.view else ""
 
     @property
@@ -91,7 +91,7 @@ class RunContent:
 
     @property
     def instruction(self) -> Instruction:
-        """The one thing to do now."""
+        """The present instruction."""
         number = position_label(self.hold, len(self.positions), self.most)
         return Instruction.of(self.hold, self.view, number)
 

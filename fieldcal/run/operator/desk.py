@@ -21,11 +21,11 @@ def confirmation_question(waiting: PositionWait) -> WaitReason:
 
 
 class OperatorDesk:
-    """Speaks with whoever turns the device.
+    """Dialogue of the engine with the operator; messages are marked in the session.
 
     Parameters
     ----------
-    operator : who that is
+    operator : turns the device
     recorder : the session folder being written
 
     """
@@ -60,12 +60,12 @@ class OperatorDesk:
         self._recorder.mark("insisted", position=hold.index, text=problem)
 
     def stop_if_wanted(self) -> None:
-        """End the run if the operator wants that; other wishes are ignored.
+        """End the run if the operator wants to stop; other wishes are ignored.
 
         Raises
         ------
         Stopped
-            If so.
+            If the operator wants to stop.
 
         """
         if self._operator.wish() == "stop":
@@ -77,7 +77,7 @@ class OperatorDesk:
         Raises
         ------
         Stopped, Skipped
-            If the run is to end, or this position to be left out.
+            If the run ends, or the position is left out.
 
         """
         wish = self._operator.wish()
@@ -89,12 +89,12 @@ class OperatorDesk:
         return wish
 
     def repeat(self, before: int | None) -> None:
-        """Go back to the position taken before, None if there is none.
+        """Repeat the position taken before; `before` is None if there is none.
 
         Raises
         ------
         RepeatPosition
-            If there is one.
+            If there is a position to repeat.
 
         """
         if before is not None:

@@ -1,4 +1,4 @@
-"""The one thing to do now, in words that every display shows alike."""
+"""The present instruction to the operator, in the same words on every display."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Colour = Literal["", "cyan", "yellow", "green", "red"]
 
 
 def position_label(hold: Hold | None, count: int, most: int | None) -> str:
-    """Number of the position asked for, of how many; empty where none is.
+    """Number of the requested position and of all positions; empty without one.
 
-    `most` is how many there are at most, where they are found on the way.
+    `most` is the largest number of positions if they are chosen during the run.
     """
     many = str(count) if most is None else f"at most {max(most, count)}"
     return f"position {hold.index + 1} of {many}" if hold else ""
@@ -25,13 +25,13 @@ def position_label(hold: Hold | None, count: int, most: int | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """What to do.
+    """Instruction to the operator.
 
     Attributes
     ----------
-    words : in a few capitals
-    detail : what belongs to it
-    colour : of both; yellow where something is wrong, red where nothing comes
+    words : a few words in capitals
+    detail : further words
+    colour : of both; yellow if something is wrong, red if no samples arrive
 
     """
 
@@ -43,9 +43,9 @@ class Instruction:
     def of(
         cls, hold: Hold | None, view: OperatorView | None, number: str
     ) -> Instruction:
-        """What to do at a step, by the latest view; `number` is that of the position.
+        """Instruction at a step by the latest view; `number` is the position's label.
 
-        A view of an earlier step says nothing of this one.
+        A view of an earlier step is ignored.
         """
         if hold is None:
             return cls("WAIT", "for the device", "")

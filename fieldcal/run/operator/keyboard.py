@@ -2,9 +2,9 @@
 
     Enter, space   confirm      r   repeat      s   skip      q   stop
 
-While it is open the terminal passes keys on at once and does not show them; Ctrl-C
-stays what it is. Ctrl-Z and Ctrl-S do nothing: they would halt a run that nobody could
-see halted, and its samples would be lost. What is no terminal has no keys.
+While the keyboard is open, the terminal passes keys on at once and does not show them.
+Ctrl-C interrupts as usual. Ctrl-Z and Ctrl-S have no effect: they would suspend the run
+without notice, and samples would be lost. Input that is no terminal has no keys.
 """
 
 from __future__ import annotations
@@ -31,14 +31,16 @@ KEYS: dict[str, Wish] = {
 HELP = "keys: Enter confirm · r repeat · s skip · q stop"
 
 OTHER_KEYS = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
-"""What arrows, function keys and letters with Alt send: F2 ends in a Q, F4 in an S."""
+"""Sequences of arrows, function keys and letters with Alt, which contain letters: F2
+ends in a Q, F4 in an S."""
 
 SHORT_HELP = "Enter ok · r again · s skip · q stop"
 """The same for a screen of 40 characters."""
 
 
 FUNCTION = ("\x00", "\xe0")
-"""What Windows sends before the code of a key without a letter: Q is Page Down."""
+"""Prefixes of keys without a letter on Windows; the code that follows may be a letter,
+such as Q for Page Down."""
 
 
 class Keyboard:
@@ -67,10 +69,7 @@ class Keyboard:
             self._keys.close()
 
     def pressed(self) -> Wish | None:
-        """What was asked for by the keys pressed since the last call.
-
-        It is the last of them, but whoever wants to stop is not asked twice.
-        """
+        """Wish of the keys since the last call: "stop" if any, else the last."""
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone

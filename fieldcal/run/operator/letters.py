@@ -1,7 +1,7 @@
-"""Letters for a screen whose terminal lacks some: one for one, so that nothing shifts.
+"""Substitutes for letters that a terminal cannot show, one letter for each.
 
-In a line of text they are spelled, α as alpha; on a screen that would push the frame
-out and the first lines up.
+In a line of text such letters are spelled out, α as alpha. On a screen that would make
+lines longer than the frame.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.segment import Segment
 
-ALIKE = {
+SUBSTITUTES = {
     "α": "a", "β": "b", "γ": "g", "σ": "s", "χ": "x", "→": ">", "←": "<", "−": "-",
     "²": "2", "³": "3", "±": "~", "°": " ", "·": ".",
 }  # fmt: skip
@@ -24,26 +24,26 @@ class TerminalLetters:
 
     Attributes
     ----------
-    drawn : what is to be shown
+    drawing : to be shown
 
     """
 
-    drawn: RenderableType
+    drawing: RenderableType
 
     def __rich_console__(
         self, console: Console, options: ConsoleOptions
     ) -> RenderResult:
-        """Draw it, and put others in the place of letters that cannot be sent."""
-        for segment in console.render(self.drawn, options):
+        """Draw it, with substitutes for letters that cannot be encoded."""
+        for segment in console.render(self.drawing, options):
             text = "".join(
-                _sendable(letter, options.encoding) for letter in segment.text
+                _substitute(letter, options.encoding) for letter in segment.text
             )
             yield Segment(text, segment.style, segment.control)
 
 
-def _sendable(letter: str, encoding: str) -> str:
+def _substitute(letter: str, encoding: str) -> str:
     try:
         letter.encode(encoding)
     except UnicodeEncodeError:
-        return ALIKE.get(letter, "?")
+        return SUBSTITUTES.get(letter, "?")
     return letter

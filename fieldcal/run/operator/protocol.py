@@ -1,4 +1,4 @@
-"""What the engine shows to whoever moves the device, and what it asks of them."""
+"""Interface between the engine and the operator: views to show, wishes to carry out."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class OperatorView:
 
 
 class Operator(Protocol):
-    """Whoever moves the device: a person at a console, a script, a virtual device."""
+    """Moves the device: a person at a console, or a script with a mover."""
 
     def place(self, hold: Hold) -> None:
         """Ask for a position, or begin to turn there; return at once."""
@@ -77,15 +77,15 @@ class Operator(Protocol):
         """Show the state; called for every block, must not take long."""
 
     def wish(self) -> Wish | None:
-        """What was asked for since the last call; called for every block."""
+        """Wish of the operator since the last call; called for every block."""
 
 
 class Display:
-    """Shows an operator, block by block, the state of the engine.
+    """Shows the state of the engine to an operator, block by block.
 
     Parameters
     ----------
-    operator : who is shown it
+    operator : who sees it
     driver : the device, whose health is shown
 
     """
@@ -95,31 +95,33 @@ class Display:
         self._rate = self._temperature = np.nan
 
     def note_samples(self, block: Block) -> None:
-        """Take note of the rate and temperature of samples that came."""
+        """Store rate and temperature of the latest samples."""
         if len(block) > 1:
             self._rate = (len(block) - 1) / (block.t[-1] - block.t[0])
         self._temperature = float(block.temperature[-1])
 
-    def turning(self, hold: Hold, waiting: PositionWait, reason: WaitReason) -> None:
+    def show_turning(
+        self, hold: Hold, waiting: PositionWait, reason: WaitReason
+    ) -> None:
         """Show where the device is on its way, and what is waited for."""
         self._show("turning", hold, waiting.where, waiting.meter, reason=reason)
 
-    def averaging(self, hold: Hold, window: PiecedWindow) -> None:
+    def show_averaging(self, hold: Hold, window: PiecedWindow) -> None:
         """Show the progress of a window."""
         self._show(
             "averaging", hold, None, window.motion_now, window.elapsed, window.sigma
         )
 
-    def taken(self, hold: Hold, window: PiecedWindow) -> None:
+    def show_taken(self, hold: Hold, window: PiecedWindow) -> None:
         """Show the standard error that a window has reached."""
         self._show("taken", hold, None, window.motion_now, window.elapsed, window.sigma)
 
-    def taken_before(self, hold: Hold, average: Average) -> None:
-        """Show what was reached when the position was taken before."""
+    def show_taken_before(self, hold: Hold, average: Average) -> None:
+        """Show the standard error of a position that was taken earlier."""
         self._show("taken", hold, sigma=average.sigma, reason=TAKEN_BEFORE)
 
-    def silent(self, hold: Hold, reason: WaitReason) -> None:
-        """Show that nothing comes."""
+    def show_silence(self, hold: Hold, reason: WaitReason) -> None:
+        """Show that no samples arrive."""
         self._show("silent", hold, reason=reason)
 
     def _show(

@@ -35,12 +35,12 @@ FEWEST = 3
 
 
 class Screen:
-    """Lays out what there is to show.
+    """Layout of the operator's screen.
 
     Parameters
     ----------
-    console : whose width, height and letters there are
-    shown : what is drawn
+    console : determines width, height and available letters
+    content : state of the run that is drawn
     verification : number of the position that is not fitted, None without one
     keys : whether there are keys to press
 
@@ -49,33 +49,33 @@ class Screen:
     def __init__(
         self,
         console: Console,
-        shown: RunContent,
+        content: RunContent,
         verification: int | None,
         keys: Callable[[], bool],
     ) -> None:
-        self._console, self._shown = console, shown
+        self._console, self._content = console, content
         self._verification, self._keys = verification, keys
 
-    def drawn(self) -> RenderableType:
-        """Draw the screen, always as high as the terminal, so that it does not jump."""
+    def layout(self) -> RenderableType:
+        """The screen, always as high as the terminal, so that it does not jump."""
         columns, rows = SMALL
         if self._console.width < columns or self._console.height < rows:
-            return self._lettered(self._small())
-        return self._lettered(self._whole())
+            return self._with_available_letters(self._small_layout())
+        return self._with_available_letters(self._full_layout())
 
-    def _lettered(self, drawn: RenderableType) -> RenderableType:
-        """In letters that the terminal has."""
+    def _with_available_letters(self, drawn: RenderableType) -> RenderableType:
+        """The drawing in letters that the terminal can show."""
         return drawn if self._has_all_letters else TerminalLetters(drawn)
 
     @property
     def _has_all_letters(self) -> bool:
         return self._console.encoding.lower().startswith("utf")
 
-    def _whole(self) -> RenderableType:
+    def _full_layout(self) -> RenderableType:
         """The full screen, in a frame."""
-        view = self._shown.view
+        view = self._content.view
         above: list[RenderableType] = [*self._instruction(), Text()]
-        if view and self._shown.hold is view.hold:
+        if view and self._content.hold is view.hold:
             above.append(widgets.gauges(view))
         above += [*self._sentences(), Text()]
         below: list[RenderableType] = []
@@ -83,27 +83,27 @@ class Screen:
             below.append(widgets.link_state(view))
         if self._keys():
             below.append(Text(HELP))
-        rows = max(FEWEST, self._console.height - 2 - self._lines_of(*above, *below))
+        rows = max(FEWEST, self._console.height - 2 - self._line_count(*above, *below))
         listing = self._listing(rows)
         drawn = self._drawing(listing, rows) if rows > FEWEST else []
         beside = Table.grid(padding=(0, APART))
         beside.add_row(listing, Text("\n".join(drawn)))
         parts = Layout()
-        foot = self._lines_of(*below) if below else 0
+        foot = self._line_count(*below) if below else 0
         parts.split_column(
             Layout(Group(*above, beside), ratio=1),
             Layout(Group(*below), size=max(1, foot), visible=bool(below)),
         )
-        title, height = Text(self._shown.title), self._console.height
+        title, height = Text(self._content.title), self._console.height
         return Panel(parts, title=title, title_align="left", height=height)
 
-    def _small(self) -> RenderableType:
+    def _small_layout(self) -> RenderableType:
         """Instruction, reason, seconds and keys, and nothing else."""
-        view, hold = self._shown.view, self._shown.hold
-        what = self._shown.instruction
+        view, hold = self._content.view, self._content.hold
+        what = self._content.instruction
         number = f"  {hold.index + 1}" if hold else ""
-        if hold and self._shown.most is None:
-            number += f"/{len(self._shown.positions)}"
+        if hold and self._content.most is None:
+            number += f"/{len(self._content.positions)}"
         style = f"bold reverse {what.colour}".strip()
         width = self._console.width
         lines: list[RenderableType] = [
@@ -115,10 +115,8 @@ class Screen:
         lines.append(Text(f" {name}".ljust(width), style))
         if view and hold is view.hold:
             lines += [Text(line) for line in widgets.short_gauges(view)]
-        number_of = len(self._shown.positions)
-        taken = Text(
-            widgets.progress(self._shown.taken, self._shown.current_index, number_of)
-        )
+        content, count = self._content, len(self._content.positions)
+        taken = Text(widgets.progress(content.taken, content.current_index, count))
         room = self._console.height - 1 - len(self._console.render_lines(
             Group(*lines, taken)))  # fmt: skip
         lines += [*self._sentences(room), taken]
@@ -131,7 +129,7 @@ class Screen:
     def _sentences(self, room: float = np.inf) -> list[RenderableType]:
         """The last sentences, and the reason for waiting, in a limited height."""
         said = [
-            Text(f"! {text}", style="bold yellow") for text in self._shown.sentences
+            Text(f"! {text}", style="bold yellow") for text in self._content.sentences
         ]
         while len(said) > 1 and len(self._console.render_lines(Group(*said))) > room:
             said.pop(0)
@@ -139,19 +137,21 @@ class Screen:
 
     def _listing(self, rows: int) -> RenderableType:
         """The positions around the present one, with what was reached in each."""
-        positions, now = self._shown.positions, self._shown.current_index
+        positions, now = self._content.positions, self._content.current_index
         table = Table.grid(padding=(0, 2))
         first = int(np.clip(now - rows // 2, 0, max(0, len(positions) - rows)))
         for i in range(first, min(len(positions), first + rows)):
             style = "bold" if i == now else ""
             apart = " (verification)" if i == self._verification else ""
             name = positions[i].name + apart
-            table.add_row(f"{i + 1}", name, self._shown.position_state(i), style=style)
+            table.add_row(
+                f"{i + 1}", name, self._content.position_state(i), style=style
+            )
         return table
 
     def _drawing(self, listing: RenderableType, rows: int) -> list[str]:
         """Drawing of the wanted position, if letters and room allow it."""
-        hold = self._shown.hold
+        hold = self._content.hold
         if not self._has_all_letters or hold is None:
             return []
         options = self._console.options
@@ -159,27 +159,27 @@ class Screen:
         room = self._console.width - 4 - taken - APART
         return draw_joints(hold.position, room, rows)
 
-    def _lines_of(self, *parts: RenderableType) -> int:
+    def _line_count(self, *parts: RenderableType) -> int:
         """Count the lines that parts of the screen take within its frame."""
         inside = self._console.options.update(width=self._console.width - 4)
         return len(self._console.render_lines(Group(*parts), inside))
 
     def _instruction(self) -> list[Text]:
         """The one thing to do now, in large letters, and what belongs to it."""
-        what, hold = self._shown.instruction, self._shown.hold
+        what, hold = self._content.instruction, self._content.hold
         turn = hold.position if what.words == TURN and hold else None
         style = f"bold reverse {what.colour}".strip()
         width = self._console.width - 4
         if self._console.height >= TALL and self._has_all_letters:
-            angles = _angles(turn, width - 4)
+            angles = _angle_lines(turn, width - 4)
             lines = ["", *draw_large(what.words), *angles, "", what.detail, ""]
         else:
             at = f"   {turn.name}" if turn else ""
-            lines = [_spaced(what.words) + at, what.detail]
+            lines = [_letterspaced(what.words) + at, what.detail]
         return [Text(f"  {line}".ljust(width), style=style) for line in lines]
 
 
-def _angles(position: Position | None, width: int) -> list[str]:
+def _angle_lines(position: Position | None, width: int) -> list[str]:
     """Where to turn, large if there is room for it."""
     if position is None:
         return []
@@ -191,6 +191,6 @@ def _angles(position: Position | None, width: int) -> list[str]:
     return ["", *(drawn if fits else [position.name])]
 
 
-def _spaced(words: str) -> str:
-    """Letters set apart: larger than their neighbours on any terminal."""
+def _letterspaced(words: str) -> str:
+    """Words with spaces between their letters, which look larger on any terminal."""
     return "   ".join(" ".join(word) for word in words.split())

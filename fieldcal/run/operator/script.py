@@ -1,4 +1,4 @@
-"""No operator: progress as JSON lines on standard error, the mover turns the device.
+"""Run without a person: a mover turns the device, standard error gets JSON lines.
 
 Each line has its event and the host's time; the last one is "end", with the exit code.
 """
@@ -17,12 +17,12 @@ from fieldcal.run.movers import Mover
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
 
-EVERY = 5.0
+PROGRESS_EVERY_S = 5.0
 """Time between two lines of progress, s of device time."""
 
 
 class ScriptOperator:
-    """Turns the device by `mover` and reports.
+    """Operator that turns the device by a mover and reports as JSON lines.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class ScriptOperator:
 
     def show(self, view: OperatorView) -> None:
         """Report progress: each change of phase, and now and then within one."""
-        step = int(view.elapsed // EVERY)
+        step = int(view.elapsed // PROGRESS_EVERY_S)
         now = (view.phase, view.hold.index, step, view.reason.state)
         if now == self._shown:
             return

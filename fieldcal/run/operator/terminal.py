@@ -1,7 +1,7 @@
 """The operator's terminal: what to do in large plain words, and what it waits for.
 
 Nothing here blocks: the engine calls `show` for every block, and the screen is drawn at
-most `FRAMES` times a second from the latest view. It goes on by itself; keys only
+most `FRAMES_PER_S` times a second from the latest view. It goes on by itself; keys only
 confirm, repeat, skip or stop.
 """
 
@@ -24,10 +24,10 @@ from fieldcal.run.operator.screen import Screen
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import WaitReason, reminder
 
-FRAMES = 8.0
+FRAMES_PER_S = 8.0
 """Drawings a second."""
 
-ASKED_AGAIN = 5.0
+CONFIRM_WITHIN_S = 5.0
 """Time within which a key that discards something must be pressed again, s."""
 
 
@@ -63,7 +63,7 @@ class ConsoleOperator:
         self._keyboard = keyboard
         self._shown = RunContent(title, positions, most)
         self._screen = Screen(console, self._shown, verification, self._has_keys)
-        self._skips, self._asked = -ASKED_AGAIN, ""
+        self._skips, self._asked = -CONFIRM_WITHIN_S, ""
         self._drawn = 0.0
         self._lines: set[str] = set()
         self._live: Live | None = None
@@ -118,7 +118,7 @@ class ConsoleOperator:
     def wish(self) -> Wish | None:
         """The key that was pressed, or the wish to wait for the mover."""
         pressed = self._keyboard.pressed() if self._keyboard else None
-        asked = monotonic() - self._skips < ASKED_AGAIN
+        asked = monotonic() - self._skips < CONFIRM_WITHIN_S
         if pressed == "skip" or not asked:
             self._shown.sentence_withdrawn(
                 self._asked
@@ -127,7 +127,7 @@ class ConsoleOperator:
             self._skips, pressed = monotonic(), None
             self._ask_back()
         elif pressed == "skip":
-            self._skips = -ASKED_AGAIN
+            self._skips = -CONFIRM_WITHIN_S
         return pressed or ("wait" if self._mover.busy() else None)
 
     def _ask_back(self) -> None:
@@ -144,7 +144,7 @@ class ConsoleOperator:
             self._bell()
         if self._live is None:
             self._log_view(view)
-        elif monotonic() - self._drawn >= 1 / FRAMES or view.phase == "taken":
+        elif monotonic() - self._drawn >= 1 / FRAMES_PER_S or view.phase == "taken":
             self._draw()
 
     def _bell(self) -> None:
@@ -177,8 +177,8 @@ class ConsoleOperator:
             self._live.update(self.screen(), refresh=True)
 
     def screen(self) -> RenderableType:
-        """What is shown now."""
-        return self._screen.drawn()
+        """The present drawing."""
+        return self._screen.layout()
 
     def _has_keys(self) -> bool:
         return self._keyboard is not None and self._keyboard.has_keys

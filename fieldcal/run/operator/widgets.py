@@ -1,4 +1,4 @@
-"""What the operator's screen is made of: inclinometer, meters, list, link.
+"""Parts of the operator's screen: inclinometer, meters, list, link.
 
 All of it reads without colour, and fits into 76 columns.
 """
@@ -14,16 +14,16 @@ from rich.text import Text
 from fieldcal.run.operator.protocol import OperatorView
 from fieldcal.run.position_check import round_to_tenth
 
-METER = 20
+METER_WIDTH = 20
 """Width of the stillness meter, characters."""
 
-BAR = 30
+BAR_WIDTH = 30
 """Width of the bar that fills while averaging, characters."""
 
 TICKS = (0.0, 2.0, 5.0, 15.0, 45.0, 180.0)
 """Angle of each second character of half the inclinometer, deg; a fixed scale."""
 
-HALF = 2 * (len(TICKS) - 1)
+HALF_WIDTH = 2 * (len(TICKS) - 1)
 """Characters to either side of the middle, which is the wanted angle."""
 
 RULER = "  -45  -5  0   5  45  "
@@ -33,8 +33,8 @@ UNSEEN = "by its mark, gravity does not show it"
 """Notice for a third angle: accelerometers at rest show two only."""
 
 CRYSTAL = 1000.0
-"""± of a clock that says nothing, ppm: any crystal is better. So it is for a while once
-the computer was asleep, for samples that waited meanwhile came late."""
+"""Uncertainty above which a clock error is not shown, ppm, since any crystal is better.
+It is that large for a while after the computer slept, since samples arrived late."""
 
 NEAR = 1.0
 """Least error of an angle, deg, for which a turn is requested."""
@@ -62,7 +62,7 @@ def angles(view: OperatorView) -> list[tuple[str, Text]]:
 
 
 def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
-    """Where it is (o), where it should be (the middle), and which way to turn.
+    """Scale with the angle (o), the wanted angle (middle) and the direction to turn.
 
     Parameters
     ----------
@@ -73,9 +73,11 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     """
     off = round_to_tenth(wanted - seen)
     away = 2 * float(np.interp(abs(off), TICKS, range(len(TICKS))))
-    place = HALF - int(np.copysign(np.ceil(away - 1e-9), off)) if off else HALF
-    cells = ["·"] * (2 * HALF + 1)
-    cells[HALF], cells[place] = "|", "o"
+    place = (
+        HALF_WIDTH - int(np.copysign(np.ceil(away - 1e-9), off)) if off else HALF_WIDTH
+    )
+    cells = ["·"] * (2 * HALF_WIDTH + 1)
+    cells[HALF_WIDTH], cells[place] = "|", "o"
     within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
     there = ok or abs(off) < NEAR
     way = "→" if off > 0 else "←"
@@ -89,9 +91,9 @@ def stillness(level: float) -> Text:
     """Meter of the motion, relative to the allowed motion."""
     if not np.isfinite(level):
         return Text("listening to the device's noise")
-    filled = int(np.clip(round(level * METER / 2), 0, METER))
-    bar = f"{'#' * filled:·<{METER}}"
-    limit = METER // 2
+    filled = int(np.clip(round(level * METER_WIDTH / 2), 0, METER_WIDTH))
+    bar = f"{'#' * filled:·<{METER_WIDTH}}"
+    limit = METER_WIDTH // 2
     word, style = ("still", "green") if level < 1 else ("MOVING", "bold yellow")
     return Text.assemble(f"[{bar[:limit]}|{bar[limit:]}] ", (word, style))
 
@@ -119,7 +121,7 @@ def sigma_at_end(view: OperatorView) -> str:
 
 
 def gauges(view: OperatorView) -> Table:
-    """Everything that is measured now."""
+    """All present measurements."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(width=9)
     grid.add_column()
@@ -133,7 +135,7 @@ def gauges(view: OperatorView) -> Table:
     else:
         seconds = view.hold.seconds
         share = min(1.0, view.elapsed / seconds)
-        bar = Text(f"[{'#' * round(share * BAR):·<{BAR}}] {share:4.0%}")
+        bar = Text(f"[{'#' * round(share * BAR_WIDTH):·<{BAR_WIDTH}}] {share:4.0%}")
         left = max(0.0, seconds - view.elapsed)
         grid.add_row("averaging", bar)
         grid.add_row("time left", f"{left:.0f} s of {seconds:.0f} s")
@@ -146,7 +148,7 @@ def gauges(view: OperatorView) -> Table:
 
 
 def progress(taken: Mapping[int, float], now: int, number: int) -> str:
-    """Which positions are taken and which are left, in one line.
+    """Line with the positions that are taken and that are left.
 
     >>> progress({0: 1e-3, 1: 1e-3}, 2, 5)
     'taken 1 2 · now 3 · left 4 5'
@@ -159,7 +161,7 @@ def progress(taken: Mapping[int, float], now: int, number: int) -> str:
 
 
 def short_gauges(view: OperatorView) -> list[str]:
-    """What is measured now in a few short lines, for a small screen."""
+    """All present measurements in a few short lines, for a small screen."""
     if view.phase in ("averaging", "taken"):
         left = max(0.0, view.hold.seconds - view.elapsed)
         reached = f", ± {known}" if (known := sigma(view)) else ""

@@ -1,6 +1,6 @@
-"""The run on a phone or tablet: what the console shows, for whoever stands at the box.
+"""Page of a run for phone and tablet, with the same content as the console.
 
-`watched` is an operator that shows another one's run here as well, `board` holds what
-there is to see, `buttons` says who may press them, `access` lets in who has the token,
-`server` serves the page. Nothing of it comes from elsewhere: it works offline.
+`page_operator` shows the run of another operator on the page as well, `board` has the
+content, `buttons` decides which client may press them, `access` checks tokens, and
+`server` serves the page. No file comes from another host, so it works offline.
 """

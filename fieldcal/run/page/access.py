@@ -1,9 +1,8 @@
-"""Who is let in to the page: whoever has the token, from this page and no other.
+"""Access control of the page, by a token and by the origin of a request.
 
-The token comes once in the address that the code on the console holds, and goes into a
-cookie; programs send theirs with each request. Requests under another host's name (a
-name that was made to point here), and those that want something and do not come from
-the page itself, are refused.
+The address on the console contains the token, which is then kept in a cookie. Programs
+send their own token with each request. Requests under another host name (DNS rebinding)
+are refused, and so are requests that change something and do not come from the page.
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class Access:
-    """What a request has to show.
+    """Conditions for a request to be allowed.
 
     Attributes
     ----------
     hosts : names with ports under which the page is served
-    token : what the address on the console holds
+    token : contained in the address on the console
     bearers : tokens of programs
     uploads : largest body of a path that takes files, bytes
 
@@ -56,40 +55,48 @@ class Access:
             k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]
         }
         if headers.get("host", "") not in self.hosts:
-            return _refused(421, "this page is served under the address on the console")
+            return _refusal_response(
+                421, "this page is served under the address on the console"
+            )
         given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token")
-        if given and scope["path"] == "/" and self._right(given[0]):
+        if given and scope["path"] == "/" and self._is_page_token(given[0]):
             answer = RedirectResponse("/", 303)
             answer.set_cookie(COOKIE, self.token, httponly=True, samesite="lax")
             return answer
         scheme, _, sent = headers.get("authorization", "").partition(" ")
-        program = scheme.lower() == "bearer" and self._known(sent.strip())
+        program = scheme.lower() == "bearer" and self._is_program_token(sent.strip())
         if scheme.lower() == "bearer" and not program:
-            return _refused(403, "this token is none of a program: fieldcal serve takes"
-                            " those of its --tokens file")  # fmt: skip
-        if not program and not self._right(_cookie(headers.get("cookie", ""))):
-            return _refused(403, "scan the code that the console shows, or open the"
-                            " address beside it")  # fmt: skip
+            why = "this token is none of a program: fieldcal serve takes"
+            return _refusal_response(403, f"{why} those of its --tokens file")
+        if not program and not self._is_page_token(
+            _cookie_token(headers.get("cookie", ""))
+        ):
+            why = "scan the code that the console shows, or open the address beside it"
+            return _refusal_response(403, why)
         if scope["method"] in ("GET", "HEAD"):
             return None
         here = {f"{s}://{host}" for host in self.hosts for s in ("http", "https")}
         if not program and headers.get("origin", "") not in here:
-            return _refused(403, "what is wanted has to come from the page itself")
+            return _refusal_response(
+                403, "what is wanted has to come from the page itself"
+            )
         if scope["method"] == "DELETE":
             return None
         most = self.uploads.get(scope["path"])
         kind = headers.get("content-type", "")
         if most is None and not kind.startswith("application/json"):
-            return _refused(415, "what is wanted comes as JSON")
+            return _refusal_response(415, "what is wanted comes as JSON")
         length, most = headers.get("content-length", ""), most or LARGEST
         if not length.isdecimal() or len(length) > 15 or int(length) > most:
-            return _refused(413, f"at most {most} bytes, and how many has to be said")
+            return _refusal_response(
+                413, f"at most {most} bytes, and how many has to be said"
+            )
         return None
 
-    def _right(self, given: str) -> bool:
+    def _is_page_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
-    def _known(self, given: str) -> bool:
+    def _is_program_token(self, given: str) -> bool:
         """Whether a program's token is valid; all are compared, in constant time."""
         found = [hmac.compare_digest(given.encode(), b.encode()) for b in self.bearers]
         return any(found)
@@ -120,11 +127,11 @@ class Gate:
         await answer(scope, receive, with_headers)  # type: ignore[arg-type]
 
 
-def _refused(status: int, why: str) -> Response:
+def _refusal_response(status: int, why: str) -> Response:
     return PlainTextResponse(f"refused: {why}\n", status)
 
 
-def _cookie(header: str) -> str:
+def _cookie_token(header: str) -> str:
     try:
         found = SimpleCookie(header).get(COOKIE)
     except CookieError:

@@ -22,9 +22,9 @@ class Board:
 
     Parameters
     ----------
-    title : what is being done, and where it is recorded
-    positions : all that will be asked for
-    most : positions that there are at most, where they are found on the way
+    title : name of the run, and the folder it is recorded in
+    positions : positions that will be asked for
+    most : largest number of positions; None if `positions` has them all
 
     """
 
@@ -122,7 +122,7 @@ def _angles(position: Position) -> dict[str, float] | None:
 
 
 def _measured(view: OperatorView) -> dict[str, Any]:
-    """What is measured now."""
+    """Present measurements."""
     out: dict[str, Any] = {
         "phase": view.phase,
         "link": escape_invisible(widgets.link_state(view).plain),

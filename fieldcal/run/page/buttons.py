@@ -1,4 +1,4 @@
-"""Who may press the buttons of the page: one client at a time; all may watch."""
+"""Buttons of the page. One client at a time may press them; all may watch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import get_args
 
 from fieldcal.run.operator.protocol import Wish
 
-GONE = 15.0
+GONE_AFTER_S = 15.0
 """Time without contact after which a client loses the buttons, s."""
 
 OFFERED = frozenset(get_args(Wish)) - {"wait"}
@@ -18,11 +18,11 @@ OFFERED = frozenset(get_args(Wish)) - {"wait"}
 
 
 class Buttons:
-    """The buttons, and who holds them.
+    """The buttons, and the client that holds them.
 
     Parameters
     ----------
-    clock : s
+    clock : returns the time, s
 
     """
 
@@ -44,10 +44,10 @@ class Buttons:
             return self._free()
 
     def _free(self) -> bool:
-        return not self._holder or self._clock() - self._heard > GONE
+        return not self._holder or self._clock() - self._heard > GONE_AFTER_S
 
     def take(self, client: str, over: bool = False) -> bool:
-        """Take the buttons; from somebody else only if they are asked for `over`."""
+        """Take the buttons; from another client only if `over`."""
         with self._lock:
             if client != self._holder and not (over or self._free()):
                 return False

@@ -24,16 +24,16 @@ from fieldcal.run.page.buttons import OFFERED, Buttons
 
 FILES = Path(__file__).parent / "files"
 
-EVERY = 0.125
+VIEW_EVERY_S = 0.125
 """Shortest time between two views that are sent, s."""
 
-ALIVE = 2.0
+MESSAGE_EVERY_S = 2.0
 """Longest time between two messages to a client, s."""
 
-LINGER = 3.0
+LINGER_S = 3.0
 """Time that the last state is offered to clients that have not seen it, s."""
 
-NAME = 64
+LONGEST_NAME = 64
 """Longest name of a client."""
 
 
@@ -43,13 +43,13 @@ class PageServer:
     Parameters
     ----------
     host, port : where to listen; port 0 is any that is free
-    board : what there is to see, once there is a run
-    buttons : what is pressed
+    board : content of the page, replaced when the run begins
+    buttons : of the page
 
     Raises
     ------
     InputError
-        If nothing can listen there.
+        If it cannot listen there.
 
     """
 
@@ -61,7 +61,7 @@ class PageServer:
         name = f"[{host}]" if ":" in host else host
         self.access = Access((f"{name}:{port}",))
         config = uvicorn.Config(
-            Gate(_app(self), self.access), log_config=None, access_log=False,
+            Gate(_make_app(self), self.access), log_config=None, access_log=False,
             lifespan="off", timeout_graceful_shutdown=1, server_header=False,
             limit_concurrency=64,
         )  # fmt: skip
@@ -85,11 +85,11 @@ class PageServer:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        until = monotonic() + LINGER
+        until = monotonic() + LINGER_S
         while monotonic() < until and any(
             seen < self.board.version for seen in tuple(self._seen.values())
         ):
-            sleep(EVERY)
+            sleep(VIEW_EVERY_S)
         self._server.should_exit = True
         self._thread.join(timeout=5.0)
         self._socket.close()
@@ -104,14 +104,14 @@ class PageServer:
 
     async def views(self, client: str) -> AsyncIterator[str]:
         """Every change, as events of server-sent events."""
-        before, sent = "", -ALIVE
+        before, sent = "", -MESSAGE_EVERY_S
         try:
             while not self._server.should_exit:
                 now = self.content_for(client)
-                if now != before or monotonic() - sent > ALIVE:
+                if now != before or monotonic() - sent > MESSAGE_EVERY_S:
                     before, sent = now, monotonic()
                     yield f"data: {now}\n\n"
-                await asyncio.sleep(EVERY)
+                await asyncio.sleep(VIEW_EVERY_S)
         finally:
             self._seen.pop(client, None)
 
@@ -148,7 +148,7 @@ def local_address() -> str:
             return "127.0.0.1"
 
 
-def _app(server: PageServer) -> Starlette:
+def _make_app(server: PageServer) -> Starlette:
     async def page(_: Request) -> Response:
         return FileResponse(FILES / "page.html", media_type="text/html")
 
@@ -165,7 +165,7 @@ def _app(server: PageServer) -> Starlette:
         return StreamingResponse(server.views(client), media_type="text/event-stream")
 
     async def take(request: Request) -> Response:
-        given = await _object(request)
+        given = await _request_object(request)
         if given is None or type(given.get("over", False)) is not bool:
             return JSONResponse({"error": "client and over are wanted"}, 400)
         if not server.buttons.take(given["client"], given.get("over", False)):
@@ -173,7 +173,7 @@ def _app(server: PageServer) -> Starlette:
         return JSONResponse({})
 
     async def wish(request: Request) -> Response:
-        given = await _object(request)
+        given = await _request_object(request)
         wished = None if given is None else given.get("wish")
         if given is None or not isinstance(wished, str) or wished not in OFFERED:
             return JSONResponse({"error": "client and wish are wanted"}, 400)
@@ -192,8 +192,8 @@ def _app(server: PageServer) -> Starlette:
     return Starlette(routes=routes)
 
 
-async def _object(request: Request) -> dict[str, Any] | None:
-    """What a request wants, with the client's name; None where it is none."""
+async def _request_object(request: Request) -> dict[str, Any] | None:
+    """JSON object of a request, with the client's name; None if it is invalid."""
     try:
         given = json.loads(await request.body())
     except (ValueError, RecursionError):
@@ -202,4 +202,6 @@ async def _object(request: Request) -> dict[str, Any] | None:
 
 
 def _is_name(client: Any) -> bool:
-    return isinstance(client, str) and 0 < len(client) <= NAME and client.isalnum()
+    return (
+        isinstance(client, str) and 0 < len(client) <= LONGEST_NAME and client.isalnum()
+    )

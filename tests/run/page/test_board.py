@@ -12,8 +12,8 @@ from fieldcal.drivers.driver import LinkHealth
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.page.board import Board
-from fieldcal.run.page.buttons import GONE, Buttons
-from fieldcal.run.page.watched import WatchedOperator
+from fieldcal.run.page.buttons import GONE_AFTER_S, Buttons
+from fieldcal.run.page.page_operator import PageOperator
 from fieldcal.run.position_check import PositionCheck
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -155,9 +155,9 @@ def test_whoever_is_gone_leaves_the_buttons() -> None:
     clock = Clock()
     buttons = Buttons(clock)
     buttons.take("a")
-    clock.now = GONE - 1
+    clock.now = GONE_AFTER_S - 1
     assert buttons.note_watcher("a") and not buttons.is_free()
-    clock.now += GONE - 1
+    clock.now += GONE_AFTER_S - 1
     assert not buttons.is_free() and not buttons.take("b")
     clock.now += 2
     assert buttons.is_free() and buttons.take("b")
@@ -188,7 +188,7 @@ class Console:
 
 def test_the_console_is_shown_everything_and_both_may_wish() -> None:
     console, board, buttons = Console(), Board("fieldcal", FIVE_POSITIONS), Buttons()
-    both = WatchedOperator(console, board, buttons)
+    both = PageOperator(console, board, buttons)
     buttons.take("a")
     buttons.press("a", "stop")
     now, reason = view("turning"), WaitReason(WaitState.NO_SAMPLES, "no samples")

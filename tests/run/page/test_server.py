@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from processes import HANGS, TWO_POSITION, steady
 
-from fieldcal.commands.run_page import address_of
+from fieldcal.commands.run_page import parse_address
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
@@ -204,7 +204,7 @@ def test_an_address_that_is_not_here_or_taken_is_said() -> None:
         PageServer("192.0.2.1")
     for wrong in ("", "host:", "host:x", "host:70000", ":80"):
         with pytest.raises(InputError, match="--page"):
-            address_of(wrong)
+            parse_address(wrong)
 
 
 def test_a_run_is_watched_to_its_end(tmp_path: Path) -> None:

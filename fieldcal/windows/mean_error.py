@@ -129,7 +129,7 @@ def without_lines(power: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class MeanError:
-    """How well the mean of a window of c channels is known.
+    """Error of the mean of a window of c channels.
 
     Attributes
     ----------

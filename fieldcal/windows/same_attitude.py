@@ -1,14 +1,14 @@
 """Whether the device has the same attitude after a disturbance as before.
 
-Somebody bumps the table, or a door slams: two still stretches with a gap of g seconds
-between them. theta is the lasting rotation of the device, b the jump of the biases of
-the accelerometers. Measured are
+A disturbance, such as a bump of the table, leaves two still stretches with a gap of g
+seconds between them. theta is the lasting rotation of the device, b the jump of the
+biases of the accelerometers. Measured are
 
     d = mean f after - mean f before = f x theta + b + e,   phi = theta + e'        (1)
 
 phi is the integral of the gyroscopes over the gap, less their mean beside it. Either
-theta is 0, or it is random, N(0, TURNED^2); and b is 0, or with a small probability a
-jump, N(0, JUMPED^2). By Bayes' rule over these four cases
+theta is 0, or it is random, N(0, TYPICAL_ROTATION^2); and b is 0, or with a small
+probability a jump, N(0, TYPICAL_JUMP^2). By Bayes' rule over these four cases
 
     P(as before) = sum over b of P(b) N(d, phi | theta = 0, b) / sum over all       (2)
 
@@ -43,48 +43,54 @@ from numpy.typing import NDArray
 
 from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.windows.cells import CELL, CellRows, CellTable, SamplesBetween, hold_last
+from fieldcal.windows.cells import (
+    CELL,
+    CellRows,
+    CellTable,
+    SamplesBetween,
+    fill_with_previous,
+)
 from fieldcal.windows.dead_axis import LiveAxisRows
 from fieldcal.windows.quiet import ENOUGH, LEVELS, estimate_quiet_noise
 from fieldcal.windows.rests import PAUSES, SPAN, cell_index, cell_table
 
-TURNED = 5e-3
+TYPICAL_ROTATION = 5e-3
 """Typical lasting rotation by a bump, rad about each axis: some tenths of a degree, as
 feet slip and cushions give way."""
 
-AS_BEFORE = 0.5
+PRIOR_UNMOVED = 0.5
 """Prior probability that a bump leaves the attitude unchanged."""
 
-JUMP, JUMPED = 0.01, 5e-2
+JUMP_PROBABILITY, TYPICAL_JUMP = 0.01, 5e-2
 """Prior probability that a bump makes the biases jump, and the typical jump, m/s^2; as
 in the effect `bias_step`."""
 
-SURE = 0.99
+LEAST_PROBABILITY = 0.99
 """Probability from which the attitude counts as unchanged; otherwise a new position
 begins, and the rotation is determined by the turn between both."""
 
-SMALL = 0.1
+LARGEST_ANGLE = 0.1
 """Largest angle within the gap, rad; beyond it the device was carried elsewhere."""
 
 LONGEST_S = 60.0
 """Longest gap that is judged, s: the longest turn that is integrated."""
 
-BESIDE = 6000
+NOISE_CELLS = 6000
 """Cells on either side from which the noise is estimated: ten minutes."""
 
-LONGER = 2
+EXTRA_LEVELS = 2
 """Noise levels beyond the usual ones, where they are measured: up to 51 s."""
 
-DRIFT = 4
+SLOPE_STRETCH = 4
 """Length of the stretch that gives the slope, as a multiple of T."""
 
-CHANCE = 1e-3
+NOISE_PROBABILITY = 1e-3
 """Probability of the scatter in a gap by noise alone, below which it was disturbed."""
 
-CLOSE = 20
+CELLS_BESIDE_GAP = 20
 """Cells beside a gap that predict the samples in it: two seconds."""
 
-QUICK = 4
+DIFFERENCE_ORDER = 4
 """Order of the differences of rates that give their fast part."""
 
 
@@ -149,24 +155,28 @@ def _gaps_to_leave_out(
     if gap[1] - gap[0] > LONGEST_S:
         return None
     began, ended, begins, ends = (cell_index(rows, t) for t in (*first, *later))
-    before = cell_table(rows[max(began, ended - BESIDE) : ended], origin)
-    after = cell_table(rows[begins + 1 : min(ends, begins + 1 + BESIDE)], origin)
+    before = cell_table(rows[max(began, ended - NOISE_CELLS) : ended], origin)
+    after = cell_table(rows[begins + 1 : min(ends, begins + 1 + NOISE_CELLS)], origin)
     way = concat(list(between(gap[0] - CELL, gap[1] + CELL)))
-    if min(len(before), len(after)) < 2 or _paused(way.t):
+    if min(len(before), len(after)) < 2 or _has_pause(way.t):
         return None
-    if not probability_unmoved(before, way, after, gap) > SURE:
+    if not probability_unmoved(before, way, after, gap) > LEAST_PROBABILITY:
         return None
-    return [] if _untouched(before, way.between(*gap), after) else [gap]
+    return [] if _is_untouched(before, way.between(*gap), after) else [gap]
 
 
-def _untouched(before: CellTable, way: Block, after: CellTable) -> bool:
+def _is_untouched(before: CellTable, way: Block, after: CellTable) -> bool:
     """Whether samples agree with `before` up to some instant, and then with `after`."""
-    noise = hold_last(
+    noise = fill_with_previous(
         np.vstack([before.short_lag_variance, after.short_lag_variance])
     ).mean(axis=0)
     noise = noise + np.maximum(before.rounding, after.rounding) ** 2
-    one = before.origin + hold_last(before.means)[-CLOSE:].mean(axis=0)
-    other = after.origin + hold_last(after.means)[:CLOSE].mean(axis=0)
+    one = before.origin + fill_with_previous(before.means)[-CELLS_BESIDE_GAP:].mean(
+        axis=0
+    )
+    other = after.origin + fill_with_previous(after.means)[:CELLS_BESIDE_GAP].mean(
+        axis=0
+    )
     known = np.isfinite(one + other + noise) & (noise > 0)
     six = way.six[:, known]
     if not np.isfinite(six).all():
@@ -175,10 +185,10 @@ def _untouched(before: CellTable, way: Block, after: CellTable) -> bool:
                    for level in (one, other))  # fmt: skip
     early, late = np.append(0.0, early), np.append(0.0, late)
     least = float((early + late[-1] - late).min())
-    return chi2_tail(least, six.size) > CHANCE
+    return chi2_tail(least, six.size) > NOISE_PROBABILITY
 
 
-def _paused(t: Array) -> bool:
+def _has_pause(t: Array) -> bool:
     """Whether the recording paused between these instants, s."""
     step = np.diff(t)
     if not len(step):
@@ -202,8 +212,8 @@ def probability_unmoved(
     inside = way.between(*gap)
     turned, unsure, most = _turn_in_gap(inside, level[3:], change[3:], spread[3:])
     if np.isnan(most):  # gravity leans as far as the device
-        most = _largest_lean(inside, level[:3])
-    if not most < SMALL:
+        most = _largest_angle(inside, level[:3])
+    if not most < LARGEST_ANGLE:
         return 0.0
     seen = np.concatenate([change[:3], turned])
     noise = np.concatenate([spread[:3], unsure])
@@ -212,15 +222,18 @@ def probability_unmoved(
     if not known[0] and not known[3:].all():
         return 0.0
     lean = np.vstack([_cross_matrix(np.nan_to_num(level[:3])), np.eye(3)])  # (1)
-    jump = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * JUMPED**2
+    jump = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * TYPICAL_JUMP**2
     logs = np.array(
         [
             np.log(p * q) + _log_density(seen, np.diag(noise) + turn + step, known)
             for p, turn in (
-                (AS_BEFORE, np.zeros((6, 6))),
-                (1 - AS_BEFORE, TURNED**2 * lean @ lean.T),
+                (PRIOR_UNMOVED, np.zeros((6, 6))),
+                (1 - PRIOR_UNMOVED, TYPICAL_ROTATION**2 * lean @ lean.T),
             )
-            for q, step in ((1 - JUMP, np.zeros((6, 6))), (JUMP, jump))
+            for q, step in (
+                (1 - JUMP_PROBABILITY, np.zeros((6, 6))),
+                (JUMP_PROBABILITY, jump),
+            )
         ]
     )
     weight = np.exp(logs - logs.max())
@@ -235,16 +248,21 @@ def _compare_means(
     (6,) each, SI. The means of each channel are over the time with the least
     variance (3).
     """
-    left, right = hold_last(before.means)[::-1], hold_last(after.means)
+    left, right = (
+        fill_with_previous(before.means)[::-1],
+        fill_with_previous(after.means),
+    )
     fewest = min(len(left), len(right))
     both = np.vstack([left[::-1], right])
-    longer = LONGER * (len(both) > ENOUGH * 2 ** (LEVELS + LONGER - 1))
+    longer = EXTRA_LEVELS * (len(both) > ENOUGH * 2 ** (LEVELS + EXTRA_LEVELS - 1))
     allan = estimate_quiet_noise(both, levels=LEVELS + longer).allan
     found = []
     for k, a in enumerate(allan[: fewest.bit_length()]):
         n = 2**k
         apart = gap + n * CELL
-        drift = (_slope(right[: DRIFT * n]) - _slope(left[: DRIFT * n])) / 2
+        drift = (
+            _slope(right[: SLOPE_STRETCH * n]) - _slope(left[: SLOPE_STRETCH * n])
+        ) / 2
         spread = 2 * a**2 * flicker_bias_function(1 + gap / (n * CELL))  # (3)
         means = left[:n].mean(axis=0), right[:n].mean(axis=0)
         found.append((*means, spread + (drift * apart) ** 2))
@@ -292,14 +310,14 @@ def _turn_in_gap(
     rate = way.gyr - level
     angle = np.cumsum((rate[1:] + rate[:-1]) / 2 * step, axis=0)
     most = float(np.linalg.norm(angle, axis=1).max())
-    order = min(QUICK, len(rate) - 1)
+    order = min(DIFFERENCE_ORDER, len(rate) - 1)
     quick = np.diff(rate, order, axis=0) ** 2 / comb(2 * order, order)
     drawn = len(rate) * float(np.median(step)) ** 2 * quick.mean(axis=0)
     bias = float(way.t[-1] - way.t[0]) ** 2 * (spread / 4 + change**2 / 12)
     return angle[-1], drawn + bias + (most**2 / 2) ** 2, most  # (4)
 
 
-def _largest_lean(way: Block, force: Array) -> float:
+def _largest_angle(way: Block, force: Array) -> float:
     """Largest angle from `force` within the gap, rad, by means over cells."""
     whole = way.acc[np.isfinite(way.acc).all(axis=1)]
     if not len(whole):

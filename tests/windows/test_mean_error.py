@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.windows import longrun
-from fieldcal.windows.longrun import (
+from fieldcal.windows import mean_error
+from fieldcal.windows.mean_error import (
     CORNERS,
     KNEES,
     SHAPES,
@@ -94,7 +94,7 @@ def test_the_variance_of_a_mean_is_that_of_its_spectrum(
 
 
 def test_the_family_is_every_corner_with_every_knee_and_the_walks() -> None:
-    made = longrun._shape_family()
+    made = mean_error._shape_family()
     for name in ("corner", "knee", "walk", "log_prior"):
         np.testing.assert_array_equal(getattr(made, name), getattr(SHAPES, name))
     rows = list(zip(made.corner, made.knee, made.walk, strict=True))

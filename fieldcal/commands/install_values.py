@@ -1,7 +1,7 @@
-"""What to install in an autopilot after a recalibration from what it sent.
+"""Parameters to install in an autopilot after a recalibration from its samples.
 
-It sends samples with its own calibration in them, so what is found from them stands on
-top of that: see `writeback`.
+An autopilot applies its own calibration to the samples that it sends. A calibration of
+these samples is therefore combined with the installed one, see `install.proposal`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 GROUPS = ("acc_bias", "acc_scale", "gyr_bias")
 
 
-def with_installed(calibration: Calibration, session: Session) -> Calibration:
-    """Add what was installed, and what to install now with its ±, or why not."""
+def add_install_values(calibration: Calibration, session: Session) -> Calibration:
+    """Add the installed parameters and those to install, or a warning why not."""
     from fieldcal.install.proposal import installed_in
 
     there = installed_in(session)
@@ -30,7 +30,7 @@ def with_installed(calibration: Calibration, session: Session) -> Calibration:
         return calibration
     info = {**calibration.info, "installed": there.as_table()}
     try:
-        info["install"] = _next(calibration, session, there)
+        info["install"] = _values_to_install(calibration, session, there)
     except InputError as error:
         said = f"nothing to install in the autopilot: {error}"
         warnings = (*calibration.warnings, said)
@@ -38,8 +38,8 @@ def with_installed(calibration: Calibration, session: Session) -> Calibration:
     return replace(calibration, info=info)
 
 
-def lines(calibration: Calibration) -> list[str]:
-    """What to install, as an operator types it, with its ± and what it was."""
+def install_lines(calibration: Calibration) -> list[str]:
+    """Parameters to install, with their ± and the values they had, one line each."""
     from fieldcal.calibration.wording import format_with_sigma
 
     told = []
@@ -51,8 +51,8 @@ def lines(calibration: Calibration) -> list[str]:
     return told
 
 
-def check_same(calibration: Calibration, session: Session) -> None:
-    """Refuse to apply a calibration on top of another than it was found on.
+def check_same_installed(calibration: Calibration, session: Session) -> None:
+    """Refuse a calibration that was found with other installed parameters.
 
     Raises
     ------
@@ -66,7 +66,10 @@ def check_same(calibration: Calibration, session: Session) -> None:
     found, there = calibration.info.get("installed"), installed_in(session)
     if not found or not there:
         return
-    before, now = _effective(InstalledCalibration.from_table(found)), _effective(there)
+    before, now = (
+        _effective_parameters(InstalledCalibration.from_table(found)),
+        _effective_parameters(there),
+    )
     for name in sorted(before.keys() & now.keys()):
         if not np.isclose(before[name], now[name], rtol=1e-6, atol=1e-9):
             raise InputError(
@@ -76,8 +79,8 @@ def check_same(calibration: Calibration, session: Session) -> None:
             )
 
 
-def _effective(known: InstalledCalibration) -> dict[str, float]:
-    """Parameters as they were in the samples."""
+def _effective_parameters(known: InstalledCalibration) -> dict[str, float]:
+    """Parameters by which the autopilot corrected the samples."""
     from fieldcal.drivers.mavlink_installed import identity_parameters, parameter_names
 
     of_it = sum(parameter_names(known.autopilot, known.instance).values(), start=())
@@ -85,7 +88,7 @@ def _effective(known: InstalledCalibration) -> dict[str, float]:
     return {**had, **(identity_parameters(known) if known.taken_out else {})}
 
 
-def _next(
+def _values_to_install(
     calibration: Calibration, session: Session, there: InstalledCalibration
 ) -> dict[str, dict[str, Any]]:
     from fieldcal.calibration import Nominal

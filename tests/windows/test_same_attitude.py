@@ -7,9 +7,9 @@ import pytest
 
 from fieldcal.core.samples import Block, concat
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
-from fieldcal.windows.knocks import (
-    SURE,
-    TURNED,
+from fieldcal.windows.same_attitude import (
+    LEAST_PROBABILITY,
+    TYPICAL_ROTATION,
     RestPeriod,
     flicker_bias_function,
     join_rests,
@@ -150,13 +150,15 @@ def test_what_is_said_to_be_sure_is() -> None:
     said, true = [], []
     for seed in range(120):
         as_it_lay = bool(rng.integers(2))
-        turned = 0.0 if as_it_lay else float(np.rad2deg(TURNED) * rng.rayleigh())
+        turned = (
+            0.0 if as_it_lay else float(np.rad2deg(TYPICAL_ROTATION) * rng.rayleigh())
+        )
         block = recorded(seed, turned, noise=0.1)
         gap = (39.5, 42.0)
         sides = [block.between(30.0, gap[0]), block.between(gap[1], 51.0)]
         before, after = cells_of(sides)
         way = block.between(gap[0] - CELL, gap[1] + CELL)
-        said.append(probability_unmoved(before, way, after, gap) > SURE)
+        said.append(probability_unmoved(before, way, after, gap) > LEAST_PROBABILITY)
         true.append(as_it_lay)
     sure, same = np.array(said), np.array(true)
     assert sure[same].mean() > 0.8

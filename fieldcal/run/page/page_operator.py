@@ -1,4 +1,4 @@
-"""An operator that also shows the run on the page and takes wishes from it."""
+"""Operator that also shows the run on the page and takes wishes from there."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from fieldcal.run.page.buttons import Buttons
 from fieldcal.run.wait_reason import WaitReason
 
 
-class WatchedOperator:
-    """Another operator, seen and wished on the page.
+class PageOperator:
+    """Wraps an operator; the page shows the run as well, and its buttons are wishes.
 
     Parameters
     ----------
     inner : the operator at the console, or the script
-    board : what the page shows
-    buttons : what is pressed there
+    board : content of the page
+    buttons : of the page
 
     """
 
@@ -45,5 +45,5 @@ class WatchedOperator:
         self._inner.show(view)
 
     def wish(self) -> Wish | None:
-        """A wish of the other operator or of the page, which confirms by itself."""
+        """Wish from the page, else from the wrapped operator."""
         return self._buttons.pressed() or self._inner.wish()

@@ -9,21 +9,21 @@ from fieldcal.core.errors import MoverGone
 from fieldcal.core.positions import Position
 from fieldcal.run.movers import Mover
 
-RETRY = 2.0
+RETRY_S = 2.0
 """Time between two attempts, s."""
 
 
-class PatientMover:
-    """Turns by another mover, and again where that is gone.
+class RetryingMover:
+    """Wraps a mover; a turn is repeated while its connection is lost.
 
     Parameters
     ----------
-    mover : who turns
+    mover : to be wrapped
     patience : how long to try, s
 
     Attributes
     ----------
-    tell : called with a sentence when it goes
+    tell : called with a sentence when the connection is lost
 
     """
 
@@ -41,12 +41,12 @@ class PatientMover:
         self._try(self._turn)
 
     def busy(self) -> bool:
-        """Whether it is at work, or gone.
+        """Whether it is turning, or its connection is lost.
 
         Raises
         ------
         MoverFailed
-            If it has not come back.
+            If the connection has not come back in time.
 
         """
         if not self._down:
@@ -69,7 +69,7 @@ class PatientMover:
         try:
             done = what()
         except MoverGone as gone:
-            self._down, self._next = True, monotonic() + RETRY
+            self._down, self._next = True, monotonic() + RETRY_S
             if self._first is None:
                 self._first, self._until = gone, monotonic() + self._patience
                 self.tell(f"{gone}; tried again for {self._patience:g} s")

@@ -1,4 +1,4 @@
-"""The address that hears a virtual device, from the options it was started with."""
+"""Address to open a virtual device, from the options it was started with."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ import argparse
 from collections.abc import Sequence
 from urllib.parse import parse_qsl, urlencode
 
-USUAL_HZ = 100.0
-"""Rate of a virtual device that was told none."""
+DEFAULT_HZ = 100.0
+"""Rate of a virtual device without --rate."""
 
-WRITTEN = ("digits", "time", "numbers")
-"""Options of a format that only a writer has."""
+WRITER_OPTIONS = ("digits", "time", "numbers")
+"""Options of a wire format that only the sender has."""
 
 
-def address(options: Sequence[str], place: str) -> str:
-    """Return the driver's address for what `fieldcal sim` says it listens at.
+def driver_address(options: Sequence[str], place: str) -> str:
+    """Return the driver's address of a virtual device.
 
-    >>> address(["--can", "slcan"], "/dev/pts/7")
+    `options` are those of `fieldcal sim`, `place` is the port or endpoint it printed.
+
+    >>> driver_address(["--can", "slcan"], "/dev/pts/7")
     'can:/dev/pts/7?interface=slcan&dbc=virtual'
-    >>> address(["--serial", "vnimu", "--rate", "40"], "/dev/pts/7")
+    >>> driver_address(["--serial", "vnimu", "--rate", "40"], "/dev/pts/7")
     'serial:/dev/pts/7?format=vnimu&rate=40'
     """
     from fieldcal.commands import sim
@@ -26,7 +28,7 @@ def address(options: Sequence[str], place: str) -> str:
     parser = argparse.ArgumentParser()
     sim.add_arguments(parser)
     given = parser.parse_args(options)
-    rate = given.rate or USUAL_HZ
+    rate = given.rate or DEFAULT_HZ
     if given.mavlink:
         return f"mavlink:{place}?rate={rate:g}"
     if given.can:
@@ -37,7 +39,7 @@ def address(options: Sequence[str], place: str) -> str:
     timed = name != "vnimu" and told.get("time") != "0"
     if name == "text" and "columns" in told:
         timed = "t" in told["columns"].split(",")
-    told = {key: value for key, value in told.items() if key not in WRITTEN}
+    told = {key: value for key, value in told.items() if key not in WRITER_OPTIONS}
     if not timed:
         told["rate"] = f"{rate:g}"
     return f"serial:{place}?{urlencode({'format': name, **told}, safe=',/^')}"

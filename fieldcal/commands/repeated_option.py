@@ -1,4 +1,4 @@
-"""An option that is given once for each of several devices on the same table."""
+"""Option that is repeated for each of several devices on the same table."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 
-class StoreSeveral(argparse.Action):
-    """The first goes where the option says, the others to a list ``further_…``."""
+class StoreRepeated(argparse.Action):
+    """Stores the first value in ``dest``, further ones in a list ``further_dest``."""
 
     def __call__(
         self,
@@ -17,7 +17,7 @@ class StoreSeveral(argparse.Action):
         values: str | Sequence[Any] | None,
         option_string: str | None = None,
     ) -> None:
-        """Take what was given once more."""
+        """Store a value."""
         if getattr(namespace, self.dest) is None:
             setattr(namespace, self.dest, values)
         else:

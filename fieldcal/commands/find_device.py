@@ -1,4 +1,4 @@
-"""The device of a run that names none: the one that answers introduces itself."""
+"""Finds the device for a run without --device: the only one that answers."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ if TYPE_CHECKING:
     from fieldcal.drivers.driver import Driver
     from fieldcal.drivers.probe import DetectedDevice
 
-LISTEN = 1.0
+LISTEN_S = 1.0
 """How long each port is listened to at each baud rate, s."""
 
-FIRST = 1.5
-"""Device time of the samples that tell which way is up, s."""
+FIRST_S = 1.5
+"""Length of the samples that show which axis is up, s of device time."""
 
-TURN = 20.0
-"""Device time in which a person turns it by hand, s."""
+TURN_S = 20.0
+"""Time to turn the device by hand, s of device time."""
 
-STANDARD = 9.81
-"""Gravity where nobody said where this is, m/s^2: good to half a percent."""
+DEFAULT_GRAVITY = 9.81
+"""Gravity if the site is not stated, m/s^2: right to half a percent."""
 
-OPEN = "format=text"
-"""In the address of lines whose rates may be in either unit, unless it says which."""
+TEXT_FORMAT = "format=text"
+"""Part of the address of a text format, whose rates may be in rad/s or deg/s."""
 
 
-def introduce(args: argparse.Namespace) -> None:
-    """Find the one device that answers, and write it into the options.
+def find_device(args: argparse.Namespace) -> None:
+    """Find the only device that answers, and set it in the options.
 
     Raises
     ------
     InputError
         If none answers, or several do.
     Stopped
-        If the user does not want it.
+        If the user declines the device.
 
     """
     from fieldcal.run.introduction import (
@@ -46,35 +46,35 @@ def introduce(args: argparse.Namespace) -> None:
         rate_unit_from_turn,
     )
 
-    found = _the_one()
+    found = _only_answering_device()
     url = found.url
-    gravity = args.gravity or STANDARD
-    with _opened(url) as driver:
-        known = introduce_device(_samples(driver), gravity)
+    gravity = args.gravity or DEFAULT_GRAVITY
+    with _open_device(url) as driver:
+        known = introduce_device(_first_samples(driver), gravity)
         asks = not args.headless and sys.stdin.isatty()
-        if asks and OPEN in url and "gx" in url and "gyr_unit" not in url:
-            _tell("turn the device by hand by 45° or more, and put it back ...")
-            unit = rate_unit_from_turn(driver.blocks(), gravity, TURN)
+        if asks and TEXT_FORMAT in url and "gx" in url and "gyr_unit" not in url:
+            _print_line("turn the device by hand by 45° or more, and put it back ...")
+            unit = rate_unit_from_turn(driver.blocks(), gravity, TURN_S)
             url += f"&gyr_unit={unit}" if unit else ""
     line = f'--device "{url}"'
     if known.up and not args.mounting and known.mounting != PLAIN_MOUNTING:
         args.mounting = ",".join(known.mounting)
         line += f" --mounting={args.mounting}"
-    _tell(f"{found.says.partition(';')[0]}; {known.says}")
-    _tell(f"the next time: {line}")
+    _print_line(f"{found.says.partition(';')[0]}; {known.summary}")
+    _print_line(f"the next time: {line}")
     if asks:
-        _tell("Enter takes it, q ends: ", end="")
+        _print_line("Enter takes it, q ends: ", end="")
         if sys.stdin.readline().strip().lower().startswith("q"):
             raise Stopped("stopped by the operator")
     args.device = url
 
 
-def _the_one() -> DetectedDevice:
-    """What answers on the only port where anything does."""
-    from fieldcal.commands.ports import plugged_in
+def _only_answering_device() -> DetectedDevice:
+    """The device on the only serial port that answers."""
+    from fieldcal.commands.ports import serial_ports
     from fieldcal.drivers.probe import probe_port
 
-    ports = [port["port"] for port in plugged_in()]
+    ports = [port["port"] for port in serial_ports()]
     if not ports:
         raise InputError(
             "no serial port is plugged in: plug the device in, name it (--device"
@@ -82,13 +82,13 @@ def _the_one() -> DetectedDevice:
         )
     answers = []
     for port in ports:
-        _tell(f"listening to {port} ...")
-        answers.append(probe_port(port, LISTEN))
+        _print_line(f"listening to {port} ...")
+        answers.append(probe_port(port, LISTEN_S))
     known = [answer for answer in answers if answer.url]
     if len(known) == 1:
         for one in answers:
             if not one.url:  # the device that was meant may be behind this one
-                _tell(f"not taken: {one.port}: {one.says}")
+                _print_line(f"not taken: {one.port}: {one.says}")
         return known[0]
     if known:
         listed = "; ".join(f'--device "{one.url}"' for one in known)
@@ -100,24 +100,24 @@ def _the_one() -> DetectedDevice:
     )
 
 
-def _opened(url: str) -> Driver:
+def _open_device(url: str) -> Driver:
     from fieldcal.drivers.driver import open_driver
 
     return open_driver(url)
 
 
-def _samples(driver: Driver) -> Block:
+def _first_samples(driver: Driver) -> Block:
     """The first seconds of a device."""
     from fieldcal.core.samples import concat
 
     taken = []
     for block in driver.blocks():
         taken.append(block)
-        if block.t[-1] - taken[0].t[0] >= FIRST:
+        if block.t[-1] - taken[0].t[0] >= FIRST_S:
             break
     return concat(taken)
 
 
-def _tell(text: str, end: str = "\n") -> None:
+def _print_line(text: str, end: str = "\n") -> None:
     sys.stderr.write(text + end)
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""What a result has from its unit's lot, as a person reads it."""
+"""Terminal view of the contribution of the lot to a result."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.wording import format_unit, format_with_sigma, parameter_title
 
 
-def show_borrowed(found: Calibration) -> None:
-    """Print a row a parameter: by itself, the lot, both; nothing without a lot."""
+def show_lot_prior(found: Calibration) -> None:
+    """Print each parameter alone, by the lot and by both; nothing without a lot."""
     from rich.table import Table
 
-    from fieldcal.commands.console import ShownConsole
+    from fieldcal.commands.console import EscapingConsole
 
     told = found.info.get("borrowed")
     if not told:
@@ -29,4 +29,4 @@ def show_borrowed(found: Calibration) -> None:
         table.add_row(
             parameter_title(name), lot, alone, both, format_unit(units.get(name, ""))
         )
-    ShownConsole().print(table)
+    EscapingConsole().print(table)

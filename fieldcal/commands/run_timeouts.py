@@ -1,4 +1,4 @@
-"""What a run waits for, and for how long: devices, positions, somebody at the keys."""
+"""How long a run waits for a lost device and for a position."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ if TYPE_CHECKING:
     from fieldcal.run.plan_file import PlanTask
 
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
-"""Device time after which a script gives a position up, s: with and without a mover."""
+"""Device time after which a position is given up, s: with and without a mover."""
 
 PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
-"""How long a device that is gone is waited for, s."""
+"""How long to wait for a device whose connection was lost, s."""
 
 
-def patience(args: argparse.Namespace) -> float:
-    """How long a device that is gone is waited for, s."""
+def reconnect_seconds(args: argparse.Namespace) -> float:
+    """How long to wait for a device whose connection was lost, s."""
     if args.patience is not None:
         return float(args.patience)
     return PATIENCE_HEADLESS if args.headless else PATIENCE
 
 
-def give_up(args: argparse.Namespace, task: PlanTask) -> float | None:
-    """How long a position is waited for; for a person, for ever."""
+def give_up_seconds(args: argparse.Namespace, task: PlanTask) -> float | None:
+    """How long to wait for a position, s; None, for a person, without limit."""
     given = task.run.get("give_up_s")
     unturned = task.mover["kind"] == "nothing"
     if given is not None:
@@ -33,8 +33,8 @@ def give_up(args: argparse.Namespace, task: PlanTask) -> float | None:
     return GIVE_UP
 
 
-def asks(args: argparse.Namespace) -> bool:
-    """Whether somebody is there who can be asked for more, and can leave it out."""
+def can_ask_operator(args: argparse.Namespace) -> bool:
+    """Whether an operator at a keyboard can be asked for further positions."""
     from fieldcal.run.operator.keyboard import Keyboard
 
     return not args.headless and Keyboard().has_keys

@@ -21,7 +21,7 @@ from fieldcal.against.result import Difference, Direction, RealAndSimulated
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet, with_all_parameters
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.findings import found_effects, mismatches
+from fieldcal.diagnosis.findings import found_effects, mismatches, random_sizes
 from fieldcal.diagnosis.result import Mismatch, Quantity
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
@@ -226,7 +226,7 @@ def cause_quantities(there: WidenedSet, member: Member) -> dict[str, Quantity]:
         return {}
     if isinstance(group.effect, Scatter):
         d = there.inference.dictionary
-        return found_effects.random_sizes_of_group(
+        return random_sizes.random_sizes_of_group(
             there.set, d, group, _size_of(there, member)
         )
     values, covariance = there.estimate(group.columns)

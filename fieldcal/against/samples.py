@@ -13,7 +13,7 @@ from fieldcal.against.result import Difference, RealAndSimulated
 from fieldcal.against.side import DiagnosedRecording
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.findings.agreement import UNITS
-from fieldcal.diagnosis.findings.found_effects import effect_of_line
+from fieldcal.diagnosis.findings.sample_effects import effect_of_line
 from fieldcal.diagnosis.result import FoundEffect, Mismatch, Quantity
 from fieldcal.diagnosis.signal.line import tune_line
 from fieldcal.diagnosis.signal.moments import moments_of

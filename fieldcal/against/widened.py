@@ -63,7 +63,7 @@ class WidenedSet:
         columns, typical = member[1].columns, member[1].typical
         state = self.set.state
         kept = np.ones(len(state.columns), dtype=bool)
-        kept[_column_indices(state.columns, columns)] = False
+        kept[state.places_of(columns)] = False
         less = Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
         inner, pull = less.schur_complement(columns, typical)
         own = np.diag(state.rows.matrix(columns, columns)) * typical**2
@@ -79,14 +79,8 @@ class WidenedSet:
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""
         state = self.reported_set.state
-        at = _column_indices(state.columns, columns)
+        at = state.places_of(columns)
         return state.estimate[at], state.inverse[np.ix_(at, at)]
-
-
-def _column_indices(columns: Index, wanted: Index) -> Index:
-    """Indices of columns in a set; the last one, since a member's come last."""
-    found = [int(np.flatnonzero(columns == c)[-1]) for c in wanted]
-    return np.array(found, dtype=np.intp)
 
 
 def widen_set(

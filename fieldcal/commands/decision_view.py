@@ -48,7 +48,7 @@ def _print_resume_command(folder: Path, remedy: dict[str, Any] | None) -> None:
     """Print the command that takes the remedy or the positions that were left out."""
     from fieldcal.commands.console import EscapingConsole
     from fieldcal.commands.table import print_sentence
-    from fieldcal.run.session_run import positions_left_out
+    from fieldcal.run.resuming import positions_left_out
     from fieldcal.session.folder import Session
 
     console = EscapingConsole()

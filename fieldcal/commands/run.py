@@ -253,8 +253,9 @@ def _record_and_solve(
     """
     from fieldcal.commands.run_device import device_and_mover
     from fieldcal.run.companions import record_companions
+    from fieldcal.run.resuming import recorded_averages
     from fieldcal.run.retrying_mover import RetryingMover
-    from fieldcal.run.session_run import SessionRun, recorded_averages
+    from fieldcal.run.session_run import SessionRun
     from fieldcal.session.folder import Session
     from fieldcal.session.recorder import Recorder
 

@@ -59,7 +59,7 @@ def make_task(args: argparse.Namespace) -> tuple[PlanTask, Path]:
 
 def _task_to_resume(args: argparse.Namespace) -> tuple[PlanTask, Path]:
     from fieldcal.run import plan_file
-    from fieldcal.run.session_run import open_for_resume
+    from fieldcal.run.resuming import open_for_resume
 
     if args.procedure or args.output:
         raise InputError("--resume goes on with what it finds: give it alone")

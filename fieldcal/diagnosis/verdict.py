@@ -12,7 +12,7 @@ from fieldcal.calibration.parameters import Nominal
 from fieldcal.calibration.plausible import implausible_values, misdirected_turns
 from fieldcal.core.samples import CHANNELS, GYR, Block
 from fieldcal.diagnosis.explain import Explanation, explain
-from fieldcal.diagnosis.findings import found_effects, mismatches
+from fieldcal.diagnosis.findings import found_effects, mismatches, sample_effects
 from fieldcal.diagnosis.findings.agreement import UNITS, ModelResiduals
 from fieldcal.diagnosis.findings.calibrated import (
     calibration_groups,
@@ -141,11 +141,13 @@ def _effects(
     explanation: Explanation, lost: Mapping[str, CauseRemoval], then: ModelResiduals
 ) -> list[FoundEffect]:
     prepared = explanation.prepared
-    found = list(found_effects.effects_of_faults(prepared.checked.faults))
+    found = list(sample_effects.effects_of_faults(prepared.checked.faults))
     for tone, left in zip(
         prepared.spectral_lines, prepared.line_remainders, strict=True
     ):
-        found.append(found_effects.effect_of_line(tone, left.gain(tone.clear_channels)))
+        found.append(
+            sample_effects.effect_of_line(tone, left.gain(tone.clear_channels))
+        )
     for one in explanation.probable_causes:
         if one.name in catalogue():
             found.append(

@@ -20,7 +20,7 @@ import numpy as np
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import ACC
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.diagnosis.findings.found_effects import random_sizes
+from fieldcal.diagnosis.findings.random_sizes import random_sizes
 from fieldcal.diagnosis.wording.paragraph import setup_notes
 from fieldcal.effects import catalogue
 from fieldcal.evaluation.omitted_effects import wrong_angle_sentences

@@ -27,6 +27,7 @@ from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.planned import parameters
 from fieldcal.model.state import State
 from fieldcal.solve import printed
+from fieldcal.solve.base_rate import known_earth_rate, with_base_rate
 from fieldcal.solve.estimation import (
     ParameterEstimate,
     RecordedRows,
@@ -36,11 +37,7 @@ from fieldcal.solve.latitude import VerticalEarthRate
 from fieldcal.solve.lot_contribution import combine_with_lot
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions
-from fieldcal.solve.parameter_set import (
-    ParameterSetOptions,
-    known_earth_rate,
-    with_base_rate,
-)
+from fieldcal.solve.parameter_set import ParameterSetOptions
 from fieldcal.solve.rank import ladder_remedy
 from fieldcal.solve.result import build_calibration
 from fieldcal.solve.rows import rows_of_means, without_angles

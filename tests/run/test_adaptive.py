@@ -23,7 +23,8 @@ from fieldcal.procedures import adaptive
 from fieldcal.run import plan_file, session_run
 from fieldcal.run.judging import judge_session
 from fieldcal.run.operator.protocol import OperatorView, Wish
-from fieldcal.run.session_run import SessionRun, open_for_resume, recorded_averages
+from fieldcal.run.resuming import open_for_resume, recorded_averages
+from fieldcal.run.session_run import SessionRun
 from fieldcal.run.wait_reason import WaitReason
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder

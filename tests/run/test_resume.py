@@ -21,11 +21,7 @@ from fieldcal.commands.run_task import make_task
 from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.run import plan_file
-from fieldcal.run.session_run import (
-    open_for_resume,
-    positions_left_out,
-    recorded_averages,
-)
+from fieldcal.run.resuming import open_for_resume, positions_left_out, recorded_averages
 from fieldcal.session import description
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import MARKS

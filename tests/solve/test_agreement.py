@@ -13,9 +13,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.state import State
 from fieldcal.solve import agreement, solve
+from fieldcal.solve.base_rate import with_base_rate
 from fieldcal.solve.estimation import ParameterEstimate, estimate_parameters
 from fieldcal.solve.observations import Index
-from fieldcal.solve.parameter_set import ParameterSetOptions, with_base_rate
+from fieldcal.solve.parameter_set import ParameterSetOptions
 from fieldcal.solve.rows import rows_of_means
 
 SIZE = np.array([1e-3, 2e-3, 0.7e-3])

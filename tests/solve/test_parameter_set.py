@@ -22,12 +22,8 @@ from fieldcal.model.causes.detents import detent_rotations as turned_alike
 from fieldcal.model.causes.detents import detents
 from fieldcal.physics.experience import Experience
 from fieldcal.solve import Observations, solve
-from fieldcal.solve.parameter_set import (
-    ParameterSet,
-    ParameterSetOptions,
-    known_earth_rate,
-    with_base_rate,
-)
+from fieldcal.solve.base_rate import known_earth_rate, with_base_rate
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.rows import rows_of_means
 
 HAND = Position("by hand")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,24 +11,22 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.agreement import ModelResiduals
 from fieldcal.diagnosis.findings.calibrated import calibration_changes
 from fieldcal.diagnosis.findings.instant import estimate_instant
+from fieldcal.diagnosis.findings.random_sizes import (
+    random_sizes,
+)
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
 from fieldcal.diagnosis.result import FoundEffect, Quantity
-from fieldcal.diagnosis.signal.line import SpectralLine
 from fieldcal.effects import catalogue
 from fieldcal.model import priors, thresholds
 from fieldcal.model.causes.cause import Group
-from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (
     Member,
-    most_probable_axis_size,
-    most_probable_size,
 )
 from fieldcal.model.posterior.held_out import held_out_turn_residuals, turn_residual
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.system.fitted import FittedSet
-from fieldcal.physics.effect import Param, Scatter
-from fieldcal.physics.recording import Fault
+from fieldcal.physics.effect import Scatter
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,63 +216,9 @@ def shape_estimate(explanation: Explanation, member: Member) -> tuple[float, flo
 
 def column_estimates(found: Set, columns: Index) -> tuple[Array, Array, Array]:
     """Value, sigma and prior standard deviation of some columns of a set."""
-    at = _column_indices(found, columns)
+    at = found.state.places_of(columns)
     value, sigma = found.state.estimate[at], np.sqrt(np.diag(found.state.inverse)[at])
     return value, sigma, found.state.prior_sigma[at]
-
-
-def _column_indices(found: Set, columns: Index) -> Index:
-    """Indices of columns in a set; the last one, since a member's come last."""
-    return np.array(
-        [int(np.flatnonzero(found.state.columns == c)[-1]) for c in columns]
-    )
-
-
-def random_sizes(
-    explanation: Explanation, standing: ProbableCause
-) -> dict[str, Quantity]:
-    """Sizes of a random effect, each with its uncertainty.
-
-    They are those of the likeliest set: a covariance averaged over several sizes
-    determines none of them.
-    """
-    best, out = explanation.posterior.best, dict[str, Quantity]()
-    for member in standing.members:
-        tried = float(priors.SIZES[best.sizes.members[best.members.index(member)]])
-        out |= random_sizes_of_group(best, explanation.dictionary, member[1], tried)
-    return out
-
-
-def random_sizes_of_group(
-    found: Set, d: Dictionary, group: Group, v: float
-) -> dict[str, Quantity]:
-    """Sizes of a random group, axis by axis, given that its size in a set is v.
-
-    Their uncertainty follows from the information on ln v.
-    """
-    out = {}
-    whole = most_probable_size(found.state, _column_indices(found, group.columns), v)
-    for param, at in _scattered_columns(d, group):
-        size, part = whole
-        if len(at) < len(group.columns):
-            size, part = most_probable_axis_size(
-                found.state, _column_indices(found, at), v, whole
-            )
-        size *= param.typical
-        out[param.name] = Quantity(size, size * part, param.unit)
-    return out
-
-
-def _scattered_columns(d: Dictionary, group: Group) -> Iterator[tuple[Param, Index]]:
-    """Parameters of a random effect, with the columns that each one scatters."""
-    params = group.effect.params if group.effect else ()
-    if not group.params:
-        yield from ((one, group.columns) for one in params)
-    for c in group.params:
-        yield (
-            params[c],
-            np.intersect1d(group.columns, d.cosine_columns(c, d.wander.modes[c])),
-        )
 
 
 def _held_out_gain(
@@ -319,42 +262,3 @@ def held_out_rms_gain(
     share = np.where(np.isfinite(now) & (ahead > 0), lost.squares, -1.0)
     c = int(np.argmax(share))
     return float(1 - now[c] / ahead[c]) if share[c] > 0 else np.nan
-
-
-def effect_of_line(tone: SpectralLine, gained: float) -> FoundEffect:
-    """The effect of a line in the spectrum."""
-    values = {
-        n: Quantity(v, tone.sigmas[n], tone.effect.unit(n))
-        for n, v in tone.values.items()
-    }
-    evidence = {"delta_chi2": tone.chi2, "held_out_gain": gained}
-    return FoundEffect(tone.effect.id, values, evidence=evidence)
-
-
-def effects_of_faults(faults: Sequence[tuple[str, Fault]]) -> Iterator[FoundEffect]:
-    """Effects on samples; quantisation of both triads is reported once."""
-    steps: dict[str, Quantity] = {}
-    for name, fault in faults:
-        if not fault.values:
-            continue
-        effect = catalogue()[name]
-        units = {p.name: p.unit for p in effect.params}
-        units |= {s.name: s.unit for s in effect.shapes}
-        values = {
-            n: Quantity(v, fault.sigmas.get(n), _unit_of_value(n, fault, units))
-            for n, v in fault.values.items()
-        }
-        if name == "quantisation":
-            steps |= values
-            continue
-        yield FoundEffect(name, values, evidence={"delta_chi2": fault.sigma**2})
-    if steps:
-        yield FoundEffect("quantisation", steps)
-
-
-def _unit_of_value(name: str, fault: Fault, units: dict[str, str]) -> str:
-    if name == "limit":
-        return "m/s^2" if fault.channel in CHANNELS[:3] else "rad/s"
-    if name == "needed_s":  # of a window
-        return "s"
-    return units.get(name, "1")

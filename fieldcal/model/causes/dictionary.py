@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -18,48 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.frames import EARTH_RATE
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes import columns
 from fieldcal.model.causes.cause import CLOSURE, MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import Course, General
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
+from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
 from fieldcal.model.causes.known import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander
 from fieldcal.physics.experience import Experience
-
-
-@dataclass(frozen=True, slots=True)
-class EqualWidthGroups:
-    """Groups with equally many leading columns, stacked for joint calculation.
-
-    Attributes
-    ----------
-    blocks : (b, k) distinct sets of columns; several groups may share one
-    block : (m,) index of each group's set of columns
-    typical : (m, k) typical sizes
-    cause, variant : (m,) indices of each group's cause and variant
-
-    """
-
-    blocks: Index
-    block: Index
-    typical: Array
-    cause: Index
-    variant: Index
-
-    @classmethod
-    def of(cls, some: Sequence[tuple[int, int, Group]]) -> EqualWidthGroups:
-        """Stack groups; each is given with the indices of its cause and variant."""
-        columns = np.array([g.columns[g.leading_columns] for _, _, g in some])
-        blocks, block = np.unique(columns, axis=0, return_inverse=True)
-        typical = np.array([g.typical[g.leading_columns] for _, _, g in some])
-        cause, variant = np.array([(i, j) for i, j, _ in some]).T
-        return cls(blocks, block.ravel(), typical, cause, variant)
 
 
 class Dictionary(ColumnTable):

@@ -31,13 +31,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
+from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.priors import SIZES
 
 ROUNDED = 1e-9
 """Relative size of an eigenvalue below which it is a rounding error."""
-
-SMALL = 64
-"""Largest matrix that is inverted without division into halves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,6 +246,14 @@ class Eliminated:
         score -= float(np.log(np.diag(root)).sum())  # (2)
         return cls(rows, columns, sizes, half, half.T @ seen, score)
 
+    def places_of(self, columns: Index) -> Index:
+        """Indices of columns in the set; of one that occurs twice, the last.
+
+        The columns of a member come after those of the groups that are always in.
+        """
+        found = [int(np.flatnonzero(self.columns == c)[-1]) for c in columns]
+        return np.array(found, dtype=np.intp)
+
     @cached_property
     def inverse(self) -> Array:
         """Posterior covariance S (I + S G S)^-1 S, (a, a)."""
@@ -274,44 +280,12 @@ class Eliminated:
         inner = white.T @ white - taken.T @ taken
         return inner, white.T @ self.rows.off - shared.T @ self.estimate
 
-
-def cholesky_root(scaled: Array) -> Array:
-    """Lower triangular root of I + S G S, (..., k, k), with no eigenvalue below 1.
-
-    If Cholesky's decomposition fails by rounding, eigenvalues below 1 are set to 1.
-    This happens for windows of hours, which determine slow cosines a million times
-    better than quick ones.
-
-    >>> cholesky_root(np.array([[1e20, 1e20], [1e20, 1e20]]))[1, 1] >= 1
-    np.True_
-    """
-    try:
-        out: Array = np.linalg.cholesky(scaled)
-    except np.linalg.LinAlgError:
-        values, along = np.linalg.eigh(scaled)
-        half = along * np.sqrt(np.maximum(values, 1.0))[..., None, :]
-        upper = np.linalg.qr(np.swapaxes(half, -1, -2))[1]
-        positive = np.sign(np.diagonal(upper, 0, -2, -1))
-        out = np.swapaxes(upper, -1, -2) * positive[..., None, :]
-    return out
-
-
-def triangular_inverse(root: Array) -> Array:
-    """Inverse of lower triangular matrices, by halves; faster than in general.
-
-    >>> (triangular_inverse(np.tri(200)) @ np.tri(200) == np.eye(200)).all()
-    np.True_
-    """
-    width = root.shape[-1]
-    if width <= SMALL:
-        out: Array = np.linalg.inv(root)
-        return out
-    k = width // 2
-    out = np.zeros(root.shape)
-    out[..., :k, :k] = first = triangular_inverse(root[..., :k, :k])
-    out[..., k:, k:] = last = triangular_inverse(root[..., k:, k:])
-    out[..., k:, :k] = -last @ (root[..., k:, :k] @ first)
-    return out
+    def gain_by_size(self, columns: Index, typical: Array) -> Array:
+        """Gain of ln Z by a further group, at each of its sizes, (3)."""
+        own = np.diag(self.rows.matrix(columns, columns)) * typical**2
+        return evidence_gains(
+            *self.schur_complement(columns, typical), float(own.max())
+        )
 
 
 def evidence_gains(inner: Array, pull: Array, own: Array | float) -> Array:

@@ -27,12 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.evidence.gram import (
-    Gram,
-    WeightedGram,
-    cholesky_root,
-    triangular_inverse,
-)
+from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
+from fieldcal.model.evidence.gram import Gram, WeightedGram
 
 MAX_NUMBERS = 4_000_000
 """Largest number of table elements that are calculated at once: 30 MB."""

@@ -115,7 +115,7 @@ class Offers(Sets):
         outputs = TRIAD if group.random else len(group.params)
         if not outputs or len(group.columns) <= WAVES * outputs:
             return offer
-        profile = LOG_DENSITY + gain_by_size(table.state, group)
+        profile = LOG_DENSITY + table.state.gain_by_size(group.columns, group.typical)
         chance = self.log_chance([*there.members, offer.member])
         worth = float(np.logaddexp.reduce(profile)) + chance
         score = table.score + worth - self.log_chance(there.members)
@@ -271,7 +271,12 @@ class Offers(Sets):
             if group.in_state and group.fixed_size is None:
                 wide[some] = group.prior_sigma(priors.FREE)
         free = Eliminated.of(there.state.rows, there.state.columns, wide)
-        return lambda group: bool(gain_by_size(free, group).max() >= LEAST)
+
+        def is_shown(group: Group) -> bool:
+            gains = free.gain_by_size(group.columns, group.typical)
+            return bool(gains.max() >= LEAST)
+
+        return is_shown
 
     def _permanent_groups(self, there: Set) -> Iterator[tuple[Group, slice, int]]:
         """Permanent groups, their places in the columns, and indices of their sizes."""
@@ -342,13 +347,6 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluate((*there.members, *(o.member for o in offers)), start)
-
-
-def gain_by_size(state: Eliminated, group: Group) -> Array:
-    """Gain of ln L of a set by a group, at each of the group's sizes."""
-    at, typical = group.columns, group.typical
-    own = np.diag(state.rows.matrix(at, at)) * typical**2
-    return evidence_gains(*state.schur_complement(at, typical), float(own.max()))
 
 
 def lowered_instability(

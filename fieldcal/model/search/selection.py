@@ -14,7 +14,7 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import LOG_DENSITY, Member, Sizes
 from fieldcal.model.search.offer import Offer, OfferTable
-from fieldcal.model.search.offers import NEAR, Offers, gain_by_size
+from fieldcal.model.search.offers import NEAR, Offers
 from fieldcal.model.search.pairs import Pair, pair_gains
 
 SETTLED = 0.02
@@ -285,7 +285,11 @@ def _log_worth(rest: Eliminated, some: Iterable[Group]) -> dict[Group, float]:
     """Log evidence that each group adds to a set, averaged over its sizes."""
     worth: dict[Group, float] = {}
     for one in some:
-        worth[one] = float(np.logaddexp.reduce(gain_by_size(rest, one) + LOG_DENSITY))
+        worth[one] = float(
+            np.logaddexp.reduce(
+                rest.gain_by_size(one.columns, one.typical) + LOG_DENSITY
+            )
+        )
     return worth
 
 

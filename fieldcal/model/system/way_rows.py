@@ -19,7 +19,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.columns import Course, RowView
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.evidence.gram import cholesky_root, triangular_inverse
+from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.state import State
 from fieldcal.model.turns.turn import Turn

@@ -16,11 +16,8 @@ from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
-from fieldcal.solve.parameter_set import (
-    ParameterSet,
-    ParameterSetOptions,
-    with_base_rate,
-)
+from fieldcal.solve.base_rate import with_base_rate
+from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
 from fieldcal.solve.rows import rows_of_means
 
 SD = 1e-3

@@ -1,0 +1,154 @@
+"""Going on with a session: what it has already, and what is left to take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from fieldcal import procedures
+from fieldcal.core.documents import load_json
+from fieldcal.core.errors import (
+    FieldcalError,
+    SessionError,
+)
+from fieldcal.core.positions import Position
+from fieldcal.evaluation.observations import usable_windows
+from fieldcal.run.plan_file import PlanTask
+from fieldcal.session.folder import RESULT, Session
+from fieldcal.session.marks import POSITION_ADDED
+from fieldcal.windows import Average, average
+
+
+def recorded_averages(session: Session, task: PlanTask) -> dict[int, Average]:
+    """Averages of the positions with a complete window in a session, by number."""
+    from fieldcal.acceptance.assessment import verification_window
+
+    marks = list(session.marks())
+    taken: dict[int, Average] = {}
+    with suppress(SessionError):
+        still = usable_windows(session)
+        taken = dict(zip(still.position_numbers, still.averages, strict=True))
+    last = len(task.about.positions)
+    window = verification_window(marks, last)
+    if window is not None and task.verification is not None:
+        with suppress(FieldcalError):
+            taken[last] = average(session.block.between(*window))
+    for number in list(taken):
+        if not _window_stands(marks, number):
+            del taken[number]
+    return taken
+
+
+def _window_stands(marks: list[dict[str, Any]], number: int) -> bool:
+    """Whether the last mark of a position is that of its window."""
+    said = [
+        m["event"]
+        for m in marks
+        if m.get("position") == number and m.get("event") in ("window", "repeated")
+    ]
+    return bool(said) and said[-1] == "window"
+
+
+def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
+    """A session to go on with, its tables, and positions to take once more.
+
+    What is finished and NO-GO is gone on with by its remedy: positions besides, or one
+    that was taken already; where it has none, by the positions that were left out.
+
+    Raises
+    ------
+    SessionError
+        If it is none, has nothing left to take, or was not recorded by a run.
+
+    """
+    from fieldcal.acceptance.assessment import verification_window
+
+    session = Session.open(folder)
+    tables = dict(session.about.raw)
+    if "run" not in tables:
+        raise SessionError(
+            f"{folder}: was not recorded by fieldcal run: begin a new one, or solve it"
+            " as it stands by fieldcal solve"
+        )
+    marks, again = list(session.marks()), tuple[int, ...]()
+    run = dict(tables["run"])
+    if _is_finished(marks) and (folder / RESULT).exists():
+        remedy = _remedy(folder, session)
+        again = tuple(int(i) for i in remedy["again"])
+        last = len(session.positions)
+        if remedy["positions"] and verification_window(marks, last) is not None:
+            again += (last,)  # what verified goes behind the positions besides, anew
+        tables["position"] = [
+            *tables.get("position", ()),
+            *_remedy_positions(remedy, session),
+        ]
+        run["seconds"] = float(remedy.get("seconds", run.get("seconds", 30.0)))
+    fixed = (
+        procedures.max_positions(session.about, str(run.get("procedure", ""))) is None
+    )
+    if fixed and len(tables.get("position", ())) > _planned_count(marks, session):
+        run["procedure"] = "positions"  # whatever set it was, it has more now
+    return session, {**tables, "run": run}, again
+
+
+def _remedy_positions(remedy: Mapping[str, Any], session: Session) -> list[Any]:
+    """Positions of a remedy without those left out before, which are asked anyway."""
+    known = session.about.positions
+    left_out = {known[i].degrees for i in positions_left_out(session)}
+    return [
+        place for place in remedy["positions"]
+        if Position.deg(place["alpha_deg"], place["beta_deg"]).degrees not in left_out
+    ]  # fmt: skip
+
+
+def positions_left_out(session: Session) -> tuple[int, ...]:
+    """Numbers of the positions without a valid window."""
+    marks = list(session.marks())
+    every = range(len(session.about.positions))
+    return tuple(i for i in every if not _window_stands(marks, i))
+
+
+def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:
+    """Number of positions that a session was begun with."""
+    added = sum(bool(mark.get("event") == POSITION_ADDED) for mark in marks)
+    return len(session.about.positions) - added
+
+
+def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether no position was asked for since a run had its result."""
+    told = [m.get("event") for m in marks]
+    ends = [i for i, event in enumerate(told) if event == "finished"]
+    return bool(ends) and not {POSITION_ADDED, "repeated", "asked"} & set(
+        told[ends[-1] :]
+    )
+
+
+def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:
+    """The remedy that would make a finished session GO.
+
+    Raises
+    ------
+    SessionError
+        If it is GO, or no position would.
+
+    """
+    try:
+        result = load_json((folder / RESULT).read_text(encoding="utf-8"))
+        decision = result.get("decision", {})
+    except (OSError, ValueError, AttributeError):
+        decision = {}
+    remedy = decision.get("remedy")
+    if isinstance(remedy, Mapping):
+        return remedy
+    if decision.get("go") is False and (left_out := positions_left_out(session)):
+        return {"again": left_out, "positions": ()}
+    if decision.get("go") is False:
+        raise SessionError(
+            f"{folder}: is finished and NO-GO, and no position taken besides would"
+            " change that: see fieldcal solve for the reasons, and begin a new run"
+        )
+    raise SessionError(
+        f"{folder}: is finished, nothing is left to take: see fieldcal solve"
+    )

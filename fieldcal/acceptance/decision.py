@@ -42,7 +42,7 @@ from fieldcal.core.escaping import escape_line
 from fieldcal.core.positions import Position
 from fieldcal.core.probability import chi2_tail
 from fieldcal.session.description import Description
-from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 from fieldcal.windows import Average
 
 ANGLES = "angles"

@@ -30,7 +30,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
-from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 
 MOST = 3
 """Largest number of further positions; if more are needed, repeat the run."""

@@ -19,7 +19,7 @@ from fieldcal.diagnosis import Diagnosis
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
 from fieldcal.diagnosis.verdict import make_diagnosis
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import short_lag_noise

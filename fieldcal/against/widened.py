@@ -19,7 +19,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Member, Sizes
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.search.inference import Inference
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_rows import LinearRows

@@ -30,16 +30,16 @@ from fieldcal.model.posterior.held_out import (
     held_out_turn_residuals,
 )
 from fieldcal.model.posterior.model_average import ModelAverage
-from fieldcal.model.posterior.on_the_way import way_information
 from fieldcal.model.posterior.probabilities import Posterior, ProbableCause
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.posterior.time_constants import sets_at_other_time_constants
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.posterior.way_information import way_information
 from fieldcal.model.rows.change_points import change_points
 from fieldcal.model.rows.interruptions import interruptions
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import window_starts
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.search.inference import OWN_SIGMA, Inference, InferenceResult
 from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.grade_evidence import GradeShown
 from fieldcal.core.factory import WARMING_EFFECTS, FactoryErrors
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.effect_causes import factory_groups, factory_sizes
-from fieldcal.model.evidence.of_two_grades import chances_of_coarser
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.model.posterior.model_average import eliminate_with_groups
 from fieldcal.session.description import Description
 from fieldcal.session.factory import factory_errors

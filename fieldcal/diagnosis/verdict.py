@@ -48,7 +48,7 @@ from fieldcal.diagnosis.wording.paragraph import notes, paragraph
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import ProbableCause
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
 

@@ -22,7 +22,7 @@ from fieldcal.evaluation.window_mean import (
     average_window,
     table_rate,
 )
-from fieldcal.model.rows.swaying import find_base_sway
+from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels

@@ -15,14 +15,14 @@ from typing import Any, Literal
 import numpy as np
 
 from fieldcal.calibration import Calibration
-from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.grade_evidence import GradeShown
 from fieldcal.calibration.names import TILTS, group_of, sensor_of
 from fieldcal.core.errors import InputError, NotObservable
 from fieldcal.diagnosis.explain import Explanation, explain, times_since_turn
 from fieldcal.diagnosis.prepare import PreparedRecording, prepare_recording
-from fieldcal.evaluation.angles_shown import with_shown_angle_setting
+from fieldcal.evaluation.angle_setting import with_shown_angle_setting
 from fieldcal.evaluation.jump import with_jump
-from fieldcal.evaluation.levelled import with_tilt_shown
+from fieldcal.evaluation.level_check import with_tilt_shown
 from fieldcal.evaluation.observations import (
     UsableWindows,
     angle_setting,

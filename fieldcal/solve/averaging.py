@@ -17,7 +17,7 @@ from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import ParameterName, group_of
 from fieldcal.core.samples import Array, Index
 from fieldcal.model import thresholds
-from fieldcal.model.causes.known import KnownRows
+from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing, Mixture, covariance_of_means

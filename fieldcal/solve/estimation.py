@@ -15,8 +15,8 @@ from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
-from fieldcal.model.causes.known import KnownRows
-from fieldcal.model.evidence.of_two_grades import chances_of_coarser
+from fieldcal.model.causes.known_rows import KnownRows
+from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.search.selection import Search

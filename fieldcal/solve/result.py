@@ -15,7 +15,7 @@ from fieldcal.core.errors import NotObservable
 from fieldcal.model import thresholds
 from fieldcal.solve import words
 from fieldcal.solve.cross_coupling_effect import largest_cross_coupling_effect
-from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
 from fieldcal.solve.latitude import VerticalEarthRate
 from fieldcal.solve.lot_contribution import LotContribution

@@ -17,7 +17,7 @@ from fieldcal.core.samples import UNITS as CHANNEL_UNITS
 from fieldcal.core.sentences import join_words
 from fieldcal.model import thresholds
 from fieldcal.solve import words
-from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 from fieldcal.solve.estimation import ParameterEstimate, closure_scatter, window_scatter
 from fieldcal.solve.observations import Observations
 from fieldcal.solve.options import SolveOptions

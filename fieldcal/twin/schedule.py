@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.turns.turn import Turn, select_rows

@@ -15,7 +15,7 @@ from session_folders import CALM, FACES, SITE, WIDE, places, recorded, write_ses
 from fieldcal.calibration.names import TILTS
 from fieldcal.cli import main
 from fieldcal.core.positions import SIX_FACES
-from fieldcal.evaluation import angles_shown, omitted_effects
+from fieldcal.evaluation import angle_setting, omitted_effects
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import checked_effect
@@ -218,13 +218,13 @@ def test_angles_that_nobody_sets_so_are_those_of_other_positions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Their size was refused as an option that nobody had given."""
-    monkeypatch.setattr(angles_shown, "angles_set", lambda _: size)
+    monkeypatch.setattr(angle_setting, "shown_angle_setting", lambda _: size)
     said = places([FACES[i] for i in (0, 2, 1, 3, 4, 5)])
     write_session(tmp_path, recorded(CALM, places(FACES)), said, site=SITE)
     assert main(["solve", str(tmp_path), "--json"]) == 1
     out: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert out["verdict"] == "bad" or not other
-    assert (angles_shown.OTHER_ANGLES in out["warnings"]) == other
+    assert (angle_setting.OTHER_ANGLES in out["warnings"]) == other
 
 
 @pytest.mark.thorough

@@ -11,7 +11,7 @@ from fieldcal.core.positions import FIVE_POSITIONS, WIDE_POSITIONS, Position
 from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.solve import solve, words
-from fieldcal.solve.doubt import DoubtfulPosition
+from fieldcal.solve.doubtful_position import DoubtfulPosition
 
 NINE = (*WIDE_POSITIONS, *FIVE_POSITIONS[1:])
 

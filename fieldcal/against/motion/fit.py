@@ -15,11 +15,11 @@ import numpy as np
 
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.followed import MotionDictionary
+from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.rows.coloured import Bands
+from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows
 from fieldcal.model.rows.response import Response
 from fieldcal.model.search.inference import Inference, InferenceResult

@@ -16,10 +16,10 @@ from fieldcal.against.motion.alignment import CommonMotion
 from fieldcal.against.motion.fit import MotionFit, lag_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block
-from fieldcal.model.causes.followed import MotionDictionary
+from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.rows.coloured import Bands
+from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.search.inference import InferenceResult

@@ -10,7 +10,7 @@ from fieldcal.diagnosis.result import CalibrationGroup, Quantity
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.model_average import average_of_columns
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 
 GROUP_UNITS = {
     "acc_bias": "m/s^2",

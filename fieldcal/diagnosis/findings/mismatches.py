@@ -26,7 +26,7 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.posterior.probabilities import ProbableCause
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.physics.recording import Fault
 
 

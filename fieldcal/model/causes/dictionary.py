@@ -27,7 +27,7 @@ from fieldcal.model.causes.columns import Course, General
 from fieldcal.model.causes.effect_causes import effect_causes, groups_at_points
 from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.causes.filtered_turns import FILTERED, filtered_turns
-from fieldcal.model.causes.known import KnownRows
+from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.causes.random_causes import random_causes, series_flicker
 from fieldcal.model.causes.unknown_causes import unknown_causes
 from fieldcal.model.causes.wander import Wander

@@ -34,7 +34,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import KEPT, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 
 Places = Callable[[Set], Sequence[Index]]
 """Indices of some quantities in the state of a set. A quantity with several indices is

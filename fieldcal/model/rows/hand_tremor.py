@@ -42,11 +42,11 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.hand_drift import TREMBLES, drift_factor, force_turn_rate
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
 WANDERS = 6.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldcal.core.samples import Block
 from fieldcal.core.sampling import sampling_rate
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
 OFF_S, PERIODS = 0.5, 5.0

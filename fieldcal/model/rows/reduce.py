@@ -1,7 +1,7 @@
 """Samples to block means: the rows that every hypothesis is fitted to.
 
-Each window is cut into blocks (`bounds`), so that a hypothesis costs milliseconds
-however long the recording is. The standard deviation of a mean of n
+Each window is cut into blocks (`window_bounds`), so that a hypothesis costs
+milliseconds however long the recording is. The standard deviation of a mean of n
 white samples of deviation s is s / sqrt(n); s is measured in the recording (`noise`).
 """
 
@@ -18,7 +18,6 @@ from fieldcal.core.positions import alpha_beta_angles, attitude_sigmas, gamma_an
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.block_means import block_means, masked
-from fieldcal.model.rows.bounds import block_bounds, window_bounds
 from fieldcal.model.rows.noise import rounding_sigma, shared_rounding_sigma
 from fieldcal.model.rows.orientation import (
     force_from_outputs,
@@ -29,6 +28,7 @@ from fieldcal.model.rows.orientation import (
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 from fieldcal.model.rows.vibration import WindowNoise, measure_window_noise
+from fieldcal.model.rows.window_bounds import block_bounds, window_bounds
 from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.session.description import Description

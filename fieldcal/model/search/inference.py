@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.search.proportion import proportional_causes
+from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
 from fieldcal.model.search.selection import SETTLED, Search
 from fieldcal.model.state import State

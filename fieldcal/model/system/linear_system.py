@@ -21,7 +21,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.known import KnownRows
+from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows

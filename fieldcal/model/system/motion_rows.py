@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import ACC, GYR, Array, Index
 from fieldcal.model.causes.cause import TRIADS
 from fieldcal.model.causes.columns import Course, General, RowView
-from fieldcal.model.causes.followed import MotionDictionary
+from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.rows.coloured import Bands
+from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows

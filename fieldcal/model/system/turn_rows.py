@@ -26,7 +26,7 @@ from fieldcal.model.rows.hand_tremor import turned_force
 from fieldcal.model.state import State, Term
 from fieldcal.model.system.end_columns import EndColumns
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.met_columns import TurnColumns, columns_of_turns
+from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.system.way_rows import WayRows, settling_amplitudes
 from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geometry
 from fieldcal.model.turns.turn import Turn, TurnTracker, apply_way_effects, select_rows

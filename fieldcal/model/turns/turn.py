@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.rows.bounds import window_bounds
 from fieldcal.model.rows.reduce import Rows, RowSource
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.model.state import State
 from fieldcal.model.turns.attitude import (
     accelerations,

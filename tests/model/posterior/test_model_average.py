@@ -20,7 +20,7 @@ from fieldcal.model.posterior.model_average import (
     average_over_sets,
 )
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.search.selection import Search
 
 SESSION = Session.of(ladder(), ("quadratic", "scale_asymmetry"), 1.0)

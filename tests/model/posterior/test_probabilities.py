@@ -21,7 +21,7 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.mixture import Mixing
 from fieldcal.model.posterior.probabilities import Posterior
-from fieldcal.model.posterior.reported import average_over_sizes
+from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 

@@ -19,7 +19,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.positions import table_rates
 from fieldcal.core.samples import Array, Block
 from fieldcal.core.sampling import sampling_rate
-from fieldcal.model.rows.bounds import window_bounds
+from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 from fieldcal.windows.sway import find_sway
 from fieldcal.windows.sway_process import needed_seconds

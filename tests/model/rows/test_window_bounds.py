@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from still_samples import about, place, samples
 
-from fieldcal.model.rows.bounds import block_bounds, block_edges, window_bounds
+from fieldcal.model.rows.window_bounds import block_bounds, block_edges, window_bounds
 
 
 def test_a_window_is_the_samples_from_its_start_to_before_its_end() -> None:

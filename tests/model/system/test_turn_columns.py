@@ -12,7 +12,7 @@ from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.causes.columns import RowView
 from fieldcal.model.system import turn_rows
-from fieldcal.model.system.met_columns import TurnColumns, columns_of_turns
+from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.turns.turn import Turn
 
 

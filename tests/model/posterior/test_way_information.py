@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array, Index
-from fieldcal.model.causes.known import KnownRows
+from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.on_the_way import way_information
+from fieldcal.model.posterior.way_information import way_information
 from fieldcal.model.system.turn_rows import TurnRows
 
 COLUMNS = np.array([3, 5, 8, 9])

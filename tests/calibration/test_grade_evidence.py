@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.calibration.grade_shown import GradeShown
+from fieldcal.calibration.grade_evidence import GradeShown
 from fieldcal.core.grade import Grade
 
 USUAL = {

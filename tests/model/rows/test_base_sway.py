@@ -20,7 +20,7 @@ from fieldcal.diagnosis import diagnose
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession, solve_session
-from fieldcal.model.rows.swaying import find_base_sway
+from fieldcal.model.rows.base_sway import find_base_sway
 from fieldcal.session import description
 from fieldcal.session.factory import factory_errors
 from fieldcal.session.folder import Session

@@ -8,7 +8,7 @@ from small_sessions import LADDER, SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.search.proportion import proportional_causes
+from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.window_rows import WindowSystem

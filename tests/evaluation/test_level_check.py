@@ -14,7 +14,7 @@ from session_folders import NINE, SITE, places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.positions import Position
-from fieldcal.evaluation.levelled import with_tilt_shown
+from fieldcal.evaluation.level_check import with_tilt_shown
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.vocabulary import parse
 from fieldcal.solve import solve

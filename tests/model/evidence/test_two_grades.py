@@ -14,7 +14,7 @@ from fieldcal.core.positions import TWO_POSITIONS, Position, specific_forces
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.of_two_grades import chances_of_coarser
+from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.solve import solve
 
 SET = np.array([0, 3, 4, 7])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.model.rows.coloured import Bands
+from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import frequencies
 
 LENGTH, COUNT, STEP = 100, 20, 0.05

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.physics.matched_filter import (
     AmplitudeNoise,
@@ -26,7 +25,7 @@ LENGTHS_S = (0.5, 1.0, 2.0)
 CHANCE = 1e-3
 """Probability of finding a push in a recording without any."""
 
-TRIADS, AXES = (ACC, GYR), 3
+TRIADS = (ACC, GYR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +37,8 @@ class GentlePush:
     first, last : first and one past the last sample in the window
     channel : index in `samples.CHANNELS` of the output that shows it most
     amplitude : height of the half sine there, in standard deviations of a sample
-    deviation : d of (3) in `matched_filter`
-    least : d from which it is a push
+    log_chance : ln P of (3) in `matched_filter`
+    limit : ln P below which it is a push
     matched : the filter
     noise : of the amplitudes at this instant
 
@@ -49,15 +48,20 @@ class GentlePush:
     last: int
     channel: int
     amplitude: float
-    deviation: float
-    least: float
+    log_chance: float
+    limit: float
     matched: MatchedFilter
     noise: AmplitudeNoise
 
     def is_in(self, z: Array) -> bool:
         """Whether outputs (n, 6) have a push of this length, by the same noise."""
-        d2 = self.noise.deviations(self.matched.amplitudes(z))
-        return bool(d2.size and d2.max() > self.least**2)
+        log_chances = self.noise.log_chances(self.matched.amplitudes(z))
+        return bool((log_chances < self.limit).any())
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviations of a normal variable whose density falls as far."""
+        return float(np.sqrt(-2 * self.log_chance))
 
 
 def gentle_pushes(windows: Sequence[Array], rate_hz: float) -> list[list[GentlePush]]:
@@ -77,13 +81,13 @@ def gentle_pushes(windows: Sequence[Array], rate_hz: float) -> list[list[GentleP
     looks = sum(search.looks for search in searches)
     if not looks:
         return found
-    least2 = _chi2_exceeded_with(CHANCE / looks)
+    limit = float(np.log(CHANCE / looks))
     going = set(range(len(windows)))
     while going:
         best: dict[int, GentlePush] = {}
         for search in searches:
-            for w, push in search.most_unusual(going, least2):
-                if w not in best or push.deviation > best[w].deviation:
+            for w, push in search.most_unusual(going, limit):
+                if w not in best or push.log_chance < best[w].log_chance:
                     best[w] = push
         for w, push in best.items():
             found[w].append(push)
@@ -113,19 +117,25 @@ class _Search:
             self._amplitudes[w] = self._matched.amplitudes(windows[w])
 
     def most_unusual(
-        self, going: set[int], least2: float
+        self, going: set[int], limit: float
     ) -> Iterator[tuple[int, GentlePush]]:
         """The most unusual push of each window that has one."""
         noise = amplitude_noise(self._amplitudes, self._matched)
         for w in sorted(going):
-            d2 = noise[w].deviations(self._amplitudes[w])
-            if not d2.size or d2.max() <= least2:
+            log_chances = noise[w].log_chances(self._amplitudes[w])
+            if not (log_chances < limit).any():
                 continue
-            i, triad = divmod(int(np.argmax(d2)), len(TRIADS))
-            yield w, self._push(w, i, triad, (float(d2.max()), least2), noise[w])
+            i, triad = divmod(int(np.argmin(log_chances)), len(TRIADS))
+            chances = float(log_chances.min()), limit
+            yield w, self._push(w, i, triad, chances, noise[w])
 
     def _push(
-        self, w: int, i: int, triad: int, d2: tuple[float, float], noise: AmplitudeNoise
+        self,
+        w: int,
+        i: int,
+        triad: int,
+        chances: tuple[float, float],
+        noise: AmplitudeNoise,
     ) -> GentlePush:
         amplitudes = np.nan_to_num(self._amplitudes[w][i])[TRIADS[triad]]
         axis = int(np.argmax(np.abs(amplitudes)))
@@ -136,22 +146,7 @@ class _Search:
             last,
             TRIADS[triad].start + axis,
             height,
-            float(np.sqrt(d2[0])),
-            float(np.sqrt(d2[1])),
+            *chances,
             self._matched,
             noise.at(i),
         )
-
-
-def _chi2_exceeded_with(chance: float) -> float:
-    """Chi2 of the axes of a triad that is exceeded with a probability.
-
-    >>> round(_chi2_exceeded_with(0.050106), 2)
-    7.81
-    """
-    low, high = 0.0, 1e3
-    while high - low > 1e-6:
-        middle = (low + high) / 2
-        more = chi2_tail(middle, AXES) > chance
-        low, high = (middle, high) if more else (low, middle)
-    return high

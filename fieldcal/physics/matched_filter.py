@@ -13,12 +13,13 @@ windows, s_0^2 with nu_0 (`window_variances`):
 
     v_i = max(1, (N_i s_i^2 + nu_0 s_0^2) / (N_i + nu_0)),     nu = N_i + nu_0      (2)
 
-A push moves the k axes of a triad at the same time. With R the correlation of their
-amplitudes and b = a / sqrt v, q = b' R^-1 b is a ratio of variances, and
+A push moves the three axes of a triad at the same time. With R the correlation of
+their amplitudes and b = a / sqrt v, q_i = b' R^-1 b is without a push three times a
+variable of Fisher's distribution F(3, nu). The logarithm of its tail is
 
-    d_i^2 = (nu + k / 2 - 1) ln(1 + q / nu)                                         (3)
+    ln P_i = -nu ln(1 + q / nu) / 2 + ln(1 + nu q / (nu + q) / 2) / 2               (3)
 
-has nearly the tail of a chi2 of k degrees of freedom; exactly for k = 2.
+the mean of those for 2 and for 4 axes, which are exact; 4 to 12 % low in P.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ TAPS = 12
 FURTHEST = 3.0
 """Standard deviations beyond which an amplitude counts no more in a correlation."""
 
-POOLED = 4.0
-"""Weight of the mean correlation of all windows, in degrees of freedom."""
+POOLED, APART = 4.0, 1.0
+"""Weights in a window's correlation of the mean of all windows and of axes that move
+each by itself, in degrees of freedom."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,15 +119,16 @@ class AmplitudeNoise:
         """The noise at one instant."""
         return AmplitudeNoise(self.variance[i], self.dof[i], self.correlation)
 
-    def deviations(self, amplitudes: Array) -> Array:
-        """d^2 of amplitudes (k, c) for each triad, (k, 2); one that is missing is 0."""
+    def log_chances(self, amplitudes: Array) -> Array:
+        """(3) of amplitudes (k, 6) for each triad, (k, 2); what is missing is 0."""
         b = np.nan_to_num(amplitudes) / np.sqrt(self.variance)
         out = np.zeros((len(b), 2))
         for triad, axes in enumerate((ACC, GYR)):
             inverse = np.linalg.inv(self.correlation[axes, axes])
             q = np.einsum("ij,jk,ik->i", b[:, axes], inverse, b[:, axes])
-            nu = self.dof[..., axes].mean(axis=-1)
-            out[:, triad] = (nu + 0.5) * np.log1p(q / np.maximum(nu, 1e-9))  # (3)
+            nu = np.maximum(self.dof[..., axes].mean(axis=-1), 1e-9)
+            four = np.log1p(nu * q / (nu + q) / 2)
+            out[:, triad] = (four - nu * np.log1p(q / nu)) / 2  # (3)
         return out
 
 
@@ -172,9 +175,8 @@ def _products(b: Array) -> Array:
 
 
 def _correlation(products: Array) -> Array:
+    """Correlation by sums of products (c, c) of so many degrees of freedom."""
+    products = products + APART * np.eye(len(products))
     size = np.sqrt(np.diag(products))
-    dead = size == 0
-    size[dead] = 1.0
     out: Array = products / np.outer(size, size)
-    out[dead, dead] = 1.0
     return out

@@ -77,12 +77,12 @@ def test_the_height_of_a_push_is_its_own() -> None:
         z[2] = pushed(z[2], 600, 100, 12.0)
         (push,) = gentle_pushes(z, HZ)[2]
         sizes.append(push.deviation)
-        assert push.least < push.deviation
+        assert push.log_chance < push.limit < -5
         assert push.amplitude == pytest.approx(
             12.0 * 0.64 * MatchedFilter.for_length(100).sigma, rel=0.4
         )
     # in so many degrees of freedom, 12 of their sigmas are as rare as these of a normal
-    assert 6.5 < np.mean(sizes) < 12.0
+    assert 6.0 < np.mean(sizes) < 12.0
 
 
 def test_a_hand_that_always_moves_like_that_is_not_pushed_and_a_calm_one_is() -> None:

@@ -76,17 +76,15 @@ def test_what_is_missing_has_no_amplitude() -> None:
     assert missing[:, 3].sum() == 20 and not missing[:, :3].any()
 
 
-@pytest.mark.parametrize("nu", [6.0, 12.0, 40.0])
-def test_a_deviation_has_the_tail_of_chi2(nu: float) -> None:
-    """Three normal values over the root of one variance of nu degrees of freedom."""
-    rng, n = np.random.default_rng(3), 400_000
-    amplitudes = np.zeros((n, 6))
-    amplitudes[:, :3] = rng.standard_normal((n, 3))
-    amplitudes[:, :3] /= np.sqrt(rng.chisquare(nu, n) / nu)[:, None]
-    d2 = AmplitudeNoise(np.ones(6), np.full(6, nu), ONE).deviations(amplitudes)[:, 0]
-    for chance in (0.1, 1e-2, 1e-3):
-        share = float((d2 > stats.chi2.ppf(1 - chance, 3)).mean())
-        assert share == pytest.approx(chance, rel=0.35)
+@pytest.mark.parametrize("nu", [1.0, 3.0, 12.0, 1e6])
+def test_the_chance_is_the_tail_of_fishers_distribution(nu: float) -> None:
+    amplitudes = np.zeros((5, 6))
+    amplitudes[:, 4] = [0.5, 2.0, 5.0, 10.0, 20.0]
+    found = AmplitudeNoise(np.ones(6), np.full(6, nu), ONE).log_chances(amplitudes)
+    exact = stats.f.logsf(amplitudes[:, 4] ** 2 / 3, 3, nu)
+    assert (found[:, 1] - exact < 0.0).all()
+    assert found[:, 1] == pytest.approx(exact, abs=0.125)
+    assert found[:, 0].tolist() == [0.0] * 5
 
 
 def test_axes_that_move_together_are_not_counted_thrice() -> None:
@@ -95,10 +93,12 @@ def test_axes_that_move_together_are_not_counted_thrice() -> None:
     correlation[:3, :3] = together
     noise = AmplitudeNoise(np.ones(6), np.full(6, 1e9), correlation)
     same, other = np.zeros(6), np.zeros(6)
-    same[:3], other[:3] = 4.0, (4.0, -4.0, 0.0)
-    d2 = noise.deviations(np.array([same, other]))[:, 0]
-    assert d2[0] == pytest.approx(same[:3] @ np.linalg.solve(together, same[:3]))
-    assert d2[0] < 17 < 1000 < d2[1]
+    same[:3], other[:3] = 4.0, (1.0, -1.0, 0.0)
+    found = noise.log_chances(np.array([same, other]))[:, 0]
+    for one, log_chance in zip((same, other), found.tolist(), strict=True):
+        q = float(one[:3] @ np.linalg.solve(together, one[:3]))
+        assert log_chance == pytest.approx(stats.chi2.logsf(q, 3), abs=0.13)
+    assert found[1] < -90 < -10 < found[0]
 
 
 def drawn(nu: float, dof: int, windows: int, seed: int) -> list[Array]:

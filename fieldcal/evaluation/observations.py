@@ -53,7 +53,7 @@ def build_observations(
         averages,
         about.gravity,
         latitude=about.latitude,
-        under_way=about.base_motion,
+        base_motion=about.base_motion,
         mounting=about.mounting,
         grade=about.grade,
         nominal=Nominal(**{k: tuple(v.tolist()) for k, v in about.nominal.items()}),

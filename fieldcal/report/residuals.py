@@ -78,13 +78,13 @@ def predicted_outputs(found: Calibration, seen: Observations) -> Array:
         *seen.angles,
         seen.gravity,
         base_force=specific_force_at_home(seen.gravity)
-        + seen.under_way.force * [1.0, 0.0, 1.0],
+        + seen.base_motion.force * [1.0, 0.0, 1.0],
         mounting=seen.mounting,
         rate=table_rates(seen.positions),
         gamma=gamma_angles(seen.positions),
     )
     if seen.grade == "navigation" and seen.latitude is not None:
-        rate = earth_rate_at_home(seen.latitude) + seen.under_way.rate
+        rate = earth_rate_at_home(seen.latitude) + seen.base_motion.rate
         x = x.turned(base_rate=rate)
     nominal = seen.nominal
     state = state_of(
@@ -110,7 +110,7 @@ def _estimate_earth_rate(seen: Observations, left: Array) -> Array:
     away[known] = axis_projections(seen.rates[known]) @ (
         seen.mounting.T @ direction_cosines(*(angle[known] for angle in turns))
     )
-    home = earth_rate_at_home(seen.latitude) + seen.under_way.rate
+    home = earth_rate_at_home(seen.latitude) + seen.base_motion.rate
     down = away[..., 1] * home[1]
     level = away[known][..., [0, 2]].reshape(-1, 2)
     # a prior of the size it can have keeps few windows from explaining anything with it

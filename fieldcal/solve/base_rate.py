@@ -16,7 +16,7 @@ def known_earth_rate(
     latitude: float | None,
     navigation: bool,
     heading: float | None,
-    under_way: BaseMotion | None = None,
+    base_motion: BaseMotion | None = None,
 ) -> tuple[Array, tuple[float, float, float]]:
     """The Earth's rate in base axes, and its uncertainty, rad/s.
 
@@ -27,7 +27,7 @@ def known_earth_rate(
     if latitude is None:
         free = EARTH_RATE / float(np.sqrt(3.0))
         return np.zeros(3), (free, free, free)
-    moving = under_way or BaseMotion()
+    moving = base_motion or BaseMotion()
     home = earth_rate_at_home(latitude) + moving.rate
     level = float(np.hypot(home[0], home[2]))
     if navigation and heading is None:

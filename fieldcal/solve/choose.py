@@ -196,7 +196,7 @@ class _SessionFit:
         self.observations, self.options, self.method = observations, options, method
         navigation = observations.grade == "navigation"
         base, self.earth_sigma = known_earth_rate(
-            observations.latitude, navigation, options.heading, observations.under_way
+            observations.latitude, navigation, options.heading, observations.base_motion
         )
         if earth == "another":
             self.earth_sigma = (self.earth_sigma[0], EARTH_RATE, self.earth_sigma[2])

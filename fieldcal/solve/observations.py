@@ -68,7 +68,7 @@ class Observations:
     mounting: Array = field(default_factory=lambda: np.eye(3))
     grade: Grade = "tactical"
     nominal: Nominal = field(default_factory=Nominal)
-    under_way: BaseMotion = field(default_factory=BaseMotion)
+    base_motion: BaseMotion = field(default_factory=BaseMotion)
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -95,7 +95,7 @@ class Observations:
         mounting: Array | None = None,
         grade: Grade = "tactical",
         nominal: Nominal | None = None,
-        under_way: BaseMotion | None = None,
+        base_motion: BaseMotion | None = None,
     ) -> Observations:
         """Gather the averages of windows; units and frames as in the attributes."""
         if not averages:
@@ -111,7 +111,7 @@ class Observations:
             np.eye(3) if mounting is None else mounting,
             grade,
             nominal or Nominal(),
-            under_way or BaseMotion(),
+            base_motion or BaseMotion(),
         )
 
     def __len__(self) -> int:

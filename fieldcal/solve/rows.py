@@ -47,8 +47,8 @@ def rows_of_means(observations: Observations) -> RecordedRows:
         speed=unknown_axis_speeds(observations.positions)[0],
         speed_sigma=unknown_axis_speeds(observations.positions)[1],
         base_force=specific_force_at_home(observations.gravity)
-        + observations.under_way.force * [1.0, 0.0, 1.0],
-        transport=observations.under_way.rate,
+        + observations.base_motion.force * [1.0, 0.0, 1.0],
+        transport=observations.base_motion.rate,
         mounting=observations.mounting,
         latitude=np.nan if observations.latitude is None else observations.latitude,
     )
@@ -112,7 +112,7 @@ def _earth_rate_at_rest(observations: Observations) -> float:
         return 0.0
     if observations.latitude is None:
         return EARTH_RATE
-    rate = earth_rate_at_home(observations.latitude) + observations.under_way.rate
+    rate = earth_rate_at_home(observations.latitude) + observations.base_motion.rate
     return float(np.linalg.norm(rate))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
-from fieldcal.physics.gentle_pushes import GentlePush, gentle_pushes
+from fieldcal.physics.gentle_pushes import GentlePush, block_length, gentle_pushes
 from fieldcal.physics.pushes import (
     FEWEST,
     LARGEST,
@@ -28,6 +28,10 @@ from fieldcal.physics.pushes import (
 )
 from fieldcal.physics.recording import CheckedSamples, Fault, medians
 from fieldcal.physics.shape import Shape
+from fieldcal.physics.steady_changes import (
+    AROUND_S,
+    steady_changes,
+)
 
 NEXT = 4.02
 """Largest deviation that rounding explains, in half steps of an output."""
@@ -35,18 +39,13 @@ NEXT = 4.02
 LONGEST_S = 5.0
 """A disturbance that lasts longer is a change of the device, not a bump."""
 
-AROUND_S, BESIDE_S = 6.0, 1.5
-"""Before and after a disturbance, where a jump of the level shows, and how much of that
-is on either side of it: a jump bends the course of two of its parts."""
-
-FADES_S = (1.0, 1.5, 2.0, 3.0, 4.5)
-"""Time constants of exponential changes after a turn; slower ones are no bumps."""
 
 LOUDEST_S = 1.0
 """Length of a push of a hand or a gust, s."""
 
 STEPS = 2.0
-"""Steps, in standard deviations of noise, between which a gentle push is lost."""
+"""Step of an output, in standard deviations of noise, beyond which gentle pushes of it
+are lost."""
 
 NOTHING = slice(0, 0)
 
@@ -79,26 +78,46 @@ def _gently_pushed_stretches(
     recording: CheckedSamples, loud: Mapping[int, Sequence[Fault]], rate: float
 ) -> dict[int, list[Fault]]:
     """Gentle pushes in each window, beside the faults that it has already."""
-    windows = {}
-    for p, faults in loud.items():
-        z = recording.six(*recording.windows[p].tolist()) / _noise(recording)
-        z[:, recording.steps > STEPS * recording.noise] = 0.0
-        if recording.x.rate[p].any():
-            z[:, :3] = 0.0
-        for fault in faults:
-            z[fault.rows - recording.windows[p, 0]] = np.nan
-        windows[p] = z
+    block = block_length(rate)
+    windows = {p: _block_means(recording, p, loud[p], block) for p in loud}
+    pushes = gentle_pushes(list(windows.values()), rate / block)
     out: dict[int, list[Fault]] = {p: [] for p in windows}
-    pushes = gentle_pushes(list(windows.values()), rate)
-    around = round(AROUND_S * rate)
+    around = round(AROUND_S * rate / block)
     for (p, z), found in zip(windows.items(), pushes, strict=True):
         for push in found:
             first = max(push.first - around, 0)
             near = z[first : push.last + around]
             at = (push.first - first, push.last - first)
-            courses = _steady_changes(near, at, rate)
+            courses = steady_changes(near, at, rate / block)
             if all(push.is_in(near - course) for course in courses):
-                out[p].append(_gentle_fault(recording, p, push, loud[p]))
+                out[p].append(_gentle_fault(recording, p, push, loud[p], block))
+    return out
+
+
+def _block_means(
+    recording: CheckedSamples, p: int, loud: Sequence[Fault], block: int
+) -> Array:
+    """Means of blocks of a window over their sigma by noise, (k, 6), without faults.
+
+    nan where half of the samples are missing.
+    """
+    first, last = (int(i) for i in recording.windows[p])
+    size, noise = (last - first) // block, _noise(recording)
+    out = np.zeros((size, 6))
+    bumped = np.zeros(last - first, dtype=bool)
+    for fault in loud:
+        bumped[fault.rows - first] = True
+    for c in range(6):
+        if recording.steps[c] > STEPS * recording.noise[c]:
+            continue  # what is less than a step is lost
+        if c < 3 and recording.x.rate[p].any():
+            continue  # the force goes round with the table
+        z = recording.channel(c)[first:last] / noise[c]
+        z[bumped] = np.nan
+        parts = z[: size * block].reshape(size, block)
+        count = np.isfinite(parts).sum(axis=1)
+        mean = np.nansum(parts, axis=1) / np.maximum(count, 1) * np.sqrt(block)
+        out[:, c] = np.where(2 * count > block, mean, np.nan)
     return out
 
 
@@ -205,7 +224,7 @@ def _has_steady_change(
     shortest, margin = max(2, round(0.1 * rate)), round(LOUDEST_S * rate / 2)
     first = min(at[0], around)
     beside = slice(max(first - margin, 0), first + at[1] - at[0] + margin)
-    for course in _steady_changes(near, at, rate):
+    for course in steady_changes(near, at, rate):
         rest = near - course
         _flatten(rest, rate)
         calm = (usual_spread(rest) < SHAKEN * there.sample).all()
@@ -213,40 +232,6 @@ def _has_steady_change(
         if calm and len(disturbed_stretches(rest, shortest, usually)) == 0:
             return True
     return False
-
-
-def _steady_changes(near: Array, at: tuple[int, int], rate: float) -> list[Array]:
-    """Courses (n, 6) of a jump and of exponential changes, fitted to the samples."""
-    known = np.nan_to_num(near)
-    jump = _level_jump(known, round(BESIDE_S * rate))
-    courses = [] if jump is None else [jump]
-    if at[0] < round(AROUND_S * rate):
-        courses += [_exponential_change(known, tau * rate) for tau in FADES_S]
-    return courses
-
-
-def _level_jump(z: Array, margin: int) -> Array | None:
-    """Step function where the means before and after differ most, (n, 6).
-
-    None if that leaves fewer than `margin` samples on one side.
-    """
-    n, each = len(z), np.arange(1, len(z))[:, None]
-    total = np.cumsum(z, axis=0)
-    before = total[:-1] / each
-    after = (total[-1] - total[:-1]) / (n - each)
-    gain = ((after - before) ** 2 * each * (n - each)).sum(axis=1)
-    at = int(np.argmax(gain))
-    if min(at + 1, n - at - 1) < margin:
-        return None
-    level: Array = np.where(np.arange(n)[:, None] <= at, before[at], after[at])
-    return level
-
-
-def _exponential_change(z: Array, tau: float) -> Array:
-    """Fit of an exponential change towards a level, (n, 6); `tau` in samples."""
-    design = np.column_stack([np.ones(len(z)), np.exp(-np.arange(len(z)) / tau)])
-    course: Array = design @ np.linalg.lstsq(design, z, rcond=None)[0]
-    return course
 
 
 def _deviation_from_parts(column: Array, centre: Array, level: Array) -> Array:
@@ -289,12 +274,16 @@ def _fault(
 
 
 def _gentle_fault(
-    recording: CheckedSamples, p: int, push: GentlePush, loud: Sequence[Fault]
+    recording: CheckedSamples,
+    p: int,
+    push: GentlePush,
+    loud: Sequence[Fault],
+    block: int,
 ) -> Fault:
     """Samples of a gentle push. Beside a loud one it is a part of that: not named."""
     start, end = (int(i) for i in recording.windows[p])
     t = recording.block.t
-    first, last = start + push.first, min(start + push.last, end)
+    first, last = start + push.first * block, min(start + push.last * block, end)
     at, to = float(t[first]), float(t[last - 1])
     length = to - at
     sigma = length / (2 * push.deviation)
@@ -306,6 +295,6 @@ def _gentle_fault(
         from_s=at,
         to_s=to,
         rows=np.arange(first, last),
-        size=abs(push.amplitude) * float(recording.noise[push.channel]),
+        size=abs(push.amplitude) * float(recording.noise[push.channel] / block**0.5),
         sigma=push.deviation,
     )

@@ -70,8 +70,8 @@ def gentle_pushes(windows: Sequence[Array], rate_hz: float) -> list[list[GentleP
     Parameters
     ----------
     windows : outputs of each, (n, 6), in standard deviations of noise; nan where one
-        is missing
-    rate_hz : samples in a second
+        is missing. Means of `block_length` samples will do
+    rate_hz : outputs in a second
 
     """
     left = [z.copy() for z in windows]
@@ -96,6 +96,11 @@ def gentle_pushes(windows: Sequence[Array], rate_hz: float) -> list[list[GentleP
         for search in searches:
             search.renew(left, going)
     return found
+
+
+def block_length(rate_hz: float) -> int:
+    """Samples whose mean shows the shortest push as well as each of them does."""
+    return MatchedFilter.for_length(max(round(LENGTHS_S[0] * rate_hz), 2)).block
 
 
 class _Search:

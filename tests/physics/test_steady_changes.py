@@ -38,9 +38,9 @@ def test_a_jump_near_an_end_is_no_jump() -> None:
 
 @pytest.mark.parametrize("tau_s", [1.0, 2.0, 4.5])
 def test_what_fades_after_a_turn_is_explained_only_near_it(tau_s: float) -> None:
-    near = noisy(2.0 * np.exp(-np.arange(650) / (tau_s * HZ)))
+    near = noisy(4.0 * np.exp(-np.arange(650) / (tau_s * HZ)))
     assert left(near, (20, 70)) == pytest.approx(0.1, rel=0.05)
-    assert left(near, (400, 450)) > 0.11
+    assert left(near, (400, 450)) > 0.12
 
 
 def test_a_push_is_explained_by_none() -> None:

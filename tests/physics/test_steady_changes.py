@@ -19,8 +19,9 @@ def noisy(course: Array, seed: int = 1) -> Array:
 
 
 def left(near: Array, at: tuple[int, int]) -> float:
-    """Least rms that a course leaves."""
-    return min(float((near - c).std()) for c in steady_changes(near, at, HZ))
+    """Least rms that a course leaves; infinite where none can be fitted."""
+    rms = (float((near - c).std()) for c in steady_changes(near, at, HZ))
+    return min(rms, default=np.inf)
 
 
 def test_a_jump_is_explained_wherever_it_is() -> None:

@@ -257,8 +257,8 @@ def drawn(
         one = known[rng.integers(len(known))]
         told, axes = np.linalg.eigh(one.matrix)
         noise = np.sqrt(np.maximum(told, 0)) * rng.standard_normal(len(told))
-        pull = one.matrix @ there + axes @ noise
-        small = replace(one, pull=pull)
+        rhs = one.matrix @ there + axes @ noise
+        small = replace(one, rhs=rhs)
         yield StoredSession(
             f"/s/{i}", "U1", {"station": "ABCDEFGH"[i % stations]},
             reduced=small.to_bytes(),

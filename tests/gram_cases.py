@@ -123,7 +123,7 @@ def beside(windows: Dense, turns: list[TurnRows], tau: Array) -> Dense:
         y += [one.closure, one.way]
         design.append(whole)
         white += [1 / np.sqrt(one.info), np.ones(len(one.way))]
-        ends = np.sqrt(tau[CLOSURE] ** 2 + one.bent**2 @ tau[:6] ** 2)
+        ends = np.sqrt(tau[CLOSURE] ** 2 + one.closure_errors**2 @ tau[:6] ** 2)
         spread += [ends, np.zeros(len(one.way))]
     n, sd = len(windows.y), np.concatenate(white)
     cov = np.diag(sd**2)

@@ -190,9 +190,9 @@ def _quantities_at_size(
     if told is None or not isinstance(group.effect, Motion | Sensor):
         return {}
     before = size * group.typical
-    known = np.linalg.inv(told.inner + np.eye(len(told.pull)) / size**2)
+    known = np.linalg.inv(told.inner + np.eye(len(told.rhs)) / size**2)
     covariance = known * np.outer(group.typical, group.typical)
-    values = group.typical * (known @ told.pull)
+    values = group.typical * (known @ told.rhs)
     return _determined_parameters(there, group, values, covariance, before)
 
 

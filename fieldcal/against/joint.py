@@ -57,21 +57,21 @@ class EffectInformation:
 
     Attributes
     ----------
-    inner, pull : (k, k), (k,) M and q in units of the typical sizes
+    inner, rhs : (k, k), (k,) M and q in units of the typical sizes
     largest_diagonal : largest diagonal element of M before any elimination
     evidence : ln evidence of the effect in that session, if known better than by (1)
 
     """
 
     inner: Array
-    pull: Array
+    rhs: Array
     largest_diagonal: float
     evidence: float | None = None
 
     @property
     def gain(self) -> Array:
         """Ln evidence at each size v, shifted to agree with `evidence`."""
-        return evidence_gains(self.inner, self.pull, self.largest_diagonal) + self.shift
+        return evidence_gains(self.inner, self.rhs, self.largest_diagonal) + self.shift
 
     @property
     def shift(self) -> float:
@@ -79,7 +79,7 @@ class EffectInformation:
         if self.evidence is None:
             return 0.0
         return self.evidence - _over_sizes(
-            evidence_gains(self.inner, self.pull, self.largest_diagonal)
+            evidence_gains(self.inner, self.rhs, self.largest_diagonal)
         )
 
     @property
@@ -133,7 +133,7 @@ def evidence_of_same(real: EffectInformation, sim: EffectInformation) -> float:
         return -np.inf
     there = evidence_gains(
         real.inner + sim.inner,
-        real.pull + sim.pull,
+        real.rhs + sim.rhs,
         real.largest_diagonal + sim.largest_diagonal,
     )
     return _over_sizes(there) + real.shift + sim.shift
@@ -146,15 +146,13 @@ def evidence_of_proportional(
     if real.inner.shape != sim.inner.shape:
         return None
     known, other = sorted((real, sim), key=lambda t: -_over_sizes(t.gain))
-    course = np.linalg.solve(known.inner + np.eye(len(known.pull)), known.pull)
+    course = np.linalg.solve(known.inner + np.eye(len(known.rhs)), known.rhs)
     size = float(np.linalg.norm(course))
     if size == 0:
         return None
     along = course / size
-    inner, pull = along @ other.inner @ along, along @ other.pull
-    times = evidence_gains(
-        np.array([[inner]]), np.array([pull]), other.largest_diagonal
-    )
+    inner, rhs = along @ other.inner @ along, along @ other.rhs
+    times = evidence_gains(np.array([[inner]]), np.array([rhs]), other.largest_diagonal)
     return _over_sizes(known.gain) + _over_sizes(times) + other.shift
 
 

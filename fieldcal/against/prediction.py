@@ -116,10 +116,10 @@ def _squares(
         priors.SIZES[list(real.set.sizes.instability)] * real.search.typical_instability
     )
     weighed = rows.with_instability(tau)
-    inner, pull = weighed.matrix(columns, columns), weighed.pull(columns)
-    left = weighed.square - 2 * values @ pull + values @ inner @ values
+    inner, rhs = weighed.matrix(columns, columns), weighed.rhs(columns)
+    left = weighed.square - 2 * values @ rhs + values @ inner @ values
     return chi2_of_uncertain_prediction(
-        float(left), pull - inner @ values, inner, covariance
+        float(left), rhs - inner @ values, inner, covariance
     )
 
 

@@ -65,9 +65,9 @@ class WidenedSet:
         kept = np.ones(len(state.columns), dtype=bool)
         kept[state.places_of(columns)] = False
         less = Eliminated.of(state.rows, state.columns[kept], state.prior_sigma[kept])
-        inner, pull = less.schur_complement(columns, typical)
+        inner, rhs = less.schur_complement(columns, typical)
         own = np.diag(state.rows.matrix(columns, columns)) * typical**2
-        return EffectInformation(inner, pull, float(own.max()), self.evidence(key))
+        return EffectInformation(inner, rhs, float(own.max()), self.evidence(key))
 
     def evidence(self, key: str) -> float:
         """Rise of ln Z with a cause, without its prior probability."""

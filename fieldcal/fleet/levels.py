@@ -146,29 +146,28 @@ class PooledSessions:
 
     Parameters
     ----------
-    matrix, pull : M (s, k, k) and q (s, k) of each
+    matrix, rhs : M (s, k, k) and q (s, k) of each
 
     """
 
-    def __init__(self, matrix: Array, pull: Array) -> None:
-        self.matrix, self.pull = matrix, pull
+    def __init__(self, matrix: Array, rhs: Array) -> None:
+        self.matrix, self.rhs = matrix, rhs
 
     def posterior(self, members: Sequence[LevelEffect]) -> EffectSetPosterior:
         """Posterior of a set of effects; each size is maximised in turn."""
-        inner, pull, places = self._combined_blocks(members)
+        inner, rhs, places = self._combined_blocks(members)
         sizes = [EVEN] * len(members)
         profiles: list[Array] = []
         for _ in range(ROUNDS if len(members) > 1 else 1):
             before = list(sizes)
             profiles = [
-                self._profile(inner, pull, places, sizes, i)
-                for i in range(len(members))
+                self._profile(inner, rhs, places, sizes, i) for i in range(len(members))
             ]
             if sizes == before and len(members) > 1:
                 break
         wide = [float(priors.SIZES[i]) for i in sizes]
         score, mean, covariance = _posterior_at_sizes(
-            inner, pull, self._sizes_by_column(wide, places)
+            inner, rhs, self._sizes_by_column(wide, places)
         )
         score += sum(float(DENSITY[i]) for i in sizes)
         score += sum(float(np.logaddexp.reduce(p - p.max())) for p in profiles)
@@ -181,19 +180,19 @@ class PooledSessions:
             gain = evidence_gains(*blocks, _largest_diagonal(blocks[0])).sum(axis=0)
             return float(np.logaddexp.reduce(gain + DENSITY))
         every = [*base.effects, member]
-        inner, pull, places = self._combined_blocks(every)
+        inner, rhs, places = self._combined_blocks(every)
         known = np.repeat(base.sizes, [m.width for m in base.effects])
-        gain = _evidence_gain(inner, pull, places[-1], known)
+        gain = _evidence_gain(inner, rhs, places[-1], known)
         return float(np.logaddexp.reduce(gain + DENSITY))
 
     def _blocks(self, member: LevelEffect) -> tuple[Array, Array]:
         """G and b of a single effect, (groups, k, k) and (groups, k)."""
         k, count = len(member.columns), len(member.grouping.labels)
-        inner, pull = np.zeros((count, k, k)), np.zeros((count, k))
+        inner, rhs = np.zeros((count, k, k)), np.zeros((count, k))
         at = member.columns
         np.add.at(inner, member.grouping.index, self.matrix[:, at[:, None], at])
-        np.add.at(pull, member.grouping.index, self.pull[:, at])
-        return inner, pull
+        np.add.at(rhs, member.grouping.index, self.rhs[:, at])
+        return inner, rhs
 
     def _combined_blocks(
         self, members: Sequence[LevelEffect]
@@ -201,10 +200,10 @@ class PooledSessions:
         """G and b of (1), and the rows of each effect in them."""
         ends = np.cumsum([0, *(m.width for m in members)]).tolist()
         places = [slice(a, b) for a, b in pairwise(ends)]
-        inner, pull = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
+        inner, rhs = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
         for one, here in zip(members, places, strict=True):
             rows, k = one.grouping.index, len(one.columns)
-            np.add.at(pull[here].reshape(-1, k), rows, self.pull[:, one.columns])
+            np.add.at(rhs[here].reshape(-1, k), rows, self.rhs[:, one.columns])
             for other, there in zip(members, places, strict=True):
                 j = len(other.columns)
                 part = np.zeros((one.width // k, other.width // j, k, j))
@@ -213,7 +212,7 @@ class PooledSessions:
                 inner[here, there] = part.transpose(0, 2, 1, 3).reshape(
                     one.width, other.width
                 )
-        return inner, pull, places
+        return inner, rhs, places
 
     @staticmethod
     def _sizes_by_column(wide: Sequence[float], places: Sequence[slice]) -> Array:
@@ -225,39 +224,39 @@ class PooledSessions:
     def _profile(
         self,
         inner: Array,
-        pull: Array,
+        rhs: Array,
         places: Sequence[slice],
         sizes: list[int],
         i: int,
     ) -> Array:
         """Log evidence over the sizes of effect i; sizes[i] is set to the best one."""
-        others = np.ones(len(pull), dtype=bool)
+        others = np.ones(len(rhs), dtype=bool)
         others[places[i]] = False
         order = np.concatenate([np.flatnonzero(others), np.flatnonzero(~others)])
         wide = self._sizes_by_column([float(priors.SIZES[s]) for s in sizes], places)[
             others
         ]
-        last = slice(int(others.sum()), len(pull))
-        gain = _evidence_gain(inner[np.ix_(order, order)], pull[order], last, wide)
+        last = slice(int(others.sum()), len(rhs))
+        gain = _evidence_gain(inner[np.ix_(order, order)], rhs[order], last, wide)
         profile: Array = gain + DENSITY
         sizes[i] = int(np.argmax(profile))
         return profile
 
 
-def _evidence_gain(inner: Array, pull: Array, last: slice, wide: Array) -> Array:
+def _evidence_gain(inner: Array, rhs: Array, last: slice, wide: Array) -> Array:
     """Gain in log evidence for each size of the last columns.
 
     The columns before them have fixed sizes `wide` (a,).
     """
     first = slice(0, last.start)
     scaled = inner[first, first] * wide * wide[:, None] + np.eye(last.start)
-    right = np.column_stack([inner[first, last], pull[first]]) * wide[:, None]
+    right = np.column_stack([inner[first, last], rhs[first]]) * wide[:, None]
     solved = np.linalg.solve(scaled, right)
     left = inner[last, first] * wide
     own = inner[last, last]
     less = own - left @ solved[:, :-1]
     gain: Array = evidence_gains(
-        less, pull[last] - left @ solved[:, -1], _largest_diagonal(own)
+        less, rhs[last] - left @ solved[:, -1], _largest_diagonal(own)
     )
     return gain
 
@@ -269,12 +268,12 @@ def _largest_diagonal(inner: Array) -> Array:
 
 
 def _posterior_at_sizes(
-    inner: Array, pull: Array, wide: Array
+    inner: Array, rhs: Array, wide: Array
 ) -> tuple[float, Array, Array]:
     """Log evidence (2), mean (a,) and covariance (a, a) at sizes `wide` (a,)."""
     scaled = inner * wide * wide[:, None] + np.eye(len(wide))
     root = np.linalg.cholesky(scaled)
     half = np.linalg.solve(root, np.diag(wide))
-    seen = half @ pull
+    seen = half @ rhs
     score = 0.5 * float(seen @ seen) - float(np.log(np.diag(root)).sum())
     return score, half.T @ seen, half.T @ half

@@ -127,14 +127,14 @@ class _UnitInformation:
     Attributes
     ----------
     centre, scale : (k,) in which everything here is: parameter = middle + size z
-    information, pull : (n, k, k), (n, k) C^-1 and C^-1 x of each unit
+    information, rhs : (n, k, k), (n, k) C^-1 and C^-1 x of each unit
 
     """
 
     centre: Array
     scale: Array
     information: Array
-    pull: Array
+    rhs: Array
 
     @classmethod
     def of(
@@ -155,18 +155,18 @@ class _UnitInformation:
             usual = np.abs(z) / np.sqrt(1 + np.diag(scaled))
             if not at or usual.max() > WIDER / 2:
                 continue
-            told, pull = np.zeros((k, k)), np.zeros(k)
+            told, rhs = np.zeros((k, k)), np.zeros(k)
             told[np.ix_(at, at)] = np.linalg.inv(scaled)
-            pull[at] = told[np.ix_(at, at)] @ z
+            rhs[at] = told[np.ix_(at, at)] @ z
             every.append(told)
-            pulls.append(pull)
+            pulls.append(rhs)
         some = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
         return cls(middle, size, np.array(every)[some], np.array(pulls)[some])
 
     def predict_next_unit(self) -> tuple[Array, Array]:
         """Return mean (k,) and covariance (k, k) of the next unit."""
         rng = np.random.default_rng(1)
-        n, k = self.pull.shape
+        n, k = self.rhs.shape
         spread_: Array = np.eye(k)
         means, spreads = [], []
         for draw in range(FIRST + DRAWS):
@@ -176,10 +176,10 @@ class _UnitInformation:
             both = np.linalg.inv(
                 (self.information - half.transpose(0, 2, 1) @ half).sum(0)
             )
-            seen = np.linalg.solve(root, self.pull[..., None])
-            pull = (self.pull - (half.transpose(0, 2, 1) @ seen)[..., 0]).sum(axis=0)
-            mu = rng.multivariate_normal(both @ pull, both)  # (2)
-            white = np.linalg.solve(root, (self.pull + inverse @ mu)[..., None])
+            seen = np.linalg.solve(root, self.rhs[..., None])
+            rhs = (self.rhs - (half.transpose(0, 2, 1) @ seen)[..., 0]).sum(axis=0)
+            mu = rng.multivariate_normal(both @ rhs, both)  # (2)
+            white = np.linalg.solve(root, (self.rhs + inverse @ mu)[..., None])
             white += rng.standard_normal((n, k, 1))
             theta = np.linalg.solve(root.transpose(0, 2, 1), white)[..., 0]  # (3)
             rate = SHAPE * np.diag(inverse) + LARGE**-2

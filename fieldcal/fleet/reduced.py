@@ -67,13 +67,13 @@ class ReducedSession:
     Attributes
     ----------
     columns : (k,) parameters
-    matrix, pull : M (k, k) and q (k,) of (1), in typical sizes
+    matrix, rhs : M (k, k) and q (k,) of (1), in typical sizes
 
     """
 
     columns: tuple[SharedColumn, ...]
     matrix: Array
-    pull: Array
+    rhs: Array
 
     def to_bytes(self) -> bytes:
         """Return the bytes that the store keeps: a compressed file of numpy."""
@@ -81,7 +81,7 @@ class ReducedSession:
         names = json.dumps([asdict(c) for c in self.columns]).encode()
         upper = self.matrix[np.triu_indices(len(self.columns))]
         np.savez_compressed(
-            out, columns=np.frombuffer(names, np.uint8), matrix=upper, pull=self.pull
+            out, columns=np.frombuffer(names, np.uint8), matrix=upper, pull=self.rhs
         )
         return out.getvalue()
 
@@ -122,9 +122,9 @@ def reduce_session(explanation: Explanation) -> ReducedSession:
     none = np.empty(0, dtype=np.intp)
     columns = np.concatenate([none, *(g.columns for _, _, g in groups)])
     typical = np.concatenate([np.empty(0), *(g.typical for _, _, g in groups)])
-    matrix, pull = less.schur_complement(columns, typical)
+    matrix, rhs = less.schur_complement(columns, typical)
     named = [c for cause, shape, g in groups for c in _shared_columns(cause, shape, g)]
-    return ReducedSession(tuple(named), 0.5 * (matrix + matrix.T), pull)
+    return ReducedSession(tuple(named), 0.5 * (matrix + matrix.T), rhs)
 
 
 def _shareable(cause: Cause) -> bool:

@@ -131,8 +131,8 @@ class SharedSearch:
             )
         tables = [_level_labels(one) for one in sessions]
         self.groupings = groupings(tables, ("device", *LEVELS, "session"))
-        columns, matrix, pull = stack_sessions(some)
-        self.sessions = PooledSessions(matrix, pull)
+        columns, matrix, rhs = stack_sessions(some)
+        self.sessions = PooledSessions(matrix, rhs)
         self.candidates = list(self._candidates(columns))
         self.candidates += _unexplained_effects(columns, matrix, self.groupings)
         self.visited: dict[frozenset[int], tuple[float, EffectSetPosterior]] = {}
@@ -306,13 +306,13 @@ def stack_sessions(
     ]  # fmt: skip
     place = {key: i for i, key in enumerate(names)}
     matrix = np.zeros((len(some), len(names), len(names)))
-    pull = np.zeros((len(some), len(names)))
+    rhs = np.zeros((len(some), len(names)))
     for s, one in enumerate(some):
         own = [i for i, c in enumerate(one.columns) if _column_key(c) in place]
         at = [place[_column_key(one.columns[i])] for i in own]
         matrix[s][np.ix_(at, at)] = one.matrix[np.ix_(own, own)]
-        pull[s, at] = one.pull[own]
-    return [every[key] for key in names], matrix, pull
+        rhs[s, at] = one.rhs[own]
+    return [every[key] for key in names], matrix, rhs
 
 
 def _column_key(c: SharedColumn) -> tuple[str, str, str, str]:

@@ -203,12 +203,12 @@ class ExpectedGain:
         """The best explanation with one more cause, and its log weight."""
         one, score = best
         group = cause.variants[0]
-        inner, pull = one.state.schur_complement(group.columns, group.typical)
+        inner, rhs = one.state.schur_complement(group.columns, group.typical)
         rows = one.state.rows
         own = float((np.diag(rows.matrix(group.columns, group.columns))
                      * group.typical**2).max())  # fmt: skip
         profile = (
-            evidence_gains(inner[None], pull[None], np.array([own]))[0] + LOG_DENSITY
+            evidence_gains(inner[None], rhs[None], np.array([own]))[0] + LOG_DENSITY
         )
         evidence = float(np.logaddexp.reduce(profile))
         v = float(np.sqrt(np.exp(profile - evidence) @ priors.SIZES**2))

@@ -146,7 +146,7 @@ def _random_columns(d: ParameterSet) -> Mask:
 
 def _free_rotations(gram: Gram, p: int, channels: tuple[int, ...]) -> Array:
     """Columns of the rotations of positions of unknown orientation, (3 p, 2 p)."""
-    some = gram.loose[:p, list(channels)]
+    some = gram.free_rotations[:p, list(channels)]
     out = np.zeros((p, 3, p, 2))
     out[np.arange(p), :, np.arange(p)] = some
     return out.reshape(3 * p, 2 * p)
@@ -218,7 +218,9 @@ class _MeasuredMeans:
     @property
     def freely_rotated(self) -> Mask:
         """Windows whose outputs unknown rotations change (p,)."""
-        loose = self.gram.loose[: len(self.d.window_positions), list(self.channels)]
+        loose = self.gram.free_rotations[
+            : len(self.d.window_positions), list(self.channels)
+        ]
         return np.asarray(loose.any(axis=(1, 2)))
 
     def _force_direction(self, i: int) -> Array:
@@ -232,7 +234,7 @@ class _MeasuredMeans:
         v = inputs[int(np.argmax(d.x.position == d.window_positions[i]))]
         if not v.any() or not (self.gram.info[i, at] > 0).all():
             return np.full(3, np.nan)
-        across = np.cross(*self.gram.loose[i][at].T)
+        across = np.cross(*self.gram.free_rotations[i][at].T)
         out: Array = across / (across @ (d.unit[at] * v / np.linalg.norm(v)))
         return out
 
@@ -252,11 +254,11 @@ def _held_out_residuals(
 ) -> tuple[Array, Array]:
     """Residuals of means in fits without their own window, (1), and covariances."""
     inverse = np.linalg.inv(stated + wide @ wide.T)
-    pull, window = inverse @ y, seen.window
+    rhs, window = inverse @ y, seen.window
     out, unsure = np.zeros(len(y)), np.zeros((len(seen.d.window_positions), 3, 3))
     for i in np.unique(window):
         own = np.flatnonzero(window == i)
         block = np.linalg.inv(inverse[np.ix_(own, own)])
-        out[own] = block @ pull[own]
+        out[own] = block @ rhs[own]
         unsure[i, : len(own), : len(own)] = block
     return out, unsure

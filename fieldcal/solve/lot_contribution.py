@@ -206,7 +206,7 @@ class _OutlierHypotheses:
         told = np.linalg.inv(every.covariance / scale / scale[:, None])
         middle = np.zeros(len(names))
         middle[at] = lot.mean / scale[at]
-        pull = told @ (every.values / scale - middle)
+        rhs = told @ (every.values / scale - middle)
         wide = lot.covariance / scale[at] / scale[at][:, None]
         odd, chances, spreads = zip(*_hypothesis_priors(lot, wide), strict=True)
         covariances, score = [], np.log(chances)
@@ -214,13 +214,13 @@ class _OutlierHypotheses:
             there = told.copy()
             there[np.ix_(at, at)] += np.linalg.inv(one)
             covariances.append(np.linalg.inv(there))
-            score[i] += 0.5 * float(pull @ covariances[i] @ pull)  # (2)
+            score[i] += 0.5 * float(rhs @ covariances[i] @ rhs)  # (2)
             score[i] -= 0.5 * float(np.linalg.slogdet(there)[1])
             score[i] -= 0.5 * float(np.linalg.slogdet(one)[1])
         made = np.array(covariances)
         return cls(
             names, odd, np.exp(score - np.logaddexp.reduce(score)),
-            (middle + made @ pull) * scale,  # (1)
+            (middle + made @ rhs) * scale,  # (1)
             made * scale * scale[:, None],
         )  # fmt: skip
 

@@ -116,7 +116,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     others, own = member[0].variants, member[1]
     every = np.unique(np.concatenate([g.columns for g in others]))
     rest = _without_columns(search, members, own.columns)
-    inner, pull = rest.schur_complement(every, np.ones(len(every)))
+    inner, rhs = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
     score = log_chances(member[0], beside) + np.zeros(len(others))
@@ -130,7 +130,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
-        gain = evidence_gains(square, pull[at] * size, top)
+        gain = evidence_gains(square, rhs[at] * size, top)
         known = np.array([others[j].fixed_size is not None for j in some])
         summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
         score[some] += np.where(known, gain[:, UNIT_INDEX], summed)

@@ -30,7 +30,7 @@ def test_sessions_are_drawn_with_the_information_of_recorded_ones() -> None:
     known = [ReducedSession(columns, matrix, np.zeros(2))]
     pulls = np.array(
         [
-            ReducedSession.from_bytes(one.reduced or b"").pull
+            ReducedSession.from_bytes(one.reduced or b"").rhs
             for one in drawn(rng, known, there, 5)
         ]
     )

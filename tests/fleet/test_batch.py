@@ -90,7 +90,7 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     assert {c.effect for c in small.columns} >= {"cross_coupling", "g_sensitivity"}
     assert np.linalg.eigvalsh(small.matrix)[0] > -1e-6 * np.trace(small.matrix)
     np.testing.assert_array_equal(
-        ReducedSession.from_bytes(small.to_bytes()).pull, small.pull
+        ReducedSession.from_bytes(small.to_bytes()).rhs, small.rhs
     )
 
 

@@ -38,8 +38,8 @@ def drawn(
     design = [rng.standard_normal((rows, columns)) for _ in DEVICES]
     seen = [rng.standard_normal(rows) + 2 for _ in DEVICES]
     matrix = np.array([a.T @ a for a in design])
-    pull = np.array([a.T @ y for a, y in zip(design, seen, strict=True)])
-    return design, seen, PooledSessions(matrix, pull)
+    rhs = np.array([a.T @ y for a, y in zip(design, seen, strict=True)])
+    return design, seen, PooledSessions(matrix, rhs)
 
 
 def dense(
@@ -180,7 +180,7 @@ def test_of_what_every_session_has_for_itself_the_level_is_the_session() -> None
         for one in fleet(rng, 16, np.zeros(6)):
             small = ReducedSession.from_bytes(one.reduced or b"")
             push = 4 * rng.standard_normal() * np.eye(6)[0]
-            more = replace(small, pull=small.pull + small.matrix @ push)
+            more = replace(small, rhs=small.rhs + small.matrix @ push)
             sessions.append(replace(one, reduced=more.to_bytes()))
         told.append(named(SharedSearch(sessions).run()))
     assert told == [[("cross_coupling", "session")]] * 5
@@ -200,11 +200,11 @@ def test_time_constants_count_that_all_sessions_have() -> None:
         return ReducedSession(columns, np.eye(len(shapes)), np.ones(len(shapes)))
 
     other = ReducedSession(COLUMNS[:2], np.eye(2), np.ones(2))
-    columns, matrix, pull = stack_sessions([warm("8 s", "16 s"), warm("16 s"), other])
+    columns, matrix, rhs = stack_sessions([warm("8 s", "16 s"), warm("16 s"), other])
     assert [(c.effect, c.shape) for c in columns] == [
         ("warm_up", "16 s"), *(("cross_coupling", "") for _ in range(2)),
     ]  # fmt: skip
-    assert matrix[2, 0, 0] == 0.0 and pull[1, 0] == 1.0
+    assert matrix[2, 0, 0] == 0.0 and rhs[1, 0] == 1.0
 
 
 def strange(rng: np.random.Generator, only: str, tilts: bool) -> list[StoredSession]:

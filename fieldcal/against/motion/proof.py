@@ -170,7 +170,7 @@ def _squares(left: Sequence[LinearRows], values: Array, best: Set) -> float:
     """Chi squared of the held-out part, with the uncertainty of the prediction."""
     state = best.state
     inner = np.zeros((len(state.columns), len(state.columns)))
-    pull, square = np.zeros(len(state.columns)), 0.0
+    rhs, square = np.zeros(len(state.columns)), 0.0
     for part in left:
         place = np.full(len(values), -1, dtype=np.intp)
         place[part.columns] = np.arange(len(part.columns))
@@ -178,6 +178,6 @@ def _squares(left: Sequence[LinearRows], values: Array, best: Set) -> float:
         design = part.design[:, place[state.columns[here]]]
         white = _residual(part, values, best)
         inner[np.ix_(here, here)] += design.T @ design
-        pull[here] += design.T @ white
+        rhs[here] += design.T @ white
         square += float(white @ white)
-    return chi2_of_uncertain_prediction(square, pull, inner, state.inverse)
+    return chi2_of_uncertain_prediction(square, rhs, inner, state.inverse)

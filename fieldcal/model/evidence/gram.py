@@ -46,30 +46,30 @@ class Gram:
     ----------
     within : (k, k) Phi^T R^-1 Phi of the courses of windows about their means, and of
         turns
-    pull : (k,) Phi^T R^-1 (y - h) of the same
+    rhs : (k,) right-hand side of the same, Phi^T R^-1 (y - h)
     square, count : (y - h)^T R^-1 (y - h) of the same, and their degrees of freedom
     means : (p, 6, k) columns' means in each window
     off : (p, 6) mean of y - h
     info : (p, 6) information on each mean, 0 where nothing was measured
     shared : (p, 6) standard deviation of known errors that all rows of a window share
-    loose : (p, 6, 2) A_p, derivative of the means by free rotations
+    free_rotations : (p, 6, 2) A_p, derivative of the means by free rotations
     kind : (p, 6) index of the instability of each mean; turns' closures have their own
-    bent : (p, 6, 6) error of a closure for an instability of one, by channel
+    closure_errors : (p, 6, 6) error of a closure for an instability of one, by channel
     index : (all,) place of each column of the dictionary here, -1 if absent
 
     """
 
     within: Array
-    pull: Array
+    rhs: Array
     square: float
     count: int
     means: Array
     off: Array
     info: Array
     shared: Array
-    loose: Array
+    free_rotations: Array
     kind: Index
-    bent: Array
+    closure_errors: Array
     index: Index
 
     def select_columns(self, columns: Index) -> Gram:
@@ -81,7 +81,7 @@ class Gram:
         return replace(
             self,
             within=self.within[np.ix_(at, at)],
-            pull=self.pull[at],
+            rhs=self.rhs[at],
             means=self.means[:, :, at],
             index=index,
         )
@@ -93,14 +93,14 @@ class Gram:
 
     def select_windows(self, windows: NDArray[np.bool_], info: Array) -> Gram:
         """Some windows, with other information on their means."""
-        parts = ("means", "off", "shared", "loose", "kind", "bent")
+        parts = ("means", "off", "shared", "free_rotations", "kind", "closure_errors")
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 
     def with_instability(self, tau: Array) -> WeightedGram:
         """Weight the means with instabilities by kind, (7,)."""
         known = self.info > 0
-        if self.loose.any():
+        if self.free_rotations.any():
             full, log_det = self.whitening(tau)
             own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
             return WeightedGram(
@@ -118,7 +118,7 @@ class Gram:
     def _spread(self, tau: Array) -> Array:
         """Variance of the means beside white noise, by channel, (..., p, 6)."""
         wide = tau**2
-        bent = np.einsum("pij,...j->...pi", self.bent**2, wide[..., :6])
+        bent = np.einsum("pij,...j->...pi", self.closure_errors**2, wide[..., :6])
         out: Array = self.shared**2 + wide[..., self.kind] + bent
         return out
 
@@ -130,7 +130,7 @@ class Gram:
         known = self.info > 0
         both = known[:, :, None] & known[:, None, :]
         scale = np.sqrt(self.info)
-        cov = self.loose @ np.swapaxes(self.loose, 1, 2)
+        cov = self.free_rotations @ np.swapaxes(self.free_rotations, 1, 2)
         inner = cov + np.eye(6) * self._spread(tau)[..., None]
         inner = np.where(both, inner * scale[:, :, None] * scale[:, None, :], 0.0)
         inner[..., range(6), range(6)] += 1.0
@@ -175,10 +175,10 @@ class WeightedGram:
         out += some.T @ (some if one is other else self.white[:, columns])
         return out
 
-    def pull(self, columns: Index | None) -> Array:
+    def rhs(self, columns: Index | None) -> Array:
         """Phi^T R^-1 (y - h) of some columns, or of all."""
         some = slice(None) if columns is None else self.gram.index[columns]
-        out: Array = self.gram.pull[some] + self.white[:, some].T @ self.off
+        out: Array = self.gram.rhs[some] + self.white[:, some].T @ self.off
         return out
 
     def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
@@ -200,7 +200,7 @@ class WeightedGram:
         gram = self.gram
         size = (gram.kind == kind).astype(float)
         if kind < 6:
-            size += gram.bent[:, :, kind]
+            size += gram.closure_errors[:, :, kind]
         rows, slots = np.nonzero((size > 0) & (gram.info > 0))
         out = np.zeros((len(self.weight), 6, len(rows)))
         at, by = np.arange(len(rows)), size[rows, slots]
@@ -241,7 +241,7 @@ class Eliminated:
         scaled.flat[:: len(columns) + 1] += 1.0
         root = cholesky_root(scaled)
         half = triangular_inverse(root) * sizes
-        seen = half @ rows.pull(columns)
+        seen = half @ rows.rhs(columns)
         score = 0.5 * (float(seen @ seen) - rows.square - rows.log_det)
         score -= float(np.log(np.diag(root)).sum())  # (2)
         return cls(rows, columns, sizes, half, half.T @ seen, score)
@@ -266,8 +266,8 @@ class Eliminated:
         inner = self.rows.matrix(columns, columns)
         taken = self.half @ shared
         inner -= taken.T @ taken
-        pull = self.rows.pull(columns) - shared.T @ self.estimate
-        return inner * typical * typical[:, None], pull * typical
+        rhs = self.rows.rhs(columns) - shared.T @ self.estimate
+        return inner * typical * typical[:, None], rhs * typical
 
     def schur_complement_of_means(
         self, kind: int, typical: float
@@ -288,16 +288,16 @@ class Eliminated:
         )
 
 
-def evidence_gains(inner: Array, pull: Array, own: Array | float) -> Array:
+def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     """Gain (3) at each of `SIZES` for groups of equal width: (..., k, k), (..., k).
 
     `own` (...) is the largest diagonal element of T G T before the elimination.
     """
-    if pull.shape[-1] == 1:
-        strength, power = inner[..., 0], pull**2
+    if rhs.shape[-1] == 1:
+        strength, power = inner[..., 0], rhs**2
     else:
         strength, axes = np.linalg.eigh(inner)
-        power = (np.swapaxes(axes, -1, -2) @ pull[..., None])[..., 0] ** 2
+        power = (np.swapaxes(axes, -1, -2) @ rhs[..., None])[..., 0] ** 2
     seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
     strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
     return gains_from_eigenvalues(strength, power)

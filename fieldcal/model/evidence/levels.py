@@ -42,7 +42,7 @@ class InstabilityScan:
     ----------
     score : (n,) ln Z, (3)
     sizes, root, seen : (n, a), (n, a, a), (n, a) S, L and l
-    inner, pull : (n, w, k, k), (n, w, k) M' and c' of blocks of further columns, (4)
+    inner, rhs : (n, w, k, k), (n, w, k) M' and c' of blocks of further columns, (4)
     alone : (n, w, k) squares of these columns before the set is eliminated
 
     """
@@ -52,7 +52,7 @@ class InstabilityScan:
     root: Array
     seen: Array
     inner: Array
-    pull: Array
+    rhs: Array
     alone: Array
 
     def posterior(self) -> tuple[Array, Array]:
@@ -106,9 +106,9 @@ def scan_instabilities(
 def _affected_means(gram: Gram, kinds: Sequence[int] | Index) -> NDArray[np.bool_]:
     """Means whose noise depends on instabilities of some kinds, (p, 6)."""
     own = np.isin(gram.kind, kinds)
-    if bent := [k for k in kinds if k < gram.bent.shape[2]]:
-        own |= gram.bent[:, :, bent].any(axis=2)
-    turned = gram.loose.any(axis=2)
+    if bent := [k for k in kinds if k < gram.closure_errors.shape[2]]:
+        own |= gram.closure_errors[:, :, bent].any(axis=2)
+    turned = gram.free_rotations.any(axis=2)
     own |= turned & np.any(turned & own, axis=1)[:, None]
     out: NDArray[np.bool_] = own & (gram.info > 0)
     return out
@@ -118,7 +118,7 @@ def _joint_gram(rows: WeightedGram, columns: Index) -> Array:
     """T of rows and columns (c,), (c + 1, c + 1)."""
     out = np.empty((len(columns) + 1, len(columns) + 1))
     out[:-1, :-1] = rows.matrix(columns, columns)
-    out[-1, :-1] = out[:-1, -1] = rows.pull(columns)
+    out[-1, :-1] = out[:-1, -1] = rows.rhs(columns)
     out[-1, -1] = rows.square
     return out
 
@@ -135,12 +135,12 @@ def _eliminate(total: Array, sizes: Array, shape: tuple[int, ...]) -> Instabilit
     score = 0.5 * (1 - both[:, -1, -1] ** 2)
     score -= np.log(np.diagonal(root, 0, 1, 2)).sum(axis=1)
     at = a + np.arange(int(np.prod(shape))).reshape(shape)
-    own, pull = total[:, at[:, :, None], at[:, None, :]], total[:, at, -1]
+    own, rhs = total[:, at[:, :, None], at[:, None, :]], total[:, at, -1]
     alone = np.diagonal(own, 0, 2, 3)
     if at.size:
         taken = np.linalg.solve(root, total[:, :a, a:-1] * sizes[..., None])
         taken = np.moveaxis(taken.reshape(n, a, *shape), 1, 2)  # (n, w, a, k)
         turned = np.swapaxes(taken, 2, 3)
         own = own - turned @ taken
-        pull = pull - (turned @ seen[:, None, :, None])[..., 0]
-    return InstabilityScan(score, sizes, root, seen, own, pull, alone)
+        rhs = rhs - (turned @ seen[:, None, :, None])[..., 0]
+    return InstabilityScan(score, sizes, root, seen, own, rhs, alone)

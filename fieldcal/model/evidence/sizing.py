@@ -327,11 +327,11 @@ class Sizing:
 
     def _gained_by(self, c: int) -> Array:
         """Calculate the gain over the instabilities of one channel."""
-        inner, pull = self.eliminated().schur_complement_of_means(c, 1.0)
+        inner, rhs = self.eliminated().schur_complement_of_means(c, 1.0)
         tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
         told, axes = np.linalg.eigh(inner)
         told = np.clip(told, 0.0, (1 - LEAST) / tau**2)
         left = 1 - tau**2 * told
         size = float(self.typical_instability[c])
-        power = (axes.T @ pull / left * size) ** 2
+        power = (axes.T @ rhs / left * size) ** 2
         return gains_from_eigenvalues(told / left * size**2, power)

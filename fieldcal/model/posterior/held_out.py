@@ -194,8 +194,8 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
 
 def _residual_square(there: Eliminated) -> float:
     """Q, the weighted residual square plus the prior square of the estimate."""
-    pull = there.rows.pull(there.columns)
-    return there.rows.square - float(pull @ there.estimate)
+    rhs = there.rows.rhs(there.columns)
+    return there.rows.square - float(rhs @ there.estimate)
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:

@@ -233,7 +233,7 @@ class Mixing:
         typical = self._typical(self.doubted[0][1])
         inner = there.inner * typical * typical[:, None]
         own = (there.alone * typical**2).max(axis=-1)
-        return evidence_gains(inner, there.pull * typical, own)
+        return evidence_gains(inner, there.rhs * typical, own)
 
     def _sizes_of(self, parts: Hypotheses) -> list[int]:
         """Instabilities of hypotheses of each triad together, (7,)."""

@@ -179,9 +179,9 @@ def set_estimate(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
     columns = np.concatenate([group.columns for group in left])
     typical = np.concatenate([group.typical for group in left])
     state = Eliminated.of(told.rows, told.columns, told.prior_sigma)
-    inner, pull = state.schur_complement(columns, typical)
+    inner, rhs = state.schur_complement(columns, typical)
     inner.flat[:: len(columns) + 1] += 1.0
     half = triangular_inverse(cholesky_root(inner))
     shared = state.rows.matrix(state.columns, columns) * typical
     moved = state.inverse @ shared @ half.T
-    return told.estimate - moved @ (half @ pull), np.hstack([told.half.T, moved])  # (2)
+    return told.estimate - moved @ (half @ rhs), np.hstack([told.half.T, moved])  # (2)

@@ -50,11 +50,11 @@ def way_information(
     inner = b.T @ b + np.diag(sizes[~ours] ** -2.0)
     solved = np.linalg.solve(inner, b.T @ np.column_stack([a, white]))
     info = a.T @ a - a.T @ b @ solved[:, :-1]
-    pull = a.T @ (white - b @ solved[:, -1])
+    rhs = a.T @ (white - b @ solved[:, -1])
     size, along = np.linalg.eigh(info)
     kept = size > LEAST * max(size.max(initial=0.0), LEAST)
     root = np.sqrt(size[kept])
-    rows, off = along[:, kept].T * root[:, None], along[:, kept].T @ pull / root
+    rows, off = along[:, kept].T * root[:, None], along[:, kept].T @ rhs / root
     left = white @ white - white @ b @ solved[:, -1] - off @ off
     wide = np.sqrt(max(left / max(len(white) - len(columns), 1), 1.0))
     out = np.zeros((len(off), len(wanted)))

@@ -68,13 +68,13 @@ class WeightedColumns:
     Attributes
     ----------
     rows : Gram matrix weighted with the instability
-    pull : (k,) of all columns
+    rhs : (k,) of all columns
     blocks : Phi^T R^-1 Phi of the blocks of each width
 
     """
 
     rows: WeightedGram
-    pull: Array
+    rhs: Array
     blocks: list[Array]
 
 
@@ -292,7 +292,7 @@ class Offers(Sets):
             blocks = rows.diagonals(
                 [alike.blocks for alike in self.dictionary.groups_by_width]
             )
-            self._at[less] = WeightedColumns(rows, rows.pull(None), blocks)
+            self._at[less] = WeightedColumns(rows, rows.rhs(None), blocks)
         return self._at[less]
 
     def _screen(self, levels: Sequence[Level]) -> Iterator[Array]:
@@ -305,7 +305,7 @@ class Offers(Sets):
         for there, (_, state, _) in zip(seen, levels, strict=True):
             shared = there.rows.matrix(state.columns, None)
             half.append(state.half @ shared)
-            rest.append(there.pull - shared.T @ state.estimate)
+            rest.append(there.rhs - shared.T @ state.estimate)
         halves, rests = np.stack(half), np.stack(rest)
         for w, alike in enumerate(self.dictionary.groups_by_width):
             own = np.stack([there.blocks[w] for there in seen])
@@ -316,22 +316,22 @@ class Offers(Sets):
             top = (np.diagonal(own, 0, 2, 3)[:, block] * typical**2).max(axis=-1)
             yield self._gains(inner, rests[:, alike.blocks[block]] * typical, top)
 
-    def _gains(self, inner: Array, pull: Array, own: Array) -> Array:
+    def _gains(self, inner: Array, rhs: Array, own: Array) -> Array:
         """Gains of groups; those of wide groups are cached by their matrices.
 
         A group that is not connected with a triad has the same gain at all of its
         instabilities.
         """
         if inner.shape[-1] < WIDE:
-            return evidence_gains(inner, pull, own)
-        shape, k = pull.shape[:-1], pull.shape[-1]
-        inner, pull, own = inner.reshape(-1, k, k), pull.reshape(-1, k), own.ravel()
+            return evidence_gains(inner, rhs, own)
+        shape, k = rhs.shape[:-1], rhs.shape[-1]
+        inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()
         keys = [
-            hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, pull, strict=True)
+            hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, rhs, strict=True)
         ]
         new = {key: i for i, key in enumerate(keys) if key not in self._known}
         some = list(new.values())
-        found = evidence_gains(inner[some], pull[some], own[some])
+        found = evidence_gains(inner[some], rhs[some], own[some])
         self._known.update(zip(new, found, strict=True))
         return np.array([self._known[key] for key in keys]).reshape(*shape, -1)
 

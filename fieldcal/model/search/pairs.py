@@ -73,11 +73,11 @@ def pair_gains(
     enough = np.full(len(every), -np.inf) if least is None else np.asarray(least)
     columns = np.concatenate([g.columns for g in groups])
     typical = np.concatenate([g.typical for g in groups])
-    inner, pull = state.schur_complement(columns, typical)
+    inner, rhs = state.schur_complement(columns, typical)
     first = np.cumsum([0, *(len(g.columns) for g in groups)])
     wide = np.diff(first)
     alone = {
-        int(w): _Alone.of(inner, pull, first[:-1][wide == w, None] + np.arange(w))
+        int(w): _Alone.of(inner, rhs, first[:-1][wide == w, None] + np.arange(w))
         for w in np.unique(wide)
     }
     number = np.array([np.sum(wide[:i] == w) for i, w in enumerate(wide)])
@@ -98,11 +98,11 @@ def _gain_bound(one: _Alone, two: _Alone, shared: Array) -> Array:
     if one.at.shape[1] > two.at.shape[1]:
         one, two, shared = two, one, np.swapaxes(shared, 1, 2)
     largest = np.full(len(shared), len(SIZES) - 1)
-    inner, pull = _Beside(one, two, shared).rest(largest)
+    inner, rhs = _Beside(one, two, shared).rest(largest)
     inner[:, range(inner.shape[1]), range(inner.shape[1])] += SIZES[-1] ** -2
-    beside = np.linalg.solve(inner, pull[:, :, None])[:, :, 0]
+    beside = np.linalg.solve(inner, rhs[:, :, None])[:, :, 0]
     own = (two.along**2 / (two.strength + SIZES[-1] ** -2)).sum(axis=1)
-    square = own + (pull * beside).sum(axis=1)
+    square = own + (rhs * beside).sum(axis=1)
     most: Array = 0.5 * square + 2 * LOG_DENSITY.max()
     return most
 
@@ -131,31 +131,31 @@ class _Alone:
     Attributes
     ----------
     at : their columns among those of all groups
-    inner, pull : what the rows say of them
-    strength, axes, along : eigenvalues, eigenvectors, and the pull along these
+    inner, rhs : what the rows say of them
+    strength, axes, along : eigenvalues, eigenvectors, and the rhs along these
     profile : gain and density over the sizes
 
     """
 
     at: Index
     inner: Array
-    pull: Array
+    rhs: Array
     strength: Array
     axes: Array
     along: Array
     profile: Array
 
     @classmethod
-    def of(cls, inner: Array, pull: Array, at: Index) -> Self:
-        """Groups of which all columns' `inner` and `pull` are given."""
-        own, pulled = inner[at[:, :, None], at[:, None, :]], pull[at]
+    def of(cls, inner: Array, rhs: Array, at: Index) -> Self:
+        """Groups of which all columns' `inner` and `rhs` are given."""
+        own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
         seen = strength > ROUNDED * np.maximum(top, 1e-300)
         axes, strength = axes * seen[:, None, :], np.where(seen, strength, 0.0)
-        along = (pulled[:, None, :] @ axes)[:, 0]
+        along = (right[:, None, :] @ axes)[:, 0]
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY
-        return cls(at, own, pulled, strength, axes, along, profile)
+        return cls(at, own, right, strength, axes, along, profile)
 
     def at_numbers(self, some: Index | NDArray[np.bool_]) -> Self:
         """Some of the groups; one may be there more than once."""
@@ -180,7 +180,7 @@ class _Beside:
     def rest(self, size: Index) -> tuple[Array, Array]:
         """Matrices of the groups after elimination of the others at some sizes, (1)."""
         root, taken = self._taken(self.shared, size)
-        return self.one.inner - root @ np.swapaxes(root, 1, 2), self.one.pull - taken
+        return self.one.inner - root @ np.swapaxes(root, 1, 2), self.one.rhs - taken
 
     def profile(self, size: Index) -> Array:
         """Gain and density over the sizes of the one, (n, sizes)."""
@@ -198,15 +198,15 @@ class _Beside:
         taken = (shared @ (kept * other.along)[:, :, None])[:, :, 0]
         return shared * np.sqrt(kept)[:, None, :], taken
 
-    def _in_axes(self, root: Array, pull: Array) -> Array:
+    def _in_axes(self, root: Array, rhs: Array) -> Array:
         """The gain by (2), of W (n, k, l) and b' (n, k)."""
         strength = self.one.strength
         wide = SIZES[:, None] ** 2
         back = wide / (1 + wide * strength[:, None, :])  # B, (n, sizes, k)
         weighed = back[:, :, None, :] * np.swapaxes(root, 1, 2)[:, None]
         inner = np.eye(root.shape[2]) - weighed @ root[:, None]
-        left = weighed @ pull[:, None, :, None]
-        square = (back * pull[:, None, :] ** 2).sum(axis=-1)
+        left = weighed @ rhs[:, None, :, None]
+        square = (back * rhs[:, None, :] ** 2).sum(axis=-1)
         square += (left * np.linalg.solve(inner, left)).sum(axis=(-2, -1))
         log_det = np.log1p(wide * strength[:, None, :]).sum(axis=-1)
         log_det += np.linalg.slogdet(inner)[1]

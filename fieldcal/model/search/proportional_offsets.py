@@ -51,11 +51,11 @@ def _window_offsets(d: Dictionary, there: Set, some: Array) -> Array:
     )
     state = Eliminated.of(rows, there.state.columns, there.state.prior_sigma)
     columns = np.concatenate([d.window_columns(c) for c in some])
-    inner, pull = state.schur_complement(
+    inner, rhs = state.schur_complement(
         columns, np.repeat(typical_unknown_sizes(d)[some], len(d.window_positions))
     )
     inner.flat[:: len(columns) + 1] += 1 / priors.SIZES[-1] ** 2
-    left: Array = np.linalg.solve(inner, pull).reshape(len(some), -1).T
+    left: Array = np.linalg.solve(inner, rhs).reshape(len(some), -1).T
     return left
 
 

@@ -110,6 +110,6 @@ def estimates_by_column(state: Eliminated, dictionary: Dictionary) -> Array:
         left[gram.info > 0] = state.rows.off - state.rows.white[:, at] @ state.estimate
         for j, p in enumerate(dictionary.window_positions):
             if dictionary.unoriented[j]:
-                pull = gram.loose[j].T @ state.rows.root[j].T @ left[j]
-                out[dictionary.rotations_of(p)] += priors.SMALL_ROTATION * pull
+                rhs = gram.free_rotations[j].T @ state.rows.root[j].T @ left[j]
+                out[dictionary.rotations_of(p)] += priors.SMALL_ROTATION * rhs
     return out

@@ -112,7 +112,7 @@ def gram(
         total.append(_add_known(out, dictionary.known))
     for j in np.flatnonzero(dictionary.unoriented):
         at = index[dictionary.rotations_of(held[j])]
-        out.loose[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
+        out.free_rotations[j] = priors.SMALL_ROTATION * out.means[j, :, at].T
     return replace(out, square=sum(t[0] for t in total), count=sum(t[1] for t in total))
 
 
@@ -131,7 +131,7 @@ def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int
     middle = np.add.reduceat(white * part.weight, first) / weight
     inner = design.T @ design - (mean * weight[:, None]).T @ mean
     out.within[np.ix_(at, at)] += inner
-    out.pull[at] += design.T @ white - mean.T @ (weight * middle)
+    out.rhs[at] += design.T @ white - mean.T @ (weight * middle)
     out.means[windows[:, None], c, at] = mean
     out.off[windows, c], out.info[windows, c] = middle, weight
     return float(white @ white) - float(weight @ middle**2), len(white) - len(windows)
@@ -142,7 +142,7 @@ def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
     all_ = out.index[known.columns]
     at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
     out.within[np.ix_(at, at)] += design.T @ design
-    out.pull[at] += design.T @ known.off
+    out.rhs[at] += design.T @ known.off
     return float(known.off @ known.off), len(known.off)
 
 
@@ -153,10 +153,10 @@ def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, 
     at = all_[there]
     out.off[i, :some], out.info[i, :some] = turn.closure, turn.info
     out.means[i, :some, at] = turn.design[:, there].T
-    out.bent[i, :some] = turn.bent
+    out.closure_errors[i, :some] = turn.closure_errors
     if not len(turn.way):
         return 0.0, 0
     design = turn.way_design[:, there]
     out.within[np.ix_(at, at)] += design.T @ design
-    out.pull[at] += design.T @ turn.way
+    out.rhs[at] += design.T @ turn.way
     return float(turn.way @ turn.way), len(turn.way)

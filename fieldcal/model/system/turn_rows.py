@@ -51,8 +51,8 @@ class TurnRows:
     columns : (k,) of the dictionary
     design : (s, k) of the closure
     info : (s,) information, 1/rad^2
-    bent : (s, 6) error of the closure per error of each accelerometer at both ends, and
-        of each gyroscope during the turn
+    closure_errors : (s, 6) error of the closure per error of each accelerometer at both
+        ends, and of each gyroscope during the turn
     way, way_design : (r,), (r, k) whitened rows of the accelerometers on the way
 
     """
@@ -62,7 +62,7 @@ class TurnRows:
     columns: Index
     design: Array
     info: Array
-    bent: Array
+    closure_errors: Array
     way: Array
     way_design: Array
 

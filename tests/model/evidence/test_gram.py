@@ -28,11 +28,11 @@ WIDE = np.array([0.7, 2.0, 0.05, 1.0])
 def test_information_is_that_of_the_rows(seed: int, free: tuple[int, ...]) -> None:
     one = case(seed, free)
     rows, every = one.gram.with_instability(TAU), np.arange(WIDTH)
-    inner, pull = one.dense.information()
+    inner, rhs = one.dense.information()
     assert_agree(rows.matrix(every, every), inner[:WIDTH, :WIDTH])
     assert_agree(rows.matrix(SET, None), inner[SET])
-    assert_agree(rows.pull(SET), pull[SET])
-    assert_agree(rows.pull(None), pull)
+    assert_agree(rows.rhs(SET), rhs[SET])
+    assert_agree(rows.rhs(None), rhs)
     blocks = [np.array([[0, 1], [5, 2]]), np.array([[8]])]
     for at, found in zip(blocks, rows.diagonals(blocks), strict=True):
         for block, there in zip(at, found, strict=True):
@@ -62,9 +62,9 @@ def test_each_mean_has_the_information_that_the_rest_of_its_window_leaves(
     one = case(seed, free).gram
     for p, weight in enumerate(one.with_instability(TAU).weight):
         there = one.info[p] > 0
-        cov = one.loose[p][there] @ one.loose[p][there].T
+        cov = one.free_rotations[p][there] @ one.free_rotations[p][there].T
         spread = one.shared[p] ** 2 + TAU[one.kind[p]] ** 2
-        spread += one.bent[p] ** 2 @ TAU[:6] ** 2
+        spread += one.closure_errors[p] ** 2 @ TAU[:6] ** 2
         cov += np.diag(1 / one.info[p][there] + spread[there])
         assert_agree(weight[there], np.diag(np.linalg.inv(cov)))
         assert not weight[~there].any()
@@ -108,14 +108,14 @@ def test_the_gain_of_one_more_group_is_the_rise_of_the_evidence(
     one, at = case(seed, free), np.array(more)
     typical = np.linspace(0.02, 0.05, len(at))
     found = Eliminated.of(one.gram.with_instability(TAU), SET, WIDE)
-    inner, pull = found.schur_complement(at, typical)
+    inner, rhs = found.schur_complement(at, typical)
     before = one.dense.evidence(SET, WIDE)
     both = np.concatenate([SET, at])
     rise = [
         one.dense.evidence(both, np.concatenate([WIDE, v * typical])) - before
         for v in SIZES
     ]
-    gain = evidence_gains(inner, pull, np.diag(inner).max())
+    gain = evidence_gains(inner, rhs, np.diag(inner).max())
     np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
 
 
@@ -128,13 +128,13 @@ def test_the_gain_of_an_instability_is_the_rise_of_the_evidence(
     none = np.where(np.arange(7) == kind, 0.0, TAU)
     one, typical = case(seed, free, none), 0.03
     found = Eliminated.of(one.gram.with_instability(none), SET, WIDE)
-    inner, pull = found.schur_complement_of_means(kind, typical)
+    inner, rhs = found.schur_complement_of_means(kind, typical)
     before = one.dense.evidence(SET, WIDE)
     rise = []
     for v in SIZES:
         tau = np.where(np.arange(7) == kind, v * typical, TAU)
         rise.append(case(seed, free, tau).dense.evidence(SET, WIDE) - before)
-    gain = evidence_gains(inner, pull, np.diag(inner).max())
+    gain = evidence_gains(inner, rhs, np.diag(inner).max())
     np.testing.assert_allclose(gain, rise, rtol=1e-9, atol=1e-9 * abs(before))
 
 
@@ -143,10 +143,10 @@ def test_gains_of_many_groups_are_those_of_each() -> None:
     rows = Eliminated.of(one.gram.with_instability(TAU), SET, WIDE)
     for at in ([1, 2], [5, 6], [8, 1]):
         found.append(rows.schur_complement(np.array(at), np.array([0.3, 0.1])))
-    inner, pull = (np.stack(some) for some in zip(*found, strict=True))
+    inner, rhs = (np.stack(some) for some in zip(*found, strict=True))
     own = np.diagonal(inner, 0, 1, 2).max(axis=-1)
     each = [evidence_gains(*one, own=top) for one, top in zip(found, own, strict=True)]
-    np.testing.assert_allclose(evidence_gains(inner, pull, own), each, rtol=1e-12)
+    np.testing.assert_allclose(evidence_gains(inner, rhs, own), each, rtol=1e-12)
 
 
 @SEEDS
@@ -154,9 +154,9 @@ def test_what_elimination_leaves_by_rounding_gains_nothing(seed: int) -> None:
     """A column that the set has at any size cannot add anything."""
     one, at = case(seed), np.array([3])
     wide = Eliminated.of(one.gram.with_instability(TAU), SET, np.full(4, 1e9))
-    inner, pull = wide.schur_complement(at, np.array([1.0]))
+    inner, rhs = wide.schur_complement(at, np.array([1.0]))
     own = one.gram.with_instability(TAU).matrix(at, at)[0, 0]
-    assert np.array_equal(evidence_gains(inner, pull, own), np.zeros(len(SIZES)))
+    assert np.array_equal(evidence_gains(inner, rhs, own), np.zeros(len(SIZES)))
 
 
 @FREE

@@ -44,9 +44,9 @@ def test_levels_are_those_of_the_rows_written_out(
         dense = case(2, free, tau).dense
         assert found.score[n] == pytest.approx(dense.evidence(SET, WIDE), rel=1e-9)
         for w, block in enumerate(FURTHER):
-            inner, pull, alone = left(dense, block)
+            inner, rhs, alone = left(dense, block)
             np.testing.assert_allclose(found.inner[n, w], inner, rtol=1e-8, atol=1e-9)
-            np.testing.assert_allclose(found.pull[n, w], pull, rtol=1e-8, atol=1e-9)
+            np.testing.assert_allclose(found.rhs[n, w], rhs, rtol=1e-8, atol=1e-9)
             np.testing.assert_allclose(found.alone[n, w], alone, rtol=1e-8)
 
 

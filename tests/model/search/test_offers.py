@@ -88,16 +88,16 @@ def test_wide_groups_are_looked_up_where_rows_say_the_same_of_them() -> None:
     rng = np.random.default_rng(2)
     root = rng.standard_normal((3, 40, 40))
     inner = root @ root.swapaxes(1, 2)
-    pull, own = rng.standard_normal((3, 40)), np.full(3, 80.0)
-    found = search._gains(inner, pull, own)
-    again = search._gains(inner[::-1], pull[::-1], own)
+    rhs, own = rng.standard_normal((3, 40)), np.full(3, 80.0)
+    found = search._gains(inner, rhs, own)
+    again = search._gains(inner[::-1], rhs[::-1], own)
     np.testing.assert_array_equal(found, again[::-1])
     at = int(np.argmin(np.abs(np.log(priors.SIZES))))
     v = float(priors.SIZES[at])
     for i in range(3):
-        scaled = np.linalg.solve(inner[i] + np.eye(40) / v**2, pull[i])
+        scaled = np.linalg.solve(inner[i] + np.eye(40) / v**2, rhs[i])
         log_det = np.linalg.slogdet(np.eye(40) + v**2 * inner[i])[1]
-        assert found[i, at] == pytest.approx(0.5 * (pull[i] @ scaled - log_det))
+        assert found[i, at] == pytest.approx(0.5 * (rhs[i] @ scaled - log_det))
 
 
 @pytest.mark.parametrize("key", ["random_walk:acc", "flicker:acc"])

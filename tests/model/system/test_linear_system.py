@@ -262,15 +262,15 @@ def test_the_gram_matrix_is_that_of_the_rows(free: tuple[int, ...]) -> None:
         )
         cov += small_rotation @ small_rotation.T
     off = (y - output(d, one.state)).ravel() + design @ values
-    inner, pull = Dense(off, design[:, some], cov, sd).information()
+    inner, rhs = Dense(off, design[:, some], cov, sd).information()
     size = np.linalg.norm(design[:, some] / sd[:, None], axis=0) + 1e-300
     inner, seen = (m / size / size[:, None] for m in (inner, found.matrix(some, some)))
     # turns of a radian are far beyond the noise: eight digits go, and by which route
     # of the processor the last ones are summed
     near = 5e-8 if free else 1e-9
     np.testing.assert_allclose(seen, inner, rtol=0, atol=near)
-    pull, drawn = pull / size, found.pull(some) / size
-    np.testing.assert_allclose(drawn, pull, rtol=0, atol=near * np.abs(pull).max())
+    rhs, drawn = rhs / size, found.rhs(some) / size
+    np.testing.assert_allclose(drawn, rhs, rtol=0, atol=near * np.abs(rhs).max())
 
 
 def test_a_force_that_is_turned_aside_stays_as_long() -> None:

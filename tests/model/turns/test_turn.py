@@ -338,7 +338,9 @@ def test_a_gyroscope_that_is_off_on_the_way_bends_a_turn_as_its_bias_does() -> N
         whole[:, turn.columns] = turn.design
         drift = np.abs(whole[:, d.bias + np.arange(3, 6)])
         assert drift.max() > 1.0, "s, as long as the way"
-        np.testing.assert_allclose(turn.bent[:, 3:], drift, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(
+            turn.closure_errors[:, 3:], drift, rtol=1e-6, atol=1e-9
+        )
 
 
 def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
@@ -367,6 +369,6 @@ def test_what_windows_are_off_by_bends_a_turn_as_a_bias_does() -> None:
             assert np.flatnonzero(each.any(axis=0)).tolist() == list(turn.positions)
             for found, expected in (
                 (each.sum(axis=1), whole[:, d.bias + c]),
-                (np.linalg.norm(each, axis=1), turn.bent[:, c]),
+                (np.linalg.norm(each, axis=1), turn.closure_errors[:, c]),
             ):
                 np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)

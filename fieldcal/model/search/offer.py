@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,3 +81,12 @@ def ranked_offers(
         if cause.key not in there.keys
     ]
     return sorted(offers, key=lambda o: -o.score)
+
+
+def lowered_instability(
+    instability: InstabilityIndices, some: Sequence[int], down: int
+) -> InstabilityIndices:
+    """Instabilities with some of them lowered by `down` steps."""
+    return tuple(
+        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
+    )

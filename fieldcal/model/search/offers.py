@@ -26,6 +26,7 @@ from fieldcal.model.search.offer import (
     Offer,
     OfferTable,
     extra_log_odds,
+    lowered_instability,
     ranked_offers,
 )
 
@@ -347,12 +348,3 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluate((*there.members, *(o.member for o in offers)), start)
-
-
-def lowered_instability(
-    instability: InstabilityIndices, some: Sequence[int], down: int
-) -> InstabilityIndices:
-    """Instabilities with some of them lowered by `down` steps."""
-    return tuple(
-        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
-    )

@@ -21,7 +21,8 @@ from fieldcal.model.evidence.sizing import (
     most_probable_size,
 )
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.offers import FALLING, LEVELS, lowered_instability
+from fieldcal.model.search.offer import lowered_instability
+from fieldcal.model.search.offers import FALLING, LEVELS
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")

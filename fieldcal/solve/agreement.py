@@ -101,13 +101,13 @@ def triad_agreement(
     """Compare the means of a triad with the estimate."""
     p = len(d.window_positions)
     at = np.ix_(np.arange(p), np.array(channels))
-    info, off = gram.info[at], gram.off[at]
+    info, mean_residual = gram.info[at], gram.residual[at]
     used = (info > 0).ravel()
     if not used.any():
         return TriadFit(0.0, 0, np.nan, np.nan, np.full((p, 3), np.nan))
     index = gram.index[found.columns]
     means = gram.means[:p, list(channels)][:, :, index].reshape(-1, len(index))[used]
-    y = off.ravel()[used]
+    y = mean_residual.ravel()[used]
     random = _random_columns(d)
     noise = (1 / info.ravel()[used]) + gram.shared[at].ravel()[used] ** 2
     loose = _free_rotations(gram, p, channels)[used]

@@ -111,13 +111,6 @@ def identify_columns(
     )
 
 
-def direction_columns(table: Array) -> list[Three]:
-    """Adjacent columns that are a calculated direction, such as that of gravity."""
-    free = [i for i in range(table.shape[1]) if _moves(table[:, i])]
-    beside = [(a, a + 1, a + 2) for a in free if {a + 1, a + 2} <= set(free)]
-    return [three for three in beside if is_direction(table[:, list(three)])]
-
-
 def unnamed_axes(
     table: Array, names: Sequence[str], known: Collection[int]
 ) -> list[Three]:

@@ -314,11 +314,6 @@ class Dictionary(ColumnTable):
         self.causes = [*self.causes, *causes]
         self._clear_caches()
 
-    def keep_causes(self, causes: Iterable[Cause]) -> None:
-        """Keep only these causes."""
-        self.causes = list(causes)
-        self._clear_caches()
-
     def _clear_caches(self) -> None:
         """Discard cached values that depend on the causes."""
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))

@@ -1,6 +1,6 @@
 """Prior knowledge of columns, as rows in addition to those of the recording.
 
-    off = design u + e,    e ~ N(0, 1)                                              (1)
+    residual = design u + e,    e ~ N(0, 1)                                         (1)
 
 They count as any other rows do, in the estimate and in the evidence of every set.
 """
@@ -23,22 +23,22 @@ class KnownRows:
     ----------
     columns : (k,) of the dictionary
     design : (r, k)
-    off : (r,)
+    residual : (r,)
 
     """
 
     columns: Index
     design: Array
-    off: Array
+    residual: Array
 
     @classmethod
-    def of(cls, design: Array, off: Array, covariance: Array) -> KnownRows:
+    def of(cls, design: Array, residual: Array, covariance: Array) -> KnownRows:
         """Rows of a design (r, all) with values (r,) and covariance (r, r)."""
         columns = np.flatnonzero(design.any(axis=0))
         root = np.linalg.cholesky(covariance)
         return cls(
             columns, np.linalg.solve(root, design[:, columns]),
-            np.linalg.solve(root, off),
+            np.linalg.solve(root, residual),
         )  # fmt: skip
 
     @classmethod
@@ -47,8 +47,8 @@ class KnownRows:
         columns = np.unique(np.concatenate([one.columns for one in some]))
         design = []
         for one in some:
-            part = np.zeros((len(one.off), len(columns)))
+            part = np.zeros((len(one.residual), len(columns)))
             part[:, np.searchsorted(columns, one.columns)] = one.design
             design.append(part)
-        off = np.concatenate([one.off for one in some])
-        return cls(columns, np.vstack(design), off)
+        residual = np.concatenate([one.residual for one in some])
+        return cls(columns, np.vstack(design), residual)

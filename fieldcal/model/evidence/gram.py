@@ -49,7 +49,7 @@ class Gram:
     rhs : (k,) right-hand side of the same, Phi^T R^-1 (y - h)
     square, count : (y - h)^T R^-1 (y - h) of the same, and their degrees of freedom
     means : (p, 6, k) columns' means in each window
-    off : (p, 6) mean of y - h
+    residual : (p, 6) mean of y - h
     info : (p, 6) information on each mean, 0 where nothing was measured
     shared : (p, 6) standard deviation of known errors that all rows of a window share
     free_rotations : (p, 6, 2) A_p, derivative of the means by free rotations
@@ -64,7 +64,7 @@ class Gram:
     square: float
     count: int
     means: Array
-    off: Array
+    residual: Array
     info: Array
     shared: Array
     free_rotations: Array
@@ -93,7 +93,14 @@ class Gram:
 
     def select_windows(self, windows: NDArray[np.bool_], info: Array) -> Gram:
         """Some windows, with other information on their means."""
-        parts = ("means", "off", "shared", "free_rotations", "kind", "closure_errors")
+        parts = (
+            "means",
+            "residual",
+            "shared",
+            "free_rotations",
+            "kind",
+            "closure_errors",
+        )
         kept = {name: getattr(self, name)[windows] for name in parts}
         return replace(self, info=info[windows], **kept)
 
@@ -105,15 +112,15 @@ class Gram:
             own = np.diagonal(np.swapaxes(full, 1, 2) @ full, 0, 1, 2)
             return WeightedGram(
                 self, (full @ self.means)[known],
-                (full @ self.off[:, :, None])[known, 0], own, full, float(log_det),
+                (full @ self.residual[:, :, None])[known, 0], own, full, float(log_det),
             )  # fmt: skip
         spread = self._spread(tau)
         weight = self.info / (1 + self.info * spread)
         log_det = np.log1p(self.info * spread).sum()
         root = np.sqrt(weight[known])
         white: Array = self.means[known] * root[:, None]
-        off: Array = self.off[known] * root
-        return WeightedGram(self, white, off, weight, np.zeros(0), float(log_det))
+        residual: Array = self.residual[known] * root
+        return WeightedGram(self, white, residual, weight, np.zeros(0), float(log_det))
 
     def _spread(self, tau: Array) -> Array:
         """Variance of the means beside white noise, by channel, (..., p, 6)."""
@@ -147,7 +154,7 @@ class WeightedGram:
     ----------
     gram : the matrix without instability
     white : (r, k) whitened means of the columns, for measured channels
-    off : (r,) whitened means of y - h
+    residual : (r,) whitened means of y - h
     weight : (p, 6) information on each mean given the rest of its window
     root : (p, 6, 6) whitening of the means; empty if they are uncorrelated
     log_det : ln |R| beyond that of white noise
@@ -156,7 +163,7 @@ class WeightedGram:
 
     gram: Gram
     white: Array
-    off: Array
+    residual: Array
     weight: Array
     root: Array
     log_det: float
@@ -178,7 +185,7 @@ class WeightedGram:
     def rhs(self, columns: Index | None) -> Array:
         """Phi^T R^-1 (y - h) of some columns, or of all."""
         some = slice(None) if columns is None else self.gram.index[columns]
-        out: Array = self.gram.rhs[some] + self.white[:, some].T @ self.off
+        out: Array = self.gram.rhs[some] + self.white[:, some].T @ self.residual
         return out
 
     def diagonals(self, blocks: Sequence[Index]) -> list[Array]:
@@ -193,7 +200,7 @@ class WeightedGram:
     @property
     def square(self) -> float:
         """(y - h)^T R^-1 (y - h)."""
-        return self.gram.square + float(self.off @ self.off)
+        return self.gram.square + float(self.residual @ self.residual)
 
     def shared(self, kind: int) -> Array:
         """Whitened columns of the offsets of single means of a kind, (r, m)."""
@@ -278,7 +285,7 @@ class Eliminated:
         shared = ours.T @ white
         taken = self.half @ shared
         inner = white.T @ white - taken.T @ taken
-        return inner, white.T @ self.rows.off - shared.T @ self.estimate
+        return inner, white.T @ self.rows.residual - shared.T @ self.estimate
 
     def gain_by_size(self, columns: Index, typical: Array) -> Array:
         """Gain of ln Z by a further group, at each of its sizes, (3)."""

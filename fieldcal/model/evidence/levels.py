@@ -85,7 +85,9 @@ def scan_instabilities(
     common = _joint_gram(still, every)
     windows: NDArray[np.bool_] = np.any(moved, axis=1)
     some = gram.select_windows(windows, np.where(moved, gram.info, 0.0))
-    table = np.append(some.means[:, :, some.index[every]], some.off[..., None], axis=2)
+    table = np.append(
+        some.means[:, :, some.index[every]], some.residual[..., None], axis=2
+    )
     rows, width = int(moved.sum()), len(common)
     step = max(1, MAX_NUMBERS // (width * (rows + width)))
     parts = []

@@ -107,7 +107,9 @@ def estimates_by_column(state: Eliminated, dictionary: Dictionary) -> Array:
     if dictionary.unoriented.any() and state.rows.root.size:
         gram, at = state.rows.gram, state.rows.gram.index[state.columns]
         left = np.zeros(gram.info.shape)
-        left[gram.info > 0] = state.rows.off - state.rows.white[:, at] @ state.estimate
+        left[gram.info > 0] = (
+            state.rows.residual - state.rows.white[:, at] @ state.estimate
+        )
         for j, p in enumerate(dictionary.window_positions):
             if dictionary.unoriented[j]:
                 rhs = gram.free_rotations[j].T @ state.rows.root[j].T @ left[j]

@@ -133,7 +133,7 @@ def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int
     out.within[np.ix_(at, at)] += inner
     out.rhs[at] += design.T @ white - mean.T @ (weight * middle)
     out.means[windows[:, None], c, at] = mean
-    out.off[windows, c], out.info[windows, c] = middle, weight
+    out.residual[windows, c], out.info[windows, c] = middle, weight
     return float(white @ white) - float(weight @ middle**2), len(white) - len(windows)
 
 
@@ -142,8 +142,8 @@ def _add_known(out: Gram, known: KnownRows) -> tuple[float, int]:
     all_ = out.index[known.columns]
     at, design = all_[all_ >= 0], known.design[:, all_ >= 0]
     out.within[np.ix_(at, at)] += design.T @ design
-    out.rhs[at] += design.T @ known.off
-    return float(known.off @ known.off), len(known.off)
+    out.rhs[at] += design.T @ known.residual
+    return float(known.residual @ known.residual), len(known.residual)
 
 
 def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, int]:
@@ -151,7 +151,7 @@ def _add_turn(out: Gram, i: int, turn: TurnRows, values: Array) -> tuple[float, 
     all_, some = out.index[turn.columns], len(turn.closure)
     there = all_ >= 0
     at = all_[there]
-    out.off[i, :some], out.info[i, :some] = turn.closure, turn.info
+    out.residual[i, :some], out.info[i, :some] = turn.closure, turn.info
     out.means[i, :some, at] = turn.design[:, there].T
     out.closure_errors[i, :some] = turn.closure_errors
     if not len(turn.way):

@@ -103,4 +103,4 @@ def test_known_rows_are_joined_column_by_column() -> None:
     both = KnownRows.concatenated([one, other])
     assert both.columns.tolist() == [1, 2, 7]
     assert both.design.tolist() == [[0.0, 1.0, 2.0], [4.0, 0.0, 5.0]]
-    assert both.off.tolist() == [3.0, 6.0]
+    assert both.residual.tolist() == [3.0, 6.0]

@@ -40,8 +40,12 @@ from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.rest_onset import window_starts
 from fieldcal.model.rows.window_bounds import window_bounds
-from fieldcal.model.search.inference import OWN_SIGMA, Inference, InferenceResult
-from fieldcal.model.search.selection import SETTLED, Search
+from fieldcal.model.search.inference import (
+    TIME_CONSTANT_LOG_LOSS,
+    Inference,
+    InferenceResult,
+)
+from fieldcal.model.search.selection import MIN_LOG_RISE, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.turn_rows import Turns
@@ -49,7 +53,7 @@ from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.model.turns.turn import Turn, TurnTracker
 from fieldcal.session.description import Description
 
-MOST_RESUMPTIONS = 2
+MAX_RESUMPTIONS = 2
 """Most times that a search is resumed from an alias that proved better."""
 
 
@@ -199,11 +203,11 @@ def explain(
     inference = build_inference(prepared.source, prepared.rows, prepared)
     found = inference.run(None if before is None else _starting_causes(before))
     posterior = _calculate_posterior(found)
-    for _ in range(MOST_RESUMPTIONS):
+    for _ in range(MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
         if better.score <= now.score + (
-            OWN_SIGMA if better.keys == now.keys else SETTLED
+            TIME_CONSTANT_LOG_LOSS if better.keys == now.keys else MIN_LOG_RISE
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of
@@ -266,7 +270,7 @@ def build_inference(
     dictionary.add_instants(change_points(rows).tolist())
     dictionary.expect_within(interruptions(source.block, about))
     grain = rounding_noise(source.block, window_bounds(source.block, about))
-    rough = bool((grain[:3] > thresholds.ROUGH * rows.noise[:3]).any())
+    rough = bool((grain[:3] > thresholds.ROUNDING_SHARE * rows.noise[:3]).any())
     # swaying is removed from windows and closures, but not from samples within turns
     rough |= "sway" in prepared.checked.ids
     turning = TurnTracker(source, rows, dictionary.since)

@@ -33,7 +33,7 @@ from fieldcal.physics.recording import Fault
 from fieldcal.session.description import Description
 from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 
-SHORTEST = 20
+MIN_WINDOW_SAMPLES = 20
 """Fewest samples of a window that is used."""
 
 
@@ -186,11 +186,12 @@ def _without_constant_temperature(rows: Rows, warmth: Thermometer) -> Rows:
 
 def _refuse_empty(block: Block, about: Description) -> None:
     windows = window_bounds(block, about)
-    if not (windows[:, 1] - windows[:, 0] >= SHORTEST).any():
+    if not (windows[:, 1] - windows[:, 0] >= MIN_WINDOW_SAMPLES).any():
         held = len(about.positions)
         raise InputError(
-            f"none of the {held} windows in session.toml holds {SHORTEST} samples; the"
-            f" samples run from {block.t[0]:g} to {block.t[-1]:g} s of device time:"
+            f"none of the {held} windows in session.toml holds"
+            f" {MIN_WINDOW_SAMPLES} samples; the samples run from {block.t[0]:g} to"
+            f" {block.t[-1]:g} s of device time:"
             " check start_s and end_s"
         )
     if not (np.isfinite(block.acc).any() or np.isfinite(block.gyr).any()):

@@ -17,10 +17,10 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain
 from fieldcal.physics.gentle_pushes import GentlePush, block_length, gentle_pushes
 from fieldcal.physics.pushes import (
-    FEWEST,
-    LARGEST,
-    MEAN,
-    SHAKEN,
+    LOUD_MEAN_SIGMAS,
+    LOUD_SAMPLE_SIGMAS,
+    MIN_SAMPLES,
+    SHAKEN_RATIO,
     UsualSpread,
     disturbed_stretches,
     running_means,
@@ -33,23 +33,23 @@ from fieldcal.physics.steady_changes import (
     steady_changes,
 )
 
-NEXT = 4.02
+ROUNDED_HALF_STEPS = 4.02
 """Largest deviation that rounding explains, in half steps of an output."""
 
-LONGEST_S = 5.0
+MAX_BUMP_S = 5.0
 """A disturbance that lasts longer is a change of the device, not a bump."""
 
 
-LOUDEST_S = 1.0
+USUAL_PUSH_S = 1.0
 """Length of a push of a hand or a gust, s."""
 
-STEPS = 2.0
+MAX_STEP_SIGMAS = 2.0
 """Step of an output, in standard deviations of noise, beyond which gentle pushes of it
 are lost."""
 
 NOTHING = slice(0, 0)
 
-SHORTEST = 3
+MIN_NAMED_SAMPLES = 3
 """Fewest samples of a bump; a single outlier is left out without being named."""
 
 
@@ -68,7 +68,7 @@ class Bump(Chain):
         """Disturbed stretches of every window."""
         rate = 1 / float(np.median(np.diff(recording.block.t)))
         held = enumerate(recording.windows)
-        some = [p for p, (first, last) in held if last - first >= FEWEST]
+        some = [p for p, (first, last) in held if last - first >= MIN_SAMPLES]
         loud = {p: _disturbed_stretches(recording, p, rate) for p in some}
         gentle = _gently_pushed_stretches(recording, loud, rate)
         return [fault for p in some for fault in (*loud[p], *gentle[p])]
@@ -108,7 +108,7 @@ def _block_means(
     for fault in loud:
         bumped[fault.rows - first] = True
     for c in range(6):
-        if recording.steps[c] > STEPS * recording.noise[c]:
+        if recording.steps[c] > MAX_STEP_SIGMAS * recording.noise[c]:
             continue  # what is less than a step is lost
         if c < 3 and recording.x.rate[p].any():
             continue  # the force goes round with the table
@@ -134,12 +134,12 @@ def _disturbed_stretches(recording: CheckedSamples, p: int, rate: float) -> list
     np.nan_to_num(z, copy=False)
     # what goes to the next step and back is rounded, not touched
     for c in np.flatnonzero(steps >= noise):
-        z[np.abs(z[:, c]) <= NEXT, c] = 0.0
+        z[np.abs(z[:, c]) <= ROUNDED_HALF_STEPS, c] = 0.0
     if recording.x.rate[p].any():
         z[:, :3] = 0.0  # the force goes round with the table
     there = UsualSpread.of(z, shortest)
     for a, b in disturbed_stretches(z, shortest, there):
-        if b - a > LONGEST_S * rate:
+        if b - a > MAX_BUMP_S * rate:
             continue
         near = recording.six(first + max(a - around, 0), min(first + b + around, last))
         if not _has_steady_change(near / noise, there, (int(a), int(b)), rate):
@@ -166,11 +166,15 @@ def _most_disturbed_stretch(z: Array, rate: float, m: int) -> slice:
     for column in z.T:
         off = np.nan_to_num(_deviation_from_course(column, rate))
         np.maximum(mean, running_means(off, width), out=mean)
-    at, long = int(np.argmax(mean)), min(round(LOUDEST_S * rate), len(z) // 4)
+    at, long = int(np.argmax(mean)), min(round(USUAL_PUSH_S * rate), len(z) // 4)
     first = at - (long - width) // 2
     # at the ends nothing on the other side tells the course
     inside = long <= first <= len(z) - 2 * long
-    return slice(first, first + long) if mean[at] > MEAN and inside else NOTHING
+    return (
+        slice(first, first + long)
+        if mean[at] > LOUD_MEAN_SIGMAS and inside
+        else NOTHING
+    )
 
 
 def _flatten(piece: Array, rate: float, without: slice = NOTHING) -> None:
@@ -221,13 +225,13 @@ def _has_steady_change(
     window, first and one past the last sample; `there` what is usual in that.
     """
     near, around = np.nan_to_num(near), round(AROUND_S * rate)
-    shortest, margin = max(2, round(0.1 * rate)), round(LOUDEST_S * rate / 2)
+    shortest, margin = max(2, round(0.1 * rate)), round(USUAL_PUSH_S * rate / 2)
     first = min(at[0], around)
     beside = slice(max(first - margin, 0), first + at[1] - at[0] + margin)
     for course in steady_changes(near, at, rate):
         rest = near - course
         _flatten(rest, rate)
-        calm = (usual_spread(rest) < SHAKEN * there.sample).all()
+        calm = (usual_spread(rest) < SHAKEN_RATIO * there.sample).all()
         usually = there.no_less_than(np.delete(rest, beside, axis=0), shortest)
         if calm and len(disturbed_stretches(rest, shortest, usually)) == 0:
             return True
@@ -259,7 +263,7 @@ def _fault(
     worst = int(np.argmax(np.abs(z[a:b]).max(axis=0)))
     at, length = float(t[start + a]), float(t[start + b - 1] - t[start + a]) + 1 / rate
     margin = round(0.2 * rate)
-    known = b - a >= SHORTEST
+    known = b - a >= MIN_NAMED_SAMPLES
     return Fault(
         channel=CHANNELS[worst],
         values={"at_s": at, "for_s": length} if known else {},
@@ -269,7 +273,9 @@ def _fault(
         rows=start + np.arange(max(a - margin, 0), min(b + margin, len(z))),
         size=float(np.abs(z[a:b, worst]).max() * recording.noise[worst]),
         sigma=float(np.abs(z[a:b, worst]).max()),
-        channels=tuple(np.array(CHANNELS)[np.abs(z[a:b]).max(axis=0) > LARGEST]),
+        channels=tuple(
+            np.array(CHANNELS)[np.abs(z[a:b]).max(axis=0) > LOUD_SAMPLE_SIGMAS]
+        ),
     )
 
 

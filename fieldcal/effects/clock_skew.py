@@ -26,7 +26,7 @@ PPM = 5.0
 WORST = 1e5
 """Largest rate of a crystal, ppm: a larger one is a recording at another speed."""
 
-SURE = 6.0
+MIN_SIGMAS = 6.0
 
 
 def estimate_skew(t: Array, t_host: Array) -> tuple[float, float]:
@@ -64,7 +64,7 @@ class ClockSkew(Chain):
         if known.sum() < 100:
             return []
         ppm, sigma = estimate_skew(block.t[known], block.t_host[known])
-        if not max(PPM, SURE * sigma) <= abs(ppm) <= WORST:
+        if not max(PPM, MIN_SIGMAS * sigma) <= abs(ppm) <= WORST:
             return []
         return [
             Fault(

@@ -35,13 +35,13 @@ Counts = NDArray[np.int64]
 JUMP = 128
 """Smallest step between samples that counts as a jump, LSB."""
 
-CLEARLY = 5
+MIN_JUMP_RATIO = 5
 """Ratio of jumps removed to jumps added from which a fault is undone."""
 
 WIDEST = 70_000
 """Largest count of a 16-bit value; larger ones are decimals."""
 
-FEWEST = 4
+MIN_REMOVED_JUMPS = 4
 """Smallest number of jumps removed."""
 
 BYTE = 256
@@ -53,14 +53,14 @@ NEARER = 10.0
 UNLIKELY = (5.0, 0.5)
 """Smallest deviation of an outlier at rest, m/s^2 and rad/s."""
 
-BESIDE = 10
+NEIGHBOURING_SAMPLES = 10
 """Samples to either side that tell whether something shakes the device."""
 
 AROUND, CHANCE = 500, 1e-4
 """Samples to either side whose tail is looked at, and the chance that a sample of that
 tail goes as far. Rectified vibration has an exponential tail, and not a normal one."""
 
-AT_ONCE = 1 << 16
+SAMPLES_AT_ONCE = 1 << 16
 """Samples looked at together: an hour of them need not be in memory once more."""
 
 MOVED = (np.inf, 10.0)
@@ -77,7 +77,11 @@ def undo_decode_fault(counts: Counts) -> tuple[str, Counts]:
         after = np.abs(np.diff(tried))
         gone = int(((before > JUMP) & (after < before / 2)).sum())
         made = int(((after > JUMP) & (before < after / 2)).sum())
-        if gone >= FEWEST and gone > CLEARLY * made and float(after.sum()) < best:
+        if (
+            gone >= MIN_REMOVED_JUMPS
+            and gone > MIN_JUMP_RATIO * made
+            and float(after.sum()) < best
+        ):
             best, kind, mended = float(after.sum()), name, tried
     return kind, mended
 
@@ -128,13 +132,15 @@ def _outlier_samples(recording: CheckedSamples) -> NDArray[np.bool_]:
     """Whether single samples jump by more than the device can move, (n, 6)."""
     n, edge, still = len(recording.block), AROUND + 3, recording.still
     out, moved = np.zeros((n, 6), dtype=bool), np.repeat(MOVED, 3)
-    for first in range(0, n, AT_ONCE):
-        some = slice(max(first - edge, 0), min(first + AT_ONCE + edge, n))
+    for first in range(0, n, SAMPLES_AT_ONCE):
+        some = slice(max(first - edge, 0), min(first + SAMPLES_AT_ONCE + edge, n))
         most = np.where(still[some, None], 1.0, moved) * np.repeat(UNLIKELY, 3)
         found = _outliers_in_block(
             recording.block[some], most * np.abs(recording.scale)
         )
-        out[first : first + AT_ONCE] = found[first - some.start :][:AT_ONCE]
+        out[first : first + SAMPLES_AT_ONCE] = found[first - some.start :][
+            :SAMPLES_AT_ONCE
+        ]
     return out
 
 
@@ -147,7 +153,7 @@ def _outliers_in_block(block: Block, most: Array) -> NDArray[np.bool_]:
     if not wild.any():
         return wild
     wild &= np.isnan(without_spikes(block).six)
-    apart, steps = np.nan_to_num(apart), np.arange(2, BESIDE + 2)
+    apart, steps = np.nan_to_num(apart), np.arange(2, NEIGHBOURING_SAMPLES + 2)
     for c in np.flatnonzero(wild.any(axis=0)):
         rows = np.flatnonzero(wild[:, c])
         sides = (

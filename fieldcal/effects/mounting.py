@@ -57,7 +57,7 @@ USUAL, AROUND = 1.5, 4.0
 """Angle turned over the least that it can be, and by what factor that may be off: units
 are 17 apart and more."""
 
-LEAST = np.deg2rad(10.0)
+MIN_TURN_RAD = np.deg2rad(10.0)
 """Smallest turn of the force that is used, rad."""
 
 
@@ -120,7 +120,7 @@ def measured_turns(
     often = sampling_rate(block)
     for (p, one), (q, two) in pairwise(zip(held, f, strict=True)):
         gap = slice(recording.windows[p, 1], recording.windows[q, 0])
-        if not angle_between(one, two) > LEAST or gap.stop - gap.start < 2:
+        if not angle_between(one, two) > MIN_TURN_RAD or gap.stop - gap.start < 2:
             continue
         if not has_no_pause(block.t, gap.start, gap.stop, often):
             continue

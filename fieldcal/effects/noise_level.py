@@ -21,14 +21,14 @@ from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
 from fieldcal.windows.noise import short_lag_noise
 
-RATIO = 1.8
+NOISIER_RATIO = 1.8
 """Ratio from which an axis counts as noisier: out-of-plane axes reach 1.5."""
 
 
-FEWEST = 50
+MIN_WINDOW_SAMPLES = 50
 """Samples of a window that shows the ratio to a tenth."""
 
-STEADY, HALF = 0.8, (1 + RATIO) / 2
+STEADY, HALF = 0.8, (1 + NOISIER_RATIO) / 2
 """Share of the windows in which the axis must be the noisiest one, and by what ratio
 at least: single windows show it less well."""
 
@@ -68,7 +68,7 @@ class NoiseLevel(Chain):
             if not noise.all():
                 continue
             worst, ratio = noisiest_axis(noise)
-            if ratio < RATIO or not _is_noisiest_in_most_windows(
+            if ratio < NOISIER_RATIO or not _is_noisiest_in_most_windows(
                 recording, triad, worst
             ):
                 continue
@@ -96,7 +96,7 @@ def _is_noisiest_in_most_windows(
     for first, last in recording.windows:
         noise = short_lag_noise(recording.six(first, last)[:, triad])
         noise = np.maximum(noise, recording.steps[triad])
-        if last - first > FEWEST and np.isfinite(noise).all():
+        if last - first > MIN_WINDOW_SAMPLES and np.isfinite(noise).all():
             axis, ratio = noisiest_axis(noise)
             found.append(axis == worst and ratio > HALF)
     return not found or float(np.mean(found)) >= STEADY

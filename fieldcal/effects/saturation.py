@@ -20,10 +20,10 @@ from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault, Rows
 
-FEWEST = 5
+MIN_RAIL_SAMPLES = 5
 """Smallest number of samples at a rail."""
 
-BESIDE = 4.0
+RAIL_RATIO = 4.0
 """Ratio of samples at the rail to samples at the value next to it."""
 
 UNDER_WAY = 5
@@ -47,12 +47,12 @@ def samples_at_rails(values: Array, limit: float, coarse: bool = False) -> list[
     alike = low < 0 and abs(high + low) < 1e-3 * high and not np.isfinite(limit)
     for edge in (low, high):
         at = np.flatnonzero(values == edge)
-        if len(at) < FEWEST:
+        if len(at) < MIN_RAIL_SAMPLES:
             continue
         declared = abs(abs(edge) - limit) < 1e-3 * limit
         beside = _neighbour_count(values, edge)
         apart = bool((np.diff(at) > 1).any()) or _moves_into_rail(values, at)
-        often = apart and 0 < BESIDE * beside + FEWEST < len(at)
+        often = apart and 0 < RAIL_RATIO * beside + MIN_RAIL_SAMPLES < len(at)
         # as far down as up is full scale only if more is there than beside it: gravity
         # on both faces of a box is as much up as down, and its noise thins outwards
         chance = CHANCE * (len(at) + beside) ** 0.5

@@ -26,10 +26,10 @@ from fieldcal.physics.shape import Shape
 from fieldcal.windows.dead_axis import dead_sensors
 
 ODDS = 1e-6
-MANY = 20
+MIN_RUNS = 20
 """Smallest number of runs for which their usual length is known."""
 
-SHARE = 0.2
+MIN_FREE_SHARE = 0.2
 """Smallest part of a window outside a run for which its repeats are known."""
 
 TURNED = 30.0
@@ -38,7 +38,7 @@ TURNED = 30.0
 JUMP = 2.5
 """Smallest jump, in steps, at the ends of a run."""
 
-FEWEST = 8
+MIN_RUN_SAMPLES = 8
 """Smallest number of equal samples of a run."""
 
 
@@ -49,14 +49,14 @@ def equal_value_runs(values: Array) -> NDArray[np.intp]:
     if not len(found):
         return found
     length = found[:, 1] - found[:, 0]
-    many = 10 * np.median(length) if len(length) >= MANY else 0.0
-    usual = length[length <= max(FEWEST, many)]
+    many = 10 * np.median(length) if len(length) >= MIN_RUNS else 0.0
+    usual = length[length <= max(MIN_RUN_SAMPLES, many)]
     often = usual.sum() / max(len(equal) - length.sum() + usual.sum(), 1)
     # a grid coarser than the noise repeats itself: what follows a repeat decides
     again = 1 - len(usual) / usual.sum() if len(usual) else 0.0
     chance = min(max(often, again, 1e-3), 0.999)
     longest = np.log(ODDS / len(values)) / np.log(chance)
-    long = found[length + 1 >= max(FEWEST, longest)]
+    long = found[length + 1 >= max(MIN_RUN_SAMPLES, longest)]
     return np.column_stack([long[:, 0], long[:, 1] + 1])
 
 
@@ -108,7 +108,7 @@ def _is_explained_by_steps(
     step = float(grids_of(recording.block)[c])
     step_of = step / max(float(recording.noise[c]), 1e-300)
     # a turn begins slowly: its first samples may read as those of the rest before
-    if step_of > 2 and _turned(recording, c, first, last) < FEWEST:
+    if step_of > 2 and _turned(recording, c, first, last) < MIN_RUN_SAMPLES:
         return True
     return step_of > 1 and _is_usual_for_noise(recording, c, step, first, last)
 
@@ -143,7 +143,7 @@ def _is_usual_for_noise(
     start, end = recording.windows[at]
     equal = np.diff(values[start:end]) == 0
     equal = np.delete(equal, slice(first - start, last - 1 - start))
-    if len(equal) < SHARE * (end - start):
+    if len(equal) < MIN_FREE_SHARE * (end - start):
         return False
     again = (equal.sum() + 1) / (len(equal) + 2)
     odds = np.log(len(recording.block)) + (last - first) * np.log(again)

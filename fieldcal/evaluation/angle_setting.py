@@ -92,18 +92,18 @@ def with_shown_angle_setting(
     notes = [*wrong_angle_sentences(shown), *setup_notes(shown)]
     stated, angles = float(options["angle_sigma_deg"]), shown_angle_setting(shown)
     if angles > stated:
-        options["angle_sigma_deg"] = min(angles, thresholds.NO_ANGLE)
+        options["angle_sigma_deg"] = min(angles, thresholds.MEANINGLESS_ANGLE_DEG)
         wider = fit()
         if wider.info["log_evidence"] <= found.info["log_evidence"]:
             options["angle_sigma_deg"] = stated
-        elif angles <= thresholds.NO_ANGLE:
+        elif angles <= thresholds.MEANINGLESS_ANGLE_DEG:
             found, notes = wider, [_worse_set(angles, stated), *notes]
         else:
             options["angle_sigma_deg"] = stated
             warnings = (OTHER_ANGLES, *found.warnings)
             return replace(found, warnings=warnings, good=False), notes
     if (unknown := angle_equivalent_of_offsets(shown)) > options["angle_sigma_deg"]:
-        options["angle_sigma_deg"] = min(unknown, thresholds.NO_ANGLE)
+        options["angle_sigma_deg"] = min(unknown, thresholds.MEANINGLESS_ANGLE_DEG)
         found, notes = fit(), [_may_be_angles(unknown), *notes]
     return found, notes
 

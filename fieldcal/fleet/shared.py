@@ -172,7 +172,7 @@ class SharedSearch:
         total = 0.0
         for one in effects:
             again = one.key[0] in names and not one.columns[0].own
-            total += float(np.log(priors.AGAIN)) if again else one.log_chance
+            total += float(np.log(priors.COMPANION_CHANCE)) if again else one.log_chance
             total += one.log_share
             names.add(one.key[0])
         return total
@@ -254,7 +254,7 @@ class SharedSearch:
             there = best - {i} | {j}
             if j in best or there not in self.visited:
                 continue
-            if self.visited[there][0] > own - thresholds.SAME:
+            if self.visited[there][0] > own - thresholds.ALIAS_LOG_MARGIN:
                 level = " or ".join(other.level_effect.grouping.names)
                 if (other.key, other.level_effect.grouping) != (
                     one.key,

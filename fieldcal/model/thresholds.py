@@ -19,7 +19,7 @@ DIFFERS = 0.9
 a name there, as what a recording leaves unexplained does, and a gate must rarely be
 wrong."""
 
-SAME = 4.6
+ALIAS_LOG_MARGIN = 4.6
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100
 to 1, beyond which nobody would ask."""
 
@@ -45,10 +45,10 @@ elsewhere."""
 SEES_EARTH = 20.0
 """Earth rate over the noise of one window from which tactical gyroscopes see it."""
 
-ROUGH = 0.7
+ROUNDING_SHARE = 0.7
 """Part of the noise that rounding makes when it is most of it."""
 
-LINE = 4.0
+LINE_SIGMAS = 4.0
 """Standard deviations from which a channel counts as having the line."""
 
 LINE_BY_CHANCE = 1e-3
@@ -65,18 +65,18 @@ LINE_LASTS, LINE_LASTS_SIGMAS = 0.2, 3.0
 """Part of a line in either half of the windows at least, but for so many sigmas: what
 fades after turns has lines as well."""
 
-CLIPPED = 1e-3
+MAX_CLIPPED_SHARE = 1e-3
 """Part of a window at the rail that makes its mean useless."""
 
 NOT_HELD_DEG = 10.0
 """Angle from which a device was not held where it was, deg: no hand is so far off."""
 
-TAKES_LITTLE = 2.0
+LITTLE_LOG_GAIN = 2.0
 """Rise of ln L by a cause that takes next to nothing: two parameters of noise do."""
 
 # -- what is said of a calibration
 
-BETTER_TILT = 3.0
+TILT_LOG_MARGIN = 3.0
 """Evidence, ln, from which one model of the tilt counts as the better one."""
 
 BEYOND_NOISE = 0.01
@@ -89,7 +89,7 @@ in the place of another makes that ambiguous."""
 WRONG_MODEL = 9.0
 """chi2 per degree of freedom from which the model, not the noise, is at fault."""
 
-TURNS_TELL = 5
+MIN_TURN_DOF = 5
 """Degrees of freedom of the turns from which their residual says something."""
 
 USEFUL = {
@@ -124,6 +124,6 @@ CERTAIN = 1 - LOOKED_AT
 """Probability from which something is taken as sure: a window that is bad has no weight
 left, and no digits are told."""
 
-NO_ANGLE = 45.0
+MEANINGLESS_ANGLE_DEG = 45.0
 """Size of what angles are wrong by, deg, from which they say nothing: half of what
 parts one axis from the next. Nobody sets them so; session.toml is wrong."""

@@ -119,7 +119,7 @@ def estimate_from_drift(runs: Sequence[NavigatorRun], setup: RunSetup) -> DriftE
             )
         }
         name = max(tried, key=lambda n: tried[n].posterior.score, default="")
-        if not name or tried[name].evidence_gain(best) < thresholds.SAME:
+        if not name or tried[name].evidence_gain(best) < thresholds.ALIAS_LOG_MARGIN:
             break
         best, off = tried[name], [*off, name]
     return _determined_parameters(
@@ -151,7 +151,7 @@ class _SetupFit:
         calm = run_posterior(
             self.rows, self.prior_sigmas, _without_run_scatter(self.noise)
         ).score
-        return self.posterior.score - calm > thresholds.SAME
+        return self.posterior.score - calm > thresholds.ALIAS_LOG_MARGIN
 
 
 def _without_run_scatter(noise: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from fieldcal.core.frames import in_axes_turned_about_y, in_procedure_axes
 from fieldcal.core.samples import Array, Index
 
-SAME = 1e-8
+ANGLE_TOLERANCE_RAD = 1e-8
 """Difference up to which two angles are the same, rad."""
 
 
@@ -56,7 +56,7 @@ class JointTurns:
         [[1.0, 0.0], [0.0, -1.0]]
         """
         moved = np.diff(angles[:, :2], axis=0)
-        side = np.where(np.abs(moved) > SAME, np.sign(moved), 0.0)
+        side = np.where(np.abs(moved) > ANGLE_TOLERANCE_RAD, np.sign(moved), 0.0)
         known = np.isfinite(moved).all(axis=1) & np.isfinite(at[1:])
         return cls(at[1:][known], side[known], np.nan_to_num(angles[1:][known]))
 

@@ -36,10 +36,10 @@ from fieldcal.physics.window_variances import variances_of_others
 TAPS = 12
 """Block means in the length of a push, where it has more samples."""
 
-FURTHEST = 3.0
+MAX_CORRELATED_SIGMAS = 3.0
 """Standard deviations beyond which an amplitude counts no more in a correlation."""
 
-POOLED, APART = 4.0, 1.0
+POOLED_DOF, UNCORRELATED_DOF = 4.0, 1.0
 """Weights in a window's correlation of the mean of all windows and of axes that move
 each by itself, in degrees of freedom."""
 
@@ -152,7 +152,7 @@ def amplitude_noise(
     own = [_products(a / np.sqrt(v)) for a, (v, _) in zip(windows, noise, strict=True)]
     pooled = sum(own) / max(sum(len(a) for a in windows), 1)
     return [
-        AmplitudeNoise(v, dof, _correlation(one / each + POOLED * pooled))
+        AmplitudeNoise(v, dof, _correlation(one / each + POOLED_DOF * pooled))
         for one, (v, dof) in zip(own, noise, strict=True)
     ]
 
@@ -169,14 +169,14 @@ def _sums_around(values: Array, near: int) -> Array:
 
 def _products(b: Array) -> Array:
     """Sum of products of standardised amplitudes (k, c), (c, c)."""
-    clipped = np.clip(np.nan_to_num(b), -FURTHEST, FURTHEST)
+    clipped = np.clip(np.nan_to_num(b), -MAX_CORRELATED_SIGMAS, MAX_CORRELATED_SIGMAS)
     out: Array = clipped.T @ clipped
     return out
 
 
 def _correlation(products: Array) -> Array:
     """Correlation by sums of products (c, c) of so many degrees of freedom."""
-    products = products + APART * np.eye(len(products))
+    products = products + UNCORRELATED_DOF * np.eye(len(products))
     size = np.sqrt(np.diag(products))
     out: Array = products / np.outer(size, size)
     return out

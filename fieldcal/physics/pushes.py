@@ -23,29 +23,29 @@ from numpy.typing import NDArray
 from fieldcal.core.probability import MAD_TO_SIGMA
 from fieldcal.core.samples import Array, runs_of_true
 
-LARGEST = 6.5
+LOUD_SAMPLE_SIGMAS = 6.5
 """A single sample, in standard deviations."""
 
-LARGE = 4.0
+STRETCH_SAMPLE_SIGMAS = 4.0
 """A sample that belongs to a stretch found by its mean."""
 
-MEAN = 6.0
+LOUD_MEAN_SIGMAS = 6.0
 """The mean of a short stretch, in standard deviations."""
 
-SHAKEN, TAILS = 1.5, 1.6
+SHAKEN_RATIO, SHAKEN_TAIL = 1.5, 1.6
 """Spread beyond the noise that a machine or a hand makes, and how far its tails go at
 least: what a nonlinear sensor makes of it goes further to one side."""
 
-OUTER = (0.9, 0.95)
+TAIL_QUANTILES = (0.9, 0.95)
 """Shares of the values that tell how a tail goes on, beyond what a bump takes up."""
 
-SELDOM = 1e-4
+TAIL_CHANCE = 1e-4
 """Windows in which what shakes them throughout goes further than is told from them."""
 
-FEWEST = 20
+MIN_SAMPLES = 20
 """Samples that tell what is usual in them."""
 
-MANY = 50_000
+MAX_SPREAD_VALUES = 50_000
 """Values that tell the usual spread to half a percent."""
 
 
@@ -69,7 +69,9 @@ class UsualSpread:
     def of(cls, z: Array, m: int) -> UsualSpread:
         """Of outputs (n, c) without slow part; `m` as in `disturbed_stretches`."""
         sample = usual_spread(z)
-        tail = np.where(sample > SHAKEN, np.maximum(_tails(z, sample), TAILS), 1.0)
+        tail = np.where(
+            sample > SHAKEN_RATIO, np.maximum(_tails(z, sample), SHAKEN_TAIL), 1.0
+        )
         means = {width: np.ones(z.shape[1]) for width in _widths(len(z), m)}
         for c, column in enumerate(z.T):
             one = column / (sample[c] * tail[c])
@@ -82,7 +84,7 @@ class UsualSpread:
 
         Unchanged if there are too few samples.
         """
-        if len(z) < FEWEST:
+        if len(z) < MIN_SAMPLES:
             return self
         other = UsualSpread.of(z, m)
         wide = {w: np.fmax(s, other.means.get(w, s)) for w, s in self.means.items()}
@@ -107,7 +109,7 @@ def disturbed_stretches(
     size = np.zeros(len(z))
     for column, one in zip(z.T, scale, strict=True):
         np.maximum(size, np.abs(column) / one, out=size)
-    loud = size > LARGEST
+    loud = size > LOUD_SAMPLE_SIGMAS
     alone = _isolated_outliers(size)
     for width in _widths(len(z), m):
         peak = np.zeros(len(z) - width + 1)
@@ -115,7 +117,7 @@ def disturbed_stretches(
             # a byte decoded wrongly is no push: without it, what of the mean is left
             mean = running_means(np.where(alone, 0.0, column / scale[c]), width)
             np.maximum(peak, mean / there.means[width][c], out=peak)
-        for first, last in runs_of_true(peak > MEAN):
+        for first, last in runs_of_true(peak > LOUD_MEAN_SIGMAS):
             at = first + int(np.argmax(peak[first:last]))
             loud[at : at + width] = True
     found = _close_gaps(runs_of_true(loud), 2 * m)
@@ -133,8 +135,8 @@ def _isolated_outliers(size: Array) -> NDArray[np.bool_]:
     >>> _isolated_outliers(np.array([0.1, 90.0, 0.3, 0.2, 8.0, 9.0, 0.4])).nonzero()
     (array([1]),)
     """
-    calm = np.concatenate([[True], size <= LARGE, [True]])
-    alone: NDArray[np.bool_] = (size > LARGEST) & calm[:-2] & calm[2:]
+    calm = np.concatenate([[True], size <= STRETCH_SAMPLE_SIGMAS, [True]])
+    alone: NDArray[np.bool_] = (size > LOUD_SAMPLE_SIGMAS) & calm[:-2] & calm[2:]
     return alone
 
 
@@ -158,7 +160,7 @@ def usual_spread(z: Array) -> Array:
     >>> usual_spread(np.array([[0.0], [3.0], [-3.0], [3.0], [-3.0], [90.0]])).round(2)
     array([4.45])
     """
-    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
+    some = np.abs(z[:: max(len(z) // MAX_SPREAD_VALUES, 1)].T, order="C")
     spread: Array = MAD_TO_SIGMA * np.median(some, axis=1)
     return np.maximum(spread, 1.0)
 
@@ -176,14 +178,14 @@ def _tails(z: Array, spread: Array) -> Array:
     >>> _tails(z, np.array([1.0, 1.1])).round(1)
     array([1.6, 3.6])
     """
-    some = np.abs(z[:: max(len(z) // MANY, 1)].T, order="C")
+    some = np.abs(z[:: max(len(z) // MAX_SPREAD_VALUES, 1)].T, order="C")
     parts = np.array_split(some, 3, axis=1)
-    told = [np.quantile(part, OUTER, axis=1) for part in parts]
+    told = [np.quantile(part, TAIL_QUANTILES, axis=1) for part in parts]
     inner, outer = np.stack(told, axis=1)
-    share = (1 - OUTER[0]) / (1 - OUTER[1])
+    share = (1 - TAIL_QUANTILES[0]) / (1 - TAIL_QUANTILES[1])
     length = (outer - inner) / np.log(share)
-    far = inner + length * np.log((1 - OUTER[0]) * len(z) / SELDOM)
-    shortest: Array = far.min(axis=0) / (LARGEST * spread)
+    far = inner + length * np.log((1 - TAIL_QUANTILES[0]) * len(z) / TAIL_CHANCE)
+    shortest: Array = far.min(axis=0) / (LOUD_SAMPLE_SIGMAS * spread)
     return shortest
 
 
@@ -203,7 +205,7 @@ def _trim(size: Array, first: int, last: int) -> tuple[int, int]:
 
     All of it where none stands out by itself: a gentle push.
     """
-    large = np.flatnonzero(size[first:last] > LARGE)
-    if len(large) < 2 or size[first:last].max() <= LARGEST:
+    large = np.flatnonzero(size[first:last] > STRETCH_SAMPLE_SIGMAS)
+    if len(large) < 2 or size[first:last].max() <= LOUD_SAMPLE_SIGMAS:
         return first, last
     return first + int(large[0]), first + int(large[-1]) + 1

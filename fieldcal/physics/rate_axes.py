@@ -22,7 +22,7 @@ import numpy as np
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
-FEWEST = 3
+MIN_TURNS = 3
 """Least number of turns: one turn closes under several permutations by chance."""
 
 FOLLOWED = 0.8
@@ -67,7 +67,7 @@ def axes_by_turns(turns: Sequence[ObservedTurn]) -> Array | None:
     None also if several close them, as of turns about a single axis. If only the sense
     of one axis is undetermined, the device is taken to be right-handed.
     """
-    if len(turns) < FEWEST:
+    if len(turns) < MIN_TURNS:
         return None
     every = signed_axes()
     each = [_closure_angles(one, every) for one in turns]

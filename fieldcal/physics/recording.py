@@ -13,7 +13,7 @@ from fieldcal.physics.experience import Experience
 
 Rows = NDArray[np.intp]
 
-ENOUGH = 20_000
+GRID_SAMPLES = 20_000
 """Samples that show the grid that values lie on."""
 
 PARTS, SURE = 12, 9
@@ -145,7 +145,7 @@ def lsb_of(values: Array) -> float:
     """
     some = values[np.isfinite(values)]
     # one rest may show two values alone
-    return _step_between(np.unique(some[:: max(1, len(some) // ENOUGH)]))
+    return _step_between(np.unique(some[:: max(1, len(some) // GRID_SAMPLES)]))
 
 
 def _step_between(shown: Array) -> float:
@@ -172,7 +172,7 @@ def _grid(gaps: Array, step: float) -> float:
     return step if off.max() < 0.05 else 0.0
 
 
-FEW = 4
+MIN_GRID_VALUES = 4
 """Values of an output below which they show no grid by themselves."""
 
 
@@ -186,11 +186,13 @@ def grids_of(block: Block) -> Array:
 
 
 def _grids(triad: Array) -> Array:
-    some = triad[:: max(1, len(triad) // ENOUGH)]
+    some = triad[:: max(1, len(triad) // GRID_SAMPLES)]
     shown = [np.unique(axis[np.isfinite(axis)]) for axis in some.T]
     steps = np.array([_step_between(values) for values in shown])
-    few = np.array([0 < len(values) < FEW for values in shown])
+    few = np.array([0 < len(values) < MIN_GRID_VALUES for values in shown])
     known = steps[steps > 0]
     if not len(known):
-        known = np.concatenate([np.diff(v) for v in shown if len(v) < FEW] or [known])
+        known = np.concatenate(
+            [np.diff(v) for v in shown if len(v) < MIN_GRID_VALUES] or [known]
+        )
     return np.where(few & (steps == 0), min(known, default=0.0), steps)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 
-FEWEST = 3
+MIN_OTHER_WINDOWS = 3
 """Other windows that show how much windows differ."""
 
 
@@ -45,7 +45,7 @@ def variances_of_others(variance: Array, dof: Array) -> tuple[Array, Array]:
     nu = np.minimum(2 * _inverse_trigamma(np.maximum(beyond, 1e-9)), most)  # (1)
     prior = np.maximum(nu, 1.0) / 2
     common = np.exp(centre + mean + _digamma(prior) - np.log(prior))  # (2)
-    enough = count >= FEWEST
+    enough = count >= MIN_OTHER_WINDOWS
     return np.where(enough, common, 1.0), np.where(enough, nu, 0.0)
 
 

@@ -25,16 +25,16 @@ from fieldcal.physics.effect import Motion, Sensor
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.parameter_set import ParameterSet
 
-ROUNDED = 1e-9
+MAX_ROUNDED_LENGTH = 1e-9
 """Length of a column, as a share of the longest, that is only rounding."""
 
 WITH_EQUATION = (Motion, Sensor)
 """Kinds of effects that have an equation."""
 
-UNIT = 1e-6
+MIN_SINGULAR_VALUE = 1e-6
 """Relative singular value below which the windows do not determine a direction."""
 
-UNCHECKED = 1.0
+MAX_PREDICTION_VARIANCE = 1.0
 """Variance, (m/s^2)^2, of a prediction above which no other window checks it: the wide
 priors of the estimated parameters dominate."""
 
@@ -138,7 +138,7 @@ def _random_columns(d: ParameterSet) -> Mask:
         g for _, g in d.explanations[0].members if isinstance(g.effect, WITH_EQUATION)
     ]
     every = [
-        np.full(len(g.columns), g.fixed_size != priors.FREE and g not in equations)
+        np.full(len(g.columns), g.fixed_size != priors.FREE_SIZE and g not in equations)
         for g in d.groups
     ]
     return np.concatenate(every)
@@ -158,8 +158,10 @@ def _least_chi2(stated: Array, free: Array, y: Array) -> tuple[float, int]:
     white = np.linalg.solve(root, np.column_stack([free, y]))
     a, b = white[:, :-1], white[:, -1]
     length = np.linalg.norm(a, axis=0)
-    length = np.where(length > ROUNDED * length.max(initial=0.0), length, np.inf)
-    x, _, rank, _ = np.linalg.lstsq(a / length, b, rcond=UNIT)
+    length = np.where(
+        length > MAX_ROUNDED_LENGTH * length.max(initial=0.0), length, np.inf
+    )
+    x, _, rank, _ = np.linalg.lstsq(a / length, b, rcond=MIN_SINGULAR_VALUE)
     rest = b - a / length @ x
     return float(rest @ rest), int(rank)
 
@@ -203,7 +205,10 @@ class _MeasuredMeans:
                     if self.freely_rotated[i]
                     else np.eye(3)
                 )
-                if np.trace(n @ unsure[i] @ n.T) > UNCHECKED * self.d.unit[0] ** 2:
+                if (
+                    np.trace(n @ unsure[i] @ n.T)
+                    > MAX_PREDICTION_VARIANCE * self.d.unit[0] ** 2
+                ):
                     out[i] = np.nan
         return out
 

@@ -45,7 +45,7 @@ from fieldcal.solve.rows import rows_of_means, without_angles
 EarthRateModel = Literal["stated", "another", "none"]
 """Earth's rate in the gyroscopes: of the stated latitude, of another one, or none."""
 
-EVEN = 0.5
+COARSER_GRADE_CHANCE = 0.5
 """Probability from which an error is taken to be as large as in the coarser grade."""
 
 NO_EARTH = (
@@ -161,7 +161,7 @@ def _fit_over_earth_rates(
     if shown is None or not shown.other_favoured:
         return found, notes
     other, (none, others) = fitted("another")[0], fitted("none")
-    ahead = none.score - found.score + np.log(priors.ELSEWHERE)
+    ahead = none.score - found.score + np.log(priors.WRONG_LATITUDE_CHANCE)
     score = np.array([0.0, shown.gain, ahead])
     weights = np.exp(score - score.max())
     as_said, elsewhere, absent = (weights / weights.sum()).tolist()
@@ -266,7 +266,11 @@ class _SessionFit:
         if (stated := self.options.at_best) is None:
             return found
         chances = found.coarser_probabilities(stated)
-        finer = {k: getattr(stated, k) for k, p in chances.items() if p < EVEN}
+        finer = {
+            k: getattr(stated, k)
+            for k, p in chances.items()
+            if p < COARSER_GRADE_CHANCE
+        }
         if not finer:
             return found
         wanted = replace(wanted, factory=replace(wanted.factory, **finer))
@@ -289,7 +293,7 @@ class _SessionFit:
         ahead = usable["angle_offset"].score - usable["base_tilt"].score
         best, other = TILTS if ahead >= 0 else TILTS[::-1]
         ahead = abs(ahead)
-        if ahead > thresholds.BETTER_TILT:
+        if ahead > thresholds.TILT_LOG_MARGIN:
             note = (
                 f"the tilt is taken as {best}: {other} fits worse, by {2 * ahead:.0f}"
                 " in chi2"

@@ -45,14 +45,14 @@ from fieldcal.physics.effect import Motion, Scatter, Sensor
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.solve.warm_scales import WARM_SCALE
 
-AXES = 3
+MAX_SUBSET_PARAMETERS = 3
 """Largest number of parameters of which subsets are taken as variants."""
 
 CHANGING = ("time", "temperature", "force and time", "flicker", WARM_SCALE)
 """Functions without physics whose value at the end belongs to the biases and scale
 factors there; functions of angles and forces have no zero."""
 
-SMALL = 1e-3
+DERIVATIVE_STEP = 1e-3
 """d of (2), m/s^2 and rad/s."""
 
 
@@ -201,7 +201,7 @@ def _group_variants(d: Dictionary, group: Group) -> list[Group]:
     if not isinstance(effect, Motion | Sensor):
         raise TypeError(f"{group.cause} has no equation")
     whole = next(at for part, at in parameter_groups(d, effect) if part == group.part)
-    if isinstance(effect, Motion) or len(whole) > AXES:
+    if isinstance(effect, Motion) or len(whole) > MAX_SUBSET_PARAMETERS:
         one = replace(group, params=_in_axes_of(d, group))
         return groups_at_points(d, one, [(group.shape, group.origin)])
     own = (group.shape, group.origin)
@@ -277,9 +277,9 @@ def bias_scale_at_end(d: Dictionary, shown: Sequence[WeightedExplanation]) -> Ar
         return out
     out[0] = _end_outputs(d, there, np.zeros(6))
     for c in range(6):
-        step = SMALL * np.eye(6)[c]
+        step = DERIVATIVE_STEP * np.eye(6)[c]
         up, down = (_end_outputs(d, there, s * step)[c] for s in (1.0, -1.0))
-        out[1, c] = (up - down) / (2 * SMALL)
+        out[1, c] = (up - down) / (2 * DERIVATIVE_STEP)
     return out
 
 

@@ -38,7 +38,7 @@ Found = dict[str, Array]
 
 RAD = np.pi / 180
 
-STEP = 1e-30
+IMAGINARY_STEP = 1e-30
 """Imaginary step of the derivatives; exact to the machine, since nothing cancels."""
 
 
@@ -131,11 +131,11 @@ def _parameters_with_derivatives(
     c: Array, limits: Array, g: float, as_printed: bool
 ) -> tuple[tuple[str, ...], Array, Array]:
     """Parameters from all coefficients, and their derivatives by them."""
-    stepped = np.vstack([c + 0j, c + 1j * STEP * np.eye(len(c))]).T
+    stepped = np.vstack([c + 0j, c + 1j * IMAGINARY_STEP * np.eye(len(c))]).T
     x, y, z = (stepped[i:j] for i, j in pairwise(limits))
     found = _parameters_of_axes(x, y, z, g, as_printed)
     table = np.stack(list(found.values()))
-    return tuple(found), table[:, 0].real, table[:, 1:].imag / STEP
+    return tuple(found), table[:, 0].real, table[:, 1:].imag / IMAGINARY_STEP
 
 
 def _parameters_of_axes(

@@ -63,7 +63,9 @@ class VerticalEarthRate:
         group = Group(
             "earth", "vertical", column, np.array([EARTH_RATE]), fixed_size=1.0
         )
-        other = Cause(group.cause, group.part, priors.ELSEWHERE, (group,), "given")
+        other = Cause(
+            group.cause, group.part, priors.WRONG_LATITUDE_CHANCE, (group,), "given"
+        )
         as_said = search.evaluate(parameter_set.members)
         free = search.evaluate((*parameter_set.members, (other, group)))
         at = free.state.columns == column[0]
@@ -78,7 +80,7 @@ class VerticalEarthRate:
     @property
     def other_favoured(self) -> bool:
         """Whether the evidence favours another latitude, possible or not."""
-        return self.gain > float(np.log(priors.ELSEWHERE))
+        return self.gain > float(np.log(priors.WRONG_LATITUDE_CHANCE))
 
     @property
     def latitude_wrong(self) -> bool:

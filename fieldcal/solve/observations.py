@@ -29,7 +29,7 @@ from fieldcal.windows import Average
 
 Index = NDArray[np.integer[Any]]
 Mask = NDArray[np.bool_]
-SINGULAR = 1e-6
+MIN_EIGENVALUE = 1e-6
 """Least eigenvalue of a correlation matrix that is taken as known."""
 
 
@@ -232,7 +232,7 @@ def _regularised(covariance: Array) -> Array:
         if not (size > 0).all():
             continue
         least = np.linalg.eigvalsh(block / np.outer(size, size)).min()
-        if least < SINGULAR:
+        if least < MIN_EIGENVALUE:
             out[three, three] = np.diag(size**2)
             out[:3, 3:] = out[3:, :3] = 0.0
     return out

@@ -163,12 +163,13 @@ class ParameterSet(Dictionary):
             at = np.intersect1d(channels, self.observed)
             if not len(at):
                 continue
-            yield Group("bias", part, self.bias + at, sizes[at], fixed_size=priors.FREE,
+            free = priors.FREE_SIZE
+            yield Group("bias", part, self.bias + at, sizes[at], fixed_size=free,
                         in_state=True)  # fmt: skip
             if part == "acc" or self.options.gyr_scale:
                 size = priors.SCALE * self.unit[at]
                 yield Group("scale", part, self.scale + at, size,
-                            fixed_size=priors.FREE, in_state=True)  # fmt: skip
+                            fixed_size=priors.FREE_SIZE, in_state=True)  # fmt: skip
 
     def _causes(self) -> Iterator[Cause]:
         """Causes of the requested parameters, and of errors of known size."""
@@ -184,7 +185,9 @@ class ParameterSet(Dictionary):
         for one in factory_groups(self, left, turned=not oriented):
             yield _given_cause(one)
         if w.gyro_cross:
-            yield self._effect_cause("gyro_cross_coupling", free=priors.COUPLED)
+            yield self._effect_cause(
+                "gyro_cross_coupling", free=priors.GYRO_COUPLING_SIZE
+            )
         if any(w.earth) and oriented:
             yield self._earth_rate_cause(np.array(w.earth))
         if w.angles_deg:
@@ -213,7 +216,7 @@ class ParameterSet(Dictionary):
         name: str,
         turned: bool = False,
         known: float | None = None,
-        free: float = priors.FREE,
+        free: float = priors.FREE_SIZE,
     ) -> Cause:
         """Cause of an effect with all its parameters, free or of a known size.
 

@@ -27,8 +27,10 @@ from fieldcal.solve.result import UNITS
 
 METHODS = ("two_position", "five_position")
 
-TWO = "as printed: the sign of (5) makes the scale factor of z negative"
-FIVE = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
+TWO_POSITION_MISPRINTS = (
+    "as printed: the sign of (5) makes the scale factor of z negative"
+)
+FIVE_POSITION_MISPRINTS = "as printed: (23) is inverted, (22), (30), (34) lose the sign"
 """Warning about the misprints of each method."""
 
 
@@ -47,7 +49,11 @@ def solve(observations: Observations, options: SolveOptions) -> Calibration:
     if len(still) and observations.has_acc:
         two = len(still) == 2 if method == "auto" else method == "two_position"
         method = "two_position" if two else "five_position"
-        formulas, misprints = (two_position, TWO) if two else (five_position, FIVE)
+        formulas, misprints = (
+            (two_position, TWO_POSITION_MISPRINTS)
+            if two
+            else (five_position, FIVE_POSITION_MISPRINTS)
+        )
         parts.append(formulas(observations[still], as_printed=True))
         sentences.append(misprints)
     if observations.has_gyr:

@@ -23,16 +23,16 @@ Mask = NDArray[np.bool_]
 RCOND = 1e-7
 """Ratio of singular values below which a direction counts as not determined."""
 
-ROUNDING = 1e-12
+MAX_ROUNDED_LENGTH = 1e-12
 """Length of a column, as a share of the longest, that counts as zero."""
 
-LEAK = 1e-4
+MIN_NULL_SHARE = 1e-4
 """Share of a null direction above which a parameter counts as not determined."""
 
 MAX_POSITIONS = 4
 """Largest number of proposed positions; beyond it another procedure is needed."""
 
-LADDER = tuple(
+PROPOSED_POSITIONS = tuple(
     Position.deg(a, b)
     for a, b in [(45, 5), (-45, 5), (45, -5), (45, 0), (0, 5), (22.5, 2.5), (90, 0),
                  (0, 90), (180, 0), (45, 45)]
@@ -44,10 +44,10 @@ def determined_parameters(rows: Array) -> tuple[Mask, int]:
     """Which parameters (p,) a design (m, p) determines, and its rank."""
     scale = np.linalg.norm(rows, axis=0)
     # sin(180°) is not quite zero: such a column contains only rounding errors
-    scale = np.where(scale > ROUNDING * scale.max(initial=0.0), scale, np.inf)
+    scale = np.where(scale > MAX_ROUNDED_LENGTH * scale.max(initial=0.0), scale, np.inf)
     _, s, vt = np.linalg.svd(rows / scale, full_matrices=True)
     rank = int((s > RCOND * max(float(s.max(initial=0.0)), 1e-300)).sum())
-    known: Mask = (np.abs(vt[rank:]) < LEAK).all(axis=0)
+    known: Mask = (np.abs(vt[rank:]) < MIN_NULL_SHARE).all(axis=0)
     return known, rank
 
 
@@ -86,7 +86,7 @@ def positions_to_add(
 
 
 def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]:
-    """Names of the fewest positions of `LADDER` that would determine parameters.
+    """Names of the fewest proposed positions that would determine parameters.
 
     Positions without angles are ignored: they are not linear in the parameters.
     """
@@ -95,4 +95,4 @@ def ladder_remedy(observations: Observations, names: Sequence[str]) -> list[str]
     def rows(places: Sequence[Position]) -> Array:
         return design_matrix(names, places, observations.gravity, observations.mounting)
 
-    return [p.name for p in positions_to_add(rows, known, LADDER)]
+    return [p.name for p in positions_to_add(rows, known, PROPOSED_POSITIONS)]

@@ -59,20 +59,20 @@ class WrongAngles:
         if self.position is not None:
             return f"position {self.position + 1} with a wrong {name}"
         if self.angle_deg is not None:
-            by = f"{priors.REPEATED_DEG:g}° off each time"
+            by = f"{priors.REPEATED_MISTAKE_DEG:g}° off each time"
             return f"{name} = {self.angle_deg:.4g}° set {by}"
-        return f"every {name} set {priors.GAUGE:.1%} too far"
+        return f"every {name} set {priors.GAUGE_ERROR:.1%} too far"
 
     def error_at(self, alpha: float, beta: float) -> tuple[float, float]:
         """Error of the angles of another position by the same mistake, rad."""
         angle = (alpha, beta)[self.joint]
         off = 0.0
         if self.position is None and self.angle_deg is None:
-            off = priors.GAUGE * angle
+            off = priors.GAUGE_ERROR * angle
         elif self.angle_deg is not None and _equal_angles(
             angle, np.deg2rad(self.angle_deg)
         ):
-            off = float(np.deg2rad(priors.REPEATED_DEG))
+            off = float(np.deg2rad(priors.REPEATED_MISTAKE_DEG))
         return (off, 0.0) if self.joint == 0 else (0.0, off)
 
     def to_json(self) -> dict[str, Any]:
@@ -134,14 +134,16 @@ def _mistakes(
     for joint, angles in enumerate((x.alpha[rows], x.beta[rows])):
         for i, place in enumerate(places.tolist()):
             u = np.zeros(2 * len(places))
-            u[2 * i + joint] = np.deg2rad(priors.ALONE_DEG)
+            u[2 * i + joint] = np.deg2rad(priors.SINGLE_MISTAKE_DEG)
             yield joint, None, int(place), u
         for value in np.unique(np.round(angles, 9)).tolist():
             u = np.zeros(2 * len(places))
-            u[joint::2] = np.deg2rad(priors.REPEATED_DEG) * _equal_angles(angles, value)
+            u[joint::2] = np.deg2rad(priors.REPEATED_MISTAKE_DEG) * _equal_angles(
+                angles, value
+            )
             yield joint, float(np.rad2deg(value)), None, u
         u = np.zeros(2 * len(places))
-        u[joint::2] = priors.GAUGE * angles
+        u[joint::2] = priors.GAUGE_ERROR * angles
         if u.any():
             yield joint, None, None, u
 

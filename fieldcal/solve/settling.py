@@ -24,12 +24,12 @@ from fieldcal.solve.averaging import mixture_with_causes
 from fieldcal.solve.observations import Mask
 from fieldcal.solve.parameter_set import ParameterSet
 
-FOLLOWED, NEAR = 6, 0.01
+MAX_TURN_INTEGRATIONS, MIN_SCALE_CHANGE = 6, 0.01
 """Largest number of integrations of the turns, and the change of a scale factor from
 which they are integrated again. The error of linearisation is the square of the change:
 1e-4, and 1e-8 after the last integration."""
 
-NO_WEIGHT = 1e5
+BAD_WINDOW_NOISE = 1e5
 """Factor on the noise of a bad window that must not influence the state."""
 
 
@@ -99,7 +99,9 @@ def _settled_fit(
 def _without_windows(rows: Rows, parameter_set: ParameterSet, bad: Mask) -> Rows:
     """Rows in which bad windows (p,) have no weight."""
     left = np.isin(rows.x.position, parameter_set.window_positions[bad])
-    return replace(rows, sd=np.where(left[:, None], NO_WEIGHT * rows.sd, rows.sd))
+    return replace(
+        rows, sd=np.where(left[:, None], BAD_WINDOW_NOISE * rows.sd, rows.sd)
+    )
 
 
 def _settled_state(
@@ -116,12 +118,12 @@ def _settled_state(
     nominal = np.append(state.scale[:3], inference.nominal.scale[3:])
     state = replace(state, scale=nominal)
     state, values = _follow_turns_first(inference, parameter_set, state, values)
-    for again in range(FOLLOWED):
+    for again in range(MAX_TURN_INTEGRATIONS):
         if again:
             inference.follow_turns(state, values)
         before = state.scale
         state, values, _ = inference.settle(state, values, parameter_set.members)
-        if np.abs(state.scale / before - 1).max() < NEAR:
+        if np.abs(state.scale / before - 1).max() < MIN_SCALE_CHANGE:
             break
     return state, values
 

@@ -19,11 +19,11 @@ from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.model.search.selection import Search
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
 
-POINTS = 24
+REPRESENTATIVE_POINTS = 24
 """Number of variants that represent all variants of a certain explanation; it falls in
 proportion to the probability of the explanation."""
 
-HAIR = 1e-6
+POINT_OFFSET = 1e-6
 """Offset of points. With variants that mirror each other, a point may lie just between
 two of them, and rounding would decide which one is taken."""
 
@@ -50,7 +50,9 @@ def variants(
         for m in one.possible_members
     ]
     share: dict[tuple[Member, ...], float] = {}
-    points = spread_points(len(each), max(1, round(POINTS * one.probability)))
+    points = spread_points(
+        len(each), max(1, round(REPRESENTATIVE_POINTS * one.probability))
+    )
     for at in points:
         picked = [
             choices[choice_at(weight, u)]
@@ -67,10 +69,10 @@ def choice_at(weight: Array, u: float) -> int:
     >>> choice_at(np.array([0.3, 0.2, 0.2, 0.3]), 0.5)
     1
     """
-    return int(np.searchsorted(np.cumsum(weight)[:-1], u - HAIR))
+    return int(np.searchsorted(np.cumsum(weight)[:-1], u - POINT_OFFSET))
 
 
-def spread_points(count: int, points: int = POINTS) -> Array:
+def spread_points(count: int, points: int = REPRESENTATIVE_POINTS) -> Array:
     """Points spread evenly over the unit cube, (points, count)."""
     if not count:
         return np.full((1, 0), 0.5)

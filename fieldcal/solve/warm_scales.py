@@ -23,7 +23,7 @@ from fieldcal.model.causes.columns import Course, General, RowView
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.physics.effect import BiasChange
 
-ACC = 3
+ACC_OUTPUTS = 3
 """Number of outputs of accelerometers; they come first."""
 
 WARM_SCALE = "warm_scale"
@@ -51,17 +51,17 @@ def warm_scale(table: ColumnTable, group: Group) -> Member | None:
 
     def columns(view: RowView) -> Array:
         c_of_t = course.evaluate(view)[:, which]
-        out = np.zeros((len(view.x), 6, ACC, len(which)))
-        for c in range(ACC):
+        out = np.zeros((len(view.x), 6, ACC_OUTPUTS, len(which)))
+        for c in range(ACC_OUTPUTS):
             out[:, c, c] = c_of_t * view.x.f[:, [c]]  # (1)
         return out.reshape(len(out), 6, -1)
 
-    count = ACC * len(which)
+    count = ACC_OUTPUTS * len(which)
     at = table.add(General(WARM_SCALE, columns), count) + np.arange(count)
-    wide = np.abs(np.outer(table.unit[:ACC], priors.SCALE_WARMS * size / G0))
+    wide = np.abs(np.outer(table.unit[:ACC_OUTPUTS], priors.SCALE_WARMING * size / G0))
     one = Group(
         WARM_SCALE, "", at, wide.ravel(), group.effect, group.shape, group.origin,
-        tuple(np.repeat(range(ACC), len(which)).tolist()), fixed_size=1.0,
+        tuple(np.repeat(range(ACC_OUTPUTS), len(which)).tolist()), fixed_size=1.0,
     )  # fmt: skip
     return Cause(WARM_SCALE, "", 1.0, (one,), "noise"), one
 
@@ -87,7 +87,7 @@ def _courses(table: ColumnTable, group: Group) -> tuple[Course, Index, Array]:
     if not isinstance(basis, Course):
         raise TypeError(f"{group.cause} is no course of biases")
     channel, number = np.divmod(group.columns - first, basis.width)
-    on_acc = channel < ACC
+    on_acc = channel < ACC_OUTPUTS
     wide = (
         group.prior_sigma(1.0 if group.fixed_size is None else group.fixed_size)
         / table.unit[channel]

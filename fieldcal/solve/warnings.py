@@ -133,8 +133,8 @@ def _norm_warning(missing: Sequence[str], estimate: ParameterEstimate, n: int) -
     why = "axes held up and down alone cannot show it"
     if n < 9:
         why = f"{n} norms cannot determine 9 parameters"
-    elif estimate.acc.dof in words.FEW:
-        why += f" (and all nine would leave {words.FEW[estimate.acc.dof]})"
+    elif estimate.acc.dof in words.SPELLED_DOF:
+        why += f" (and all nine would leave {words.SPELLED_DOF[estimate.acc.dof]})"
     return (
         f"{join_words(hidden)} {'are' if hidden[1:] else 'is'} not determined, {why}:"
         f" add positions with gravity half way between {join_words(pairs)}"
@@ -199,9 +199,9 @@ def _few_windows_warnings(method: Method, estimate: ParameterEstimate) -> list[s
         return []
     if estimate.acc.dof <= 0:
         return [words.NO_DOF]
-    if method == "scalar" and estimate.acc.dof in words.FEW:
+    if method == "scalar" and estimate.acc.dof in words.SPELLED_DOF:
         return [
-            f"only {words.FEW[estimate.acc.dof]}: too few to check the fit; add"
+            f"only {words.SPELLED_DOF[estimate.acc.dof]}: too few to check the fit; add"
             " positions in other orientations"
         ]
     return []
@@ -223,7 +223,7 @@ def _scatter_warnings(estimate: ParameterEstimate) -> list[str]:
                 words.scatter_warning(name, agreed.chi2, agreed.dof, spread, unit)
             )
     chi2, dof = closure_chi2(estimate)
-    if dof >= thresholds.TURNS_TELL:
+    if dof >= thresholds.MIN_TURN_DOF:
         sentences.append(
             words.scatter_warning(
                 "turns", chi2, dof, closure_scatter(estimate.mixture), "rad"

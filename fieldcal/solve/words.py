@@ -19,7 +19,7 @@ NO_SCALE = (
     "record the turns between the positions, which determine it"
 )
 
-FEW = {1: "one degree of freedom", 2: "two degrees of freedom"}
+SPELLED_DOF = {1: "one degree of freedom", 2: "two degrees of freedom"}
 
 
 IN_WORDS = {

@@ -205,9 +205,9 @@ def test_a_column_in_its_place_is_what_the_parameter_does(name: str) -> None:
 
 def test_what_is_estimated_is_free_and_what_is_said_has_its_size() -> None:
     free = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt"))
-    assert all(g.fixed_size == priors.FREE for g in free.always)
+    assert all(g.fixed_size == priors.FREE_SIZE for g in free.always)
     (tilt,) = [g for c, g in free.members if c.name == "base_tilt"]
-    assert tilt.fixed_size == priors.FREE
+    assert tilt.fixed_size == priors.FREE_SIZE
     level = given(FIVE_POSITIONS, ParameterSetOptions("base_tilt", level_deg=0.2))
     (tilt,) = [g for c, g in level.members if c.name == "base_tilt"]
     sizes: Array = tilt.prior_sigma(tilt.fixed_size or 0.0)

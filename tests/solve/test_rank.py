@@ -11,8 +11,8 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.solve import solve
 from fieldcal.solve.rank import (
-    LADDER,
     MAX_POSITIONS,
+    PROPOSED_POSITIONS,
     determined_parameters,
     ladder_remedy,
     positions_to_add,
@@ -57,7 +57,7 @@ def test_what_is_proposed_is_enough_and_none_of_it_is_too_much(
     def rows(places: tuple[Position, ...]) -> Array:
         return design_matrix(TILTED, places, G)
 
-    extra = positions_to_add(lambda p: rows(tuple(p)), taken, LADDER)
+    extra = positions_to_add(lambda p: rows(tuple(p)), taken, PROPOSED_POSITIONS)
     assert 0 < len(extra) <= MAX_POSITIONS
     for left in [None, *extra]:
         kept = [p for p in extra if p is not left]
@@ -70,10 +70,12 @@ def test_nothing_is_proposed_where_nothing_is_missing_or_nothing_helps() -> None
         return np.ones((len(places), 1, 2))
 
     assert (
-        positions_to_add(lambda p: design_matrix(TILTED, p, G), FIVE_POSITIONS, LADDER)
+        positions_to_add(
+            lambda p: design_matrix(TILTED, p, G), FIVE_POSITIONS, PROPOSED_POSITIONS
+        )
         == []
     )
-    assert positions_to_add(rows, TWO_POSITIONS, LADDER) == []
+    assert positions_to_add(rows, TWO_POSITIONS, PROPOSED_POSITIONS) == []
 
 
 def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
@@ -81,7 +83,7 @@ def test_the_proposed_positions_mend_what_solve_leaves_open() -> None:
     seen = observe(places, outputs(places))
     assert "acc_scale.z" not in solve(seen, tilt="none").names
     extra = ladder_remedy(seen, parameters())
-    more = (*places, *(p for p in LADDER if p.name in extra))
+    more = (*places, *(p for p in PROPOSED_POSITIONS if p.name in extra))
     assert len(more) == len(places) + len(extra)
     found = solve(observe(more, outputs(more)), tilt="none")
     np.testing.assert_allclose(found.values, [*BIAS, *SCALE], atol=1e-5)

@@ -10,7 +10,7 @@ from observed import observe
 
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.core.samples import Array
-from fieldcal.model.priors import GAUGE, REPEATED_DEG
+from fieldcal.model.priors import GAUGE_ERROR, REPEATED_MISTAKE_DEG
 from fieldcal.solve import solve
 from fieldcal.solve.reliability import WrongAngles
 
@@ -50,7 +50,7 @@ def test_what_is_foretold_of_a_gauge_is_what_it_does() -> None:
             continue
         off = straight.copy()
         stated = [(p.alpha, p.beta)[wrong.joint] or 0.0 for p in FIVE_POSITIONS]
-        off[:, wrong.joint] = part * GAUGE * np.array(stated)
+        off[:, wrong.joint] = part * GAUGE_ERROR * np.array(stated)
         moved = solved(FIVE_POSITIONS, off)
         for name, by in wrong.moves.items():
             there = moved.value(name) - found.value(name)
@@ -71,9 +71,9 @@ def test_five_small_turns_have_no_witness_of_a_gauge_and_six_faces_need_none() -
 
 def test_a_mistake_is_carried_to_another_position() -> None:
     gauge = WrongAngles(1, None, None, 0.0, {})
-    assert gauge.error_at(0.3, 0.5) == pytest.approx((0.0, GAUGE * 0.5))
+    assert gauge.error_at(0.3, 0.5) == pytest.approx((0.0, GAUGE_ERROR * 0.5))
     detent = WrongAngles(0, 45.0, None, 0.0, {})
-    wide = np.deg2rad(REPEATED_DEG)
+    wide = np.deg2rad(REPEATED_MISTAKE_DEG)
     assert detent.error_at(np.pi / 4, 0.1) == pytest.approx((wide, 0.0))
     assert detent.error_at(0.1, np.pi / 4) == (0.0, 0.0)
     assert WrongAngles(0, None, 2, 0.0, {}).error_at(0.1, 0.1) == (0.0, 0.0)

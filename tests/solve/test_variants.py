@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldcal.solve.variants import POINTS, choice_at, spread_points
+from fieldcal.solve.variants import REPRESENTATIVE_POINTS, choice_at, spread_points
 
 
 def test_rounding_does_not_decide_between_variants_that_mirror_one_another() -> None:
@@ -21,5 +21,5 @@ def test_rounding_does_not_decide_between_variants_that_mirror_one_another() -> 
 def test_each_is_reached_as_often_as_it_is_likely(weight: list[float]) -> None:
     (points,) = spread_points(1).T
     at = [choice_at(np.array(weight), float(u)) for u in points]
-    share = np.bincount(at, minlength=len(weight)) / POINTS
+    share = np.bincount(at, minlength=len(weight)) / REPRESENTATIVE_POINTS
     np.testing.assert_allclose(share, weight, atol=1e-12)

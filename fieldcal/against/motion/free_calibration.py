@@ -28,7 +28,7 @@ def free_calibration_sizes(found: MotionExplanation, sizes: Array) -> Array:
     for group in found.dictionary.always:
         some = slice(first, first := first + len(group.columns))
         if group.fixed_size is None:
-            wide[some] = group.prior_sigma(priors.FREE)
+            wide[some] = group.prior_sigma(priors.FREE_SIZE)
     return wide
 
 

@@ -109,12 +109,12 @@ def _reason_rejected(
                 " tell"
             )
     rise = _evidence_rise(alone, posterior.search.evaluate(())) if alone else 0.0
-    if rise < thresholds.TAKES_LITTLE or alone is None:
+    if rise < thresholds.LITTLE_LOG_GAIN or alone is None:
         return "takes no more than chance would"
     odds = _odds(alone.score - posterior.search.evaluate(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
-    if beside is not None and _evidence_rise(beside, best) > thresholds.TAKES_LITTLE:
+    if beside is not None and _evidence_rise(beside, best) > thresholds.LITTLE_LOG_GAIN:
         return f"beside {names} it takes a little, at odds of {odds}"
     return f"{names} takes it: beside that nothing is left for it"
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array
 from fieldcal.model.rows.reduce import Rows
 
-PARTS = (0.0, 0.1, 0.25, 0.5, 1.0)
+PART_ENDS = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Ends of the parts of a window over which residuals are averaged."""
 
 
@@ -25,7 +25,7 @@ def part_means(rows: Rows, residual: Array) -> tuple[Array, Array, NDArray[np.in
     means, sds, position = [], [], []
     for p in np.unique(rows.x.position):
         at = np.flatnonzero(rows.x.position == p)
-        cuts = np.unique(np.round(np.array(PARTS) * len(at)).astype(int))
+        cuts = np.unique(np.round(np.array(PART_ENDS) * len(at)).astype(int))
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
             part = at[a:b]
             use = np.isfinite(residual[part]) & rows.used[part]

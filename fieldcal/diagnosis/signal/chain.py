@@ -175,7 +175,7 @@ def _mark_unusable(
     if name == "saturation":
         for first, last in windows:
             inside = (fault.rows >= first) & (fault.rows < last)
-            if inside.sum() > thresholds.CLIPPED * (last - first):
+            if inside.sum() > thresholds.MAX_CLIPPED_SHARE * (last - first):
                 usable[first:last, c] = False
 
 

@@ -16,19 +16,19 @@ import numpy as np
 
 from fieldcal.core.samples import CHANNELS, Array
 from fieldcal.diagnosis.signal.moments import Moments, moments_of
-from fieldcal.diagnosis.signal.periodogram import LONGEST
+from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Line
 
-FEW, STRETCHES, FOLDS = 3, 5, 12
+MIN_HELD_OUT_WINDOWS, STRETCHES_PER_WINDOW, MAX_FOLDS = 3, 5, 12
 """Number of windows below which stretches of them are held out in place of windows;
 stretches of each window; parts of the recording that are held out in turn."""
 
-SLOW = 30.0
+SLOPE_PERIODS = 30.0
 """Periods in a window up to which a slope takes a part of a line: 0.07 % here."""
 
-AT_ONCE = 256
+FREQUENCIES_AT_ONCE = 256
 """Frequencies tried together: all of a long recording would take much memory."""
 
 
@@ -91,11 +91,11 @@ class LineRemainder:
 
 def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> SpectralLine:
     """Fit an effect at the frequency near that of the moments that explains most."""
-    shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
+    shortest = min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples))) / pieces.rate
     step = 0.2 / max(float(np.ptp(moments.middle)), shortest)
     offsets = np.arange(-1.5 / shortest, 1.5 / shortest + step, step)
     tone = _line_at_best_frequency(pieces, effect, moments, offsets, step, 3)
-    if not pieces.usable or tone.hz * shortest > SLOW:
+    if not pieces.usable or tone.hz * shortest > SLOPE_PERIODS:
         return tone
     amplitude = effect.response(pieces.x, tone.hz) @ tone.causes
     again = moments_of(pieces.with_whole_line(tone.hz, amplitude), tone.hz)
@@ -106,10 +106,10 @@ def tune_line(pieces: WindowSamples, effect: Line, moments: Moments) -> Spectral
 
 def line_remainder(pieces: WindowSamples, tone: SpectralLine) -> LineRemainder:
     """Mean squares that are left of a line, after its fit and after its prediction."""
-    many = len(pieces.samples) >= FEW
-    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES)
+    many = len(pieces.samples) >= MIN_HELD_OUT_WINDOWS
+    moments = moments_of(pieces, tone.hz, 1 if many else STRETCHES_PER_WINDOW)
     groups = np.arange(len(moments.counts))
-    fold = groups % (FOLDS if many else STRETCHES)
+    fold = groups % (MAX_FOLDS if many else STRETCHES_PER_WINDOW)
     seen = moments.amplitudes(np.zeros(1))[0]
     fitted = (tone.effect.response(pieces.x, tone.hz) @ tone.causes)[moments.window]
     ahead = seen.copy()
@@ -155,7 +155,7 @@ def _line_at_best_frequency(
     rounds: int,
 ) -> SpectralLine:
     for _ in range(rounds):
-        some = np.array_split(offsets, -(-len(offsets) // AT_ONCE))
+        some = np.array_split(offsets, -(-len(offsets) // FREQUENCIES_AT_ONCE))
         chi2 = np.concatenate(
             [_fit_causes(pieces, effect, moments, each)[2] for each in some]
         )
@@ -203,7 +203,7 @@ def _fit_causes(
     own = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
     sigma = np.sqrt(own.real)
     if effect.kind == "sensor":  # each output has its own cause: drop those at noise
-        causes = np.where(np.abs(causes) > thresholds.LINE * sigma, causes, 0.0)
+        causes = np.where(np.abs(causes) > thresholds.LINE_SIGMAS * sigma, causes, 0.0)
     left = seen - response @ causes[..., None]
     fallen = np.abs(seen) ** 2 - np.abs(left) ** 2
     return causes, sigma, fallen[..., 0] @ weight
@@ -223,7 +223,7 @@ def _line_at(
     clear = [
         c
         for c, a, e in zip(CHANNELS, amplitude, error, strict=True)
-        if a > thresholds.LINE * e
+        if a > thresholds.LINE_SIGMAS * e
     ]
     values, sigmas = _named_amplitudes(effect, causes, sigma)
     values["hz"] = float(hz)

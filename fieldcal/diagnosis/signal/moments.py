@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.diagnosis.signal.periodogram import LONGEST
+from fieldcal.diagnosis.signal.periodogram import PERIODOGRAM_SAMPLES
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 
-PARTS, LEAST = 15, 4
+PARTS_PER_WINDOW, MIN_PART_SAMPLES = 15, 4
 """Parts per window (or per length of a periodogram) whose sums are kept, so that the
 frequency can be shifted within a periodogram's resolution; fewest samples in a part."""
 
@@ -73,8 +73,8 @@ def moments_of(pieces: WindowSamples, near: float, stretches: int = 1) -> Moment
     counts: list[float] = []
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
         for first, last in pairwise(_part_bounds(0, len(t), stretches)):
-            most = PARTS * max((last - first) // LONGEST, 1)
-            parts = min(most, max((last - first) // LEAST, 1))
+            most = PARTS_PER_WINDOW * max((last - first) // PERIODOGRAM_SAMPLES, 1)
+            parts = min(most, max((last - first) // MIN_PART_SAMPLES, 1))
             for a, b in pairwise(_part_bounds(first, last, parts)):
                 turned = 2 * np.pi * near * t[a:b]
                 real, imaginary = (

@@ -17,23 +17,23 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.signal.periodogram import (
-    BESIDE,
-    FAR,
-    LONGEST,
-    NEAR,
+    FLOOR_NEIGHBOURS,
+    FURTHEST_NEIGHBOUR,
+    LINE_DISTANCE_CYCLES,
+    PERIODOGRAM_SAMPLES,
     Spectrum,
     noise_near,
 )
 from fieldcal.diagnosis.signal.pieces import WindowSamples
 from fieldcal.model import thresholds
 
-CYCLES = 2.5
+MIN_CYCLES = 2.5
 """Fewest cycles in a window that make a line."""
 
-HUMP = 2.0
+PEAK_EDGE_RATIO = 2.0
 """Times the floor down to which the power about a peak belongs to it."""
 
-SEARCHED = 16
+SEARCHED_GROUPS = 16
 """Groups of channels in which a recording is searched for a peak, about."""
 
 
@@ -66,8 +66,8 @@ def highest_peak(
     Spectra of one phase throughout come first: tremor is louder, but is no line. Peaks
     close to those in `taken` are ignored.
     """
-    shortest = min(LONGEST, min(map(len, pieces.samples))) / pieces.rate
-    low, reach = max(0.05, CYCLES / shortest), NEAR / shortest
+    shortest = min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples))) / pieces.rate
+    low, reach = max(0.05, MIN_CYCLES / shortest), LINE_DISTANCE_CYCLES / shortest
     one_phase = [s for s in spectra if s.count == 1]
     peak = _significant(one_phase, low, reach, taken)
     windows, rejected = [s for s in spectra if s.count > 1], list[Peak]()
@@ -132,12 +132,12 @@ def _highest_in_spectrum(
     for some in spectrum.channel_groups:
         there = [*taken, *(p for p in rejected if set(p.channels) & set(some))]
         free = _away_from(hz, there, reach)
-        if free.sum() < 4 * BESIDE:
+        if free.sum() < 4 * FLOOR_NEIGHBOURS:
             continue
         total = np.sum([stands[c] for c in some], axis=0)
         at = int(np.argmax(np.where(free, total, 0.0)))
         odds = _log_gamma_tail(float(total[at]), count * len(some))
-        odds += np.log(SEARCHED * len(total))
+        odds += np.log(SEARCHED_GROUPS * len(total))
         if best is None or odds < best[0]:
             peak = _peak_at(hz, total / (count * len(some)), at)
             best = odds, replace(peak, channels=some)
@@ -158,8 +158,8 @@ def _peak_at(hz: Array, power: Array, at: int) -> Peak:
     It reaches as far as the smoothed power stays above the floor: a machine whose speed
     varies makes a broad peak, which is no line.
     """
-    kernel = np.ones(2 * FAR + 1) / (2 * FAR + 1)
-    low = np.flatnonzero(np.convolve(power, kernel, "same") < HUMP)
+    kernel = np.ones(2 * FURTHEST_NEIGHBOUR + 1) / (2 * FURTHEST_NEIGHBOUR + 1)
+    low = np.flatnonzero(np.convolve(power, kernel, "same") < PEAK_EDGE_RATIO)
     below, above = low[low < at], low[low > at]
     first = int(below[-1]) if len(below) else 0
     last = int(above[0]) if len(above) else len(hz) - 1

@@ -27,46 +27,46 @@ from fieldcal.core.samples import Array
 from fieldcal.diagnosis.signal.pieces import Complex, WindowSamples
 from fieldcal.physics.recording import medians
 
-LONGEST = 32_768
+PERIODOGRAM_SAMPLES = 32_768
 """Samples of one periodogram."""
 
-BESIDE = 40
+FLOOR_NEIGHBOURS = 40
 """Neighbours that give the floor, to either side."""
 
-CLOSE, FAR = 5, 12
+NEAREST_NEIGHBOUR, FURTHEST_NEIGHBOUR = 5, 12
 """Nearest and furthest neighbours beyond the taper's reach; they give the slope."""
 
-SURE = 200
+LEVEL_PERIODOGRAMS = 200
 """Periodograms whose mean gives the level of noise, to 7 %."""
 
-SIGMAS = 3.0
+LEVEL_SIGMAS = 3.0
 """Standard deviations above the level of noise from which (1) replaces it."""
 
-STEEP = 4.0
+STEEP_RATIO = 4.0
 """Multiple of the floor above which these neighbours replace it."""
 
-SLOPE = 0.3
+SLOPE_POWER_SHARE = 0.3
 """Part of the power at a frequency that is below it on a slope; beside a line, less."""
 
-BURST, BURSTS = 0.5, 0.01
+SHORT_STEP, SHORT_STEP_SHARE = 0.5, 0.01
 """Time step, in sampling periods, below which a step cannot be the device's own, and
 part of the steps that are so short where times are those of arrival."""
 
-FINER = 4
+GRID_PER_SAMPLE = 4
 """Grid points per sampling period for samples at uneven times: an error of an eighth of
 a period costs 3 % of the power at most below 0.4 of the rate, one of a half a third."""
 
-NEAR = 2.0
+LINE_DISTANCE_CYCLES = 2.0
 """Distance between two lines, in cycles of the shortest window."""
 
-TRIADS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
+CHANNEL_GROUPS = ((0, 1, 2), (3, 4, 5), (0, 1, 2, 3, 4, 5))
 """Channels that are searched together for a line of one phase."""
 
-COHERENT = 1 << 18
+MAX_COHERENT_SAMPLES = 1 << 18
 """Most samples of a recording that is searched for lines of one phase throughout."""
 
 
-GRID = 1 << 20
+MAX_COHERENT_PERIODS = 1 << 20
 """Longest such recording, in sampling periods: over longer pauses no clock keeps the
 phase of a line."""
 
@@ -138,17 +138,20 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
     windows = window_spectrum(pieces)
     out = [windows]
     lasts = pieces.times[-1][-1] - pieces.times[0][0]
-    long = lasts * pieces.rate > GRID or sum(map(len, pieces.samples)) > COHERENT
+    long = (
+        lasts * pieces.rate > MAX_COHERENT_PERIODS
+        or sum(map(len, pieces.samples)) > MAX_COHERENT_SAMPLES
+    )
     if long or any(_in_bursts(t, pieces.rate) for t in pieces.times):
         return out
     frames = [np.broadcast_to(np.eye(3), (len(pieces.samples), 3, 3))]
     if pieces.x.oriented.all():
         frames.append(np.swapaxes(pieces.x.to_device, 1, 2))
-    triads = [some for some in TRIADS if set(some) <= set(windows.channels)]
+    triads = [some for some in CHANNEL_GROUPS if set(some) <= set(windows.channels)]
     # electronics may disturb one output alone, motion of the base disturbs a triad
     groups = [(*windows.channel_groups, *triads), tuple(triads)]
     variance = _neighbour_variance(windows, pieces)
-    sure = 1 + SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
+    sure = 1 + LEVEL_SIGMAS / np.sqrt(max(len(pieces.samples) - 1, 1))
     for frame, channel_groups in zip(frames, groups, strict=False):
         power, tremor, hz = _coherent_power(pieces, frame)
         noise = np.array([np.interp(hz, windows.hz, row) for row in variance])
@@ -160,11 +163,11 @@ def compute_spectra(pieces: WindowSamples) -> list[Spectrum]:
 
 def window_spectrum(pieces: WindowSamples) -> Spectrum:
     """Power summed over windows, channel by channel."""
-    length = min(LONGEST, max(map(len, pieces.samples)))
+    length = min(PERIODOGRAM_SAMPLES, max(map(len, pieces.samples)))
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        parts = max(1, len(samples) // LONGEST)
+        parts = max(1, len(samples) // PERIODOGRAM_SAMPLES)
         for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
             tapered = samples[part].T * taper
@@ -182,9 +185,15 @@ def _neighbour_variance(windows: Spectrum, pieces: WindowSamples) -> Array:
     They lie beyond the reach of a line: that of the taper of the shortest window.
     """
     count, size = windows.count, windows.power.shape[1]
-    cycle = pieces.rate / min(LONGEST, min(map(len, pieces.samples)))
-    close = max(CLOSE, math.ceil(NEAR * cycle / windows.hz[1]))
-    reach = close + max(FAR - CLOSE, close, -(-SURE // (2 * count)))
+    cycle = pieces.rate / min(PERIODOGRAM_SAMPLES, min(map(len, pieces.samples)))
+    close = max(
+        NEAREST_NEIGHBOUR, math.ceil(LINE_DISTANCE_CYCLES * cycle / windows.hz[1])
+    )
+    reach = close + max(
+        FURTHEST_NEIGHBOUR - NEAREST_NEIGHBOUR,
+        close,
+        -(-LEVEL_PERIODOGRAMS // (2 * count)),
+    )
     kernel = np.ones(2 * reach + 1)
     kernel[reach - close : reach + close + 1] = 0.0
     there = np.convolve(np.ones(size), kernel)[reach:-reach]
@@ -253,18 +262,18 @@ def _fourier_sums(values: Array, t: Array, rate: float, n: int) -> Complex:
     the times are those of arrival, samples count as evenly spaced.
     """
     at = (t - t[0]) * rate
-    even = np.ptp(at - np.arange(len(at))) < 0.5 / FINER
+    even = np.ptp(at - np.arange(len(at))) < 0.5 / GRID_PER_SAMPLE
     if len(at) <= n and (even or _in_bursts(t, rate)):
         return np.fft.rfft(values, n)
-    place = np.round(at * FINER).astype(np.intp) % (n * FINER)
-    grid = [np.bincount(place, row, n * FINER) for row in values]
+    place = np.round(at * GRID_PER_SAMPLE).astype(np.intp) % (n * GRID_PER_SAMPLE)
+    grid = [np.bincount(place, row, n * GRID_PER_SAMPLE) for row in values]
     whole: Complex = np.fft.rfft(np.array(grid))
     return whole[:, : n // 2 + 1]
 
 
 def _in_bursts(t: Array, rate: float) -> bool:
     """Whether times are those of arrival: many steps are shorter than a device's."""
-    return bool(np.mean(np.diff(t) * rate < BURST) > BURSTS)
+    return bool(np.mean(np.diff(t) * rate < SHORT_STEP) > SHORT_STEP_SHARE)
 
 
 def _squared_magnitude(spectrum: Complex) -> Array:
@@ -274,7 +283,7 @@ def _squared_magnitude(spectrum: Complex) -> Array:
 
 def _median_floor(power: Array) -> Array:
     """Running median (m,) of the power, interpolated between stretches."""
-    parts = max(1, len(power) // (2 * BESIDE))
+    parts = max(1, len(power) // (2 * FLOOR_NEIGHBOURS))
     each = len(power) // parts
     level = medians(power[: parts * each].reshape(parts, each))
     middle = (np.arange(parts) + 0.5) * each
@@ -290,12 +299,19 @@ def _floor_on_slope(power: Array, floor: Array) -> Array:
     """
     n = len(power)
     # sums up to and including each; beyond the ends there is nothing to add
-    totals = np.pad(np.cumsum(power), (FAR + 1, FAR + 1), "edge")
-    totals[: FAR + 1] = 0.0
-    counts = np.pad(np.arange(n + 1), (FAR, FAR + 1), "edge")
+    totals = np.pad(
+        np.cumsum(power), (FURTHEST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1), "edge"
+    )
+    totals[: FURTHEST_NEIGHBOUR + 1] = 0.0
+    counts = np.pad(
+        np.arange(n + 1), (FURTHEST_NEIGHBOUR, FURTHEST_NEIGHBOUR + 1), "edge"
+    )
     sides = []
-    for low, high in ((-FAR, -CLOSE), (CLOSE + 1, FAR + 1)):
-        first, last = FAR + low, FAR + high
+    for low, high in (
+        (-FURTHEST_NEIGHBOUR, -NEAREST_NEIGHBOUR),
+        (NEAREST_NEIGHBOUR + 1, FURTHEST_NEIGHBOUR + 1),
+    ):
+        first, last = FURTHEST_NEIGHBOUR + low, FURTHEST_NEIGHBOUR + high
         count = counts[last : last + n] - counts[first : first + n]
         mean = (totals[last : last + n] - totals[first : first + n]) / np.maximum(
             count, 1
@@ -305,6 +321,6 @@ def _floor_on_slope(power: Array, floor: Array) -> Array:
     # at either end of the spectrum only one side has neighbours
     beside = np.where(np.isfinite(above), np.maximum(below, above), below)
     beside = np.where(np.isfinite(below), beside, above)
-    falls = (beside > STEEP * floor) & (below > SLOPE * power)
+    falls = (beside > STEEP_RATIO * floor) & (below > SLOPE_POWER_SHARE * power)
     level: Array = np.where(falls, np.minimum(beside, power), floor)
     return level

@@ -17,13 +17,13 @@ from fieldcal.physics.experience import Experience
 
 Complex = NDArray[np.complexfloating]
 
-AT_ONCE = 1 << 16
+SAMPLES_AT_ONCE = 1 << 16
 """Samples of which a line is subtracted at once."""
 
-ROUNDED = 1e-12
+ROUNDING_ERROR = 1e-12
 """Relative rounding error that removing a mean and a slope leaves of a constant."""
 
-SHORTEST = 64
+MIN_WINDOW_SAMPLES = 64
 """Fewest samples of a window that is searched for lines."""
 
 
@@ -73,7 +73,7 @@ def long_windows(source: RowSource, rows: Rows) -> list[tuple[int, int, int]]:
     return [
         (first[p], int(a), int(b))
         for p, (a, b) in bounds
-        if b - a >= SHORTEST and p in first
+        if b - a >= MIN_WINDOW_SAMPLES and p in first
     ]
 
 
@@ -130,7 +130,7 @@ def _detrended(
         slope = (s @ column) / max(float((s * s) @ known), 1e-12)
         column -= slope * s
         column *= known
-        rounding = ROUNDED * np.abs(values[known, c]).max(initial=0.0)
+        rounding = ROUNDING_ERROR * np.abs(values[known, c]).max(initial=0.0)
         if np.abs(column).max(initial=0.0) > rounding:  # else it never changes
             out[:, c] = column
     return out
@@ -151,6 +151,6 @@ def subtract_line(values: Array, t: Array, hz: float, amplitude: Complex) -> Non
 
 
 def chunks(first: int, last: int) -> Iterator[slice]:
-    """Slices of at most `AT_ONCE` samples, to limit memory."""
-    for start in range(first, last, AT_ONCE):
-        yield slice(start, min(start + AT_ONCE, last))
+    """Slices of at most `SAMPLES_AT_ONCE` samples, to limit memory."""
+    for start in range(first, last, SAMPLES_AT_ONCE):
+        yield slice(start, min(start + SAMPLES_AT_ONCE, last))

@@ -42,7 +42,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.physics.effect import Line
 
-MOST, LOOKS = 4, 3
+MAX_LINES, MAX_REJECTED_PEAKS = 4, 3
 """Most lines, and most peaks that may turn out to be no line."""
 
 
@@ -54,7 +54,11 @@ def find_lines(
     found: list[tuple[SpectralLine, LineRemainder]] = []
     looked: list[Peak] = []
     spectra = compute_spectra(pieces) if pieces.samples else []
-    while spectra and len(found) < MOST and len(looked) < LOOKS + len(found):
+    while (
+        spectra
+        and len(found) < MAX_LINES
+        and len(looked) < MAX_REJECTED_PEAKS + len(found)
+    ):
         peak = highest_peak(pieces, spectra, looked)
         if peak is None:
             break

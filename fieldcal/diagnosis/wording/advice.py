@@ -15,11 +15,11 @@ from fieldcal.diagnosis.wording.deciding_position import (
     deciding_position,
     ladder_extent,
 )
-from fieldcal.diagnosis.wording.paragraph import MOST_PLACES, angle_errors_text
+from fieldcal.diagnosis.wording.paragraph import MAX_LISTED_PLACES, angle_errors_text
 from fieldcal.effects import catalogue
 from fieldcal.physics.effect import Chain, Scatter
 
-FEWEST_POSITIONS = 3
+MIN_HELD_OUT_POSITIONS = 3
 """Fewest positions of which one can be held out."""
 
 
@@ -59,7 +59,7 @@ def advice(
     if any(isinstance(catalogue()[f.id], Scatter) for f in effects):
         yield "Hold more positions, or hold them longer: random errors average out."
     held = len(explanation.dictionary.window_positions)
-    if held < FEWEST_POSITIONS:
+    if held < MIN_HELD_OUT_POSITIONS:
         yield f"Record more than {held} position{'s' * (held > 1)}: so few show little."
 
 
@@ -74,7 +74,9 @@ def _cure(name: str, mismatch: Sequence[Mismatch]) -> str:
     }
     if not isinstance(effect, Chain) or not places:
         return f"{name}: {effect.cure}"
-    return f"{name} at {list_positions(sorted(places), MOST_PLACES)}: {effect.cure}"
+    return (
+        f"{name} at {list_positions(sorted(places), MAX_LISTED_PLACES)}: {effect.cure}"
+    )
 
 
 def _how_to_decide(

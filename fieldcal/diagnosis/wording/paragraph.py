@@ -16,10 +16,10 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Scatter
 
-MOST_EACH = 3
+MAX_LISTED_OCCURRENCES = 3
 """Most occurrences of an effect that are listed one by one."""
 
-MOST_PLACES = 6
+MAX_LISTED_PLACES = 6
 """Most places that a paragraph lists, and positions that a sentence lists."""
 
 
@@ -112,7 +112,7 @@ def _listed(effects: Sequence[FoundEffect]) -> str:
     often = Counter(f.id for f in effects)
     names = [
         effect_with_parameters(f)
-        if often[f.id] <= MOST_EACH
+        if often[f.id] <= MAX_LISTED_OCCURRENCES
         else f"{f.id} ({often[f.id]} times)"
         for f in effects
     ]
@@ -123,16 +123,15 @@ def _places(mismatch: Sequence[Mismatch]) -> str:
     """Where they differ, the largest difference first."""
     clearest = sorted(mismatch, key=lambda m: -m.sigma)
     places = list(dict.fromkeys(f"{m.channel}, {_where(m)}" for m in clearest))
-    more = len(places) - MOST_PLACES
-    return "; ".join(places[:MOST_PLACES]) + (
+    more = len(places) - MAX_LISTED_PLACES
+    return "; ".join(places[:MAX_LISTED_PLACES]) + (
         f"; {more} more places" if more > 0 else ""
     )
 
 
 def _where(m: Mismatch) -> str:
-    return (
-        f"{list_positions(m.positions, MOST_PLACES)}, {m.from_s:.0f} to {m.to_s:.0f} s"
-    )
+    places = list_positions(m.positions, MAX_LISTED_PLACES)
+    return f"{places}, {m.from_s:.0f} to {m.to_s:.0f} s"
 
 
 def _is_random(found: FoundEffect) -> bool:

@@ -91,7 +91,7 @@ class ColumnTable:
         """
         return self.add(Course(name, lambda v: of(v.x), width, timed), 6 * width)
 
-    def cosine_columns(self, channel: int, count: int = smooth.WAVES) -> Index:
+    def cosine_columns(self, channel: int, count: int = smooth.MAX_COSINES) -> Index:
         """Columns of the first cosines in time of a channel, (count,)."""
         at: Index = self.waves + channel * self.span.count + np.arange(count)
         return at

@@ -27,10 +27,10 @@ from fieldcal.physics.effect import (
 )
 from fieldcal.physics.experience import Experience
 
-STEP = 1e-3
+DERIVATIVE_STEP = 1e-3
 """Step of numerical derivatives, in typical sizes."""
 
-SMALL = 1e-5
+ROTATION_STEP_RAD = 1e-5
 """Step of numerical derivatives by rotations, rad."""
 
 CentralDifference = tuple[Experience, Experience, float]
@@ -120,7 +120,7 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
     def sides(plain: Experience, state: State) -> Iterator[CentralDifference]:
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
-            step[j] = STEP * param.typical
+            step[j] = DERIVATIVE_STEP * param.typical
             up, down = (
                 _with_changed_parameters(plain, state, effect, s) for s in (step, -step)
             )
@@ -130,7 +130,7 @@ def effect_basis(effect: Effect, shape: Mapping[str, float], origin: int) -> Gen
         columns = []
         for j, param in enumerate(effect.params):
             step = np.zeros(len(effect.params))
-            step[j] = STEP * param.typical
+            step[j] = DERIVATIVE_STEP * param.typical
             ends = [effect.change(view.x, s) for s in (step, -step)]  # type: ignore[attr-defined]
             columns.append(_difference(ends[0], ends[1], float(step[j]), view.state))
         return np.stack(columns, axis=2)
@@ -307,10 +307,10 @@ def attitude_sides(plain: Experience, state: State) -> Iterator[CentralDifferenc
     known = state.attitude
     if not known.any():
         known = np.zeros((len(state.small_rotation), 3))
-    for off in SMALL * np.eye(3):
+    for off in ROTATION_STEP_RAD * np.eye(3):
         ends = (replace(state, attitude=known + s * off) for s in (1.0, -1.0))
         up, down = (one.experienced(plain) for one in ends)
-        yield up, down, SMALL
+        yield up, down, ROTATION_STEP_RAD
 
 
 def small_rotation_sides(
@@ -318,10 +318,10 @@ def small_rotation_sides(
 ) -> Iterator[CentralDifference]:
     """Inputs for two small rotations of every position, rad."""
     small = state.small_rotation
-    for off in SMALL * np.eye(2):
+    for off in ROTATION_STEP_RAD * np.eye(2):
         ends = (replace(state, small_rotation=small + s * off) for s in (1.0, -1.0))
         up, down = (one.experienced(plain) for one in ends)
-        yield up, down, SMALL
+        yield up, down, ROTATION_STEP_RAD
 
 
 def small_rotation(view: RowView) -> Array:

@@ -13,7 +13,7 @@ from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General
 from fieldcal.model.state import State
 from fieldcal.physics.experience import Experience
-from fieldcal.physics.joint_turns import SAME
+from fieldcal.physics.joint_turns import ANGLE_TOLERANCE_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,9 @@ def detents(x: Experience, oriented: Sequence[int] | Index) -> Iterator[Detent]:
         first = [float(angle[int(np.argmax(x.position == p))]) for p in oriented]
         for value in sorted(set(np.round(first, 9))):
             pairs = zip(oriented, first, strict=True)
-            same = tuple(int(p) for p, a in pairs if abs(a - value) < SAME)
+            same = tuple(
+                int(p) for p, a in pairs if abs(a - value) < ANGLE_TOLERANCE_RAD
+            )
             yield Detent(joint, float(value), same)
 
 
@@ -59,10 +61,10 @@ def detent_columns(table: ColumnTable, some: Sequence[Detent]) -> Index:
         """Central differences at both ends of a turn."""
         small = state.small_rotation
         for column in shared.T:
-            off = columns.SMALL * column.reshape(small.shape)
+            off = columns.ROTATION_STEP_RAD * column.reshape(small.shape)
             ends = (replace(state, small_rotation=small + s * off) for s in (1, -1))
             up, down = (one.experienced(plain) for one in ends)
-            yield up, down, columns.SMALL
+            yield up, down, columns.ROTATION_STEP_RAD
 
     basis = General(
         "detents", lambda v: columns.small_rotation(v) @ shared, sides=sides

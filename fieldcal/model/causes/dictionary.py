@@ -241,9 +241,9 @@ class Dictionary(ColumnTable):
             basis = General("earth aside", columns.earth_rate_direction)
             held = np.unique(self.x.position[shown])
             own = (2 * held[:, None] + [0, 1]).ravel()
-            wide = np.full(len(own), 1 / priors.FREE)
+            wide = np.full(len(own), 1 / priors.FREE_SIZE)
             own = self.add(basis, 2 * self.position_count) + own
-            yield Group("earth aside", "gyr", own, wide, fixed_size=priors.FREE)
+            yield Group("earth aside", "gyr", own, wide, fixed_size=priors.FREE_SIZE)
         if self.x.earth_unseen.any():
             at = self.add(General("earth anyhow", columns.earth_rate_unoriented), 4)
             size = EARTH_RATE * np.array([3**-0.5, 3**-0.5, 3**-0.5, 1.0])
@@ -275,7 +275,7 @@ class Dictionary(ColumnTable):
         if len(self.window_positions) >= MIN_WINDOWS:
             typical = np.repeat([priors.INSTABILITY_ACC, priors.INSTABILITY_GYR], 3)
             self.typical_instability[:6] = typical * self.unit * self.used.any(axis=0)
-            self.typical_instability[CLOSURE] = priors.CLOSURE * self.turns
+            self.typical_instability[CLOSURE] = priors.CLOSURE_RAD * self.turns
 
     def add_shape_values(
         self, cause: Cause, group: Group, values: Sequence[float]

@@ -26,10 +26,10 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
 
-FEWEST, MOST = 40, 80
+MIN_TERMS, MAX_TERMS = 40, 80
 """Terms of a series, half as many as there are rows."""
 
-UNKNOWN = 1e3
+MISSING_ROW_NOISE = 1e3
 """Noise assumed for a missing row, as a multiple of the noisiest row's."""
 
 
@@ -62,7 +62,7 @@ class FlickerSeries:
         variance, along = np.linalg.eigh(whole)
         order = np.argsort(variance)[:0:-1]  # one is the mean's
         variance, along = np.maximum(variance[order], 0.0), along[:, order]
-        k, even = int(np.clip(len(t) // 2, FEWEST, MOST)), np.sqrt(len(t) / 2)
+        k, even = int(np.clip(len(t) // 2, MIN_TERMS, MAX_TERMS)), np.sqrt(len(t) / 2)
         return cls(
             t, along[:, :k] * even, np.sqrt(variance[:k]) / even, along[:, k:],
             variance[k:],
@@ -87,7 +87,7 @@ class FlickerSeries:
         for c in np.flatnonzero(known.any(axis=0) & (len(self.variances) > 0)):
             there = known[:, c]
             off = np.where(there, y[:, c] - y[there, c].mean(), 0.0)
-            wide = UNKNOWN * float(sd[there, c].max())
+            wide = MISSING_ROW_NOISE * float(sd[there, c].max())
             size[c] = self._size(off, np.where(there, sd[:, c], wide), typical[c])
         return np.outer(unit, (size * typical) ** 2)
 

@@ -56,15 +56,13 @@ def leaning(table: ColumnTable) -> Group | None:
         return out
 
     start = table.add(General("leaning", columns), int(first[-1]))
-    size = priors.LEANS_RAD / np.concatenate(
-        [[*np.arange(1, n + 1)] * 2 for n in waves]
-    )
+    size = priors.LEAN_RAD / np.concatenate([[*np.arange(1, n + 1)] * 2 for n in waves])
     return Group("leaning", "", start + np.arange(first[-1]), size, random=True)
 
 
 def _share(leans: Index) -> float:
     """Part of the cosines that is used, so that their number stays limited."""
-    return min(1.0, priors.MOST_WAVES / int(leans.sum()))
+    return min(1.0, priors.MAX_COSINES / int(leans.sum()))
 
 
 def _ends(table: ColumnTable, p: int) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 from fieldcal.model.causes.columns import General, RowView
 
-FEW = 3
+MIN_TURNS = 3
 """Ways of which one may be told from the others."""
 
 
@@ -34,7 +34,7 @@ def lost_ways(table: ColumnTable) -> Iterator[Cause]:
     last = np.array([(x.t - x.lasts / 2)[x.position == p].min() for p in held[1:]])
     long = last - first
     known = np.flatnonzero(long > 0)
-    if len(known) < FEW:
+    if len(known) < MIN_TURNS:
         return
 
     def columns(view: RowView) -> Array:
@@ -49,9 +49,9 @@ def lost_ways(table: ColumnTable) -> Iterator[Cause]:
         return out
 
     at = table.add(General("way", columns), 3 * len(known))
-    chance = priors.LOST_WAY / len(known)
+    chance = priors.LOST_TURN_CHANCE / len(known)
     for i, k in enumerate(known):
-        size = priors.LOST_RAD / long[k] * np.abs(table.unit[3:])
+        size = priors.LOST_TURN_RAD / long[k] * np.abs(table.unit[3:])
         ends = (int(held[k]), int(held[k + 1]))
         own = at + 3 * i + np.arange(3)
         group = Group(f"way {k}", "gyr", own, size, moved_positions=ends, random=True)

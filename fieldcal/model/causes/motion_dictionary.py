@@ -81,7 +81,7 @@ class MotionDictionary(Dictionary):
     def _calibration(self) -> Iterator[Group]:
         """Groups of bias, scale factor, clocks, rotation and missing channels."""
         yield from super()._calibration()
-        place, free = self.current, priors.FREE
+        place, free = self.current, priors.FREE_SIZE
         self.missing_channels = lost = place.rows.reference.missing_channels
 
         def clock(view: RowView) -> Array:

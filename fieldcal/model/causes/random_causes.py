@@ -32,11 +32,13 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
             yield from _causes_of_scatter(table, effect, oriented)
     if len(table.window_positions) >= MIN_WINDOWS:  # of fewer, it is always there
         for group in _cosine_flicker(table):
-            yield Cause(group.cause, group.part, priors.FLICKERS, (group,), "noise")
+            yield Cause(
+                group.cause, group.part, priors.FLICKER_CHANCE, (group,), "noise"
+            )
     if (leans := leaning(table)) is not None:
-        yield Cause(leans.cause, leans.part, priors.LEANS, (leans,), "noise")
+        yield Cause(leans.cause, leans.part, priors.LEAN_CHANCE, (leans,), "noise")
     if (sinks := sinking(table)) is not None:
-        yield Cause(sinks.cause, sinks.part, priors.SINKS, (sinks,), "noise")
+        yield Cause(sinks.cause, sinks.part, priors.SINK_CHANCE, (sinks,), "noise")
     if table.turns:
         yield from lost_ways(table)
     if len(table.window_positions) > 3 and len(oriented):
@@ -61,7 +63,7 @@ def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     ]
     if not several:
         return
-    wide = np.full(1, np.deg2rad(priors.REPEATED_DEG))
+    wide = np.full(1, np.deg2rad(priors.REPEATED_MISTAKE_DEG))
     at = detent_columns(table, several)
     groups = tuple(
         Group("repeated_angle", "", at[i : i + 1], wide, params=(one.joint,),
@@ -95,7 +97,9 @@ def _causes_of_scatter(
         if some:
             yield _walks(table, effect, part, [some], 1.0)
             each = [[c] for c in some]
-            yield _walks(table, effect, f"{part}, one axis", each, priors.ALONE)
+            yield _walks(
+                table, effect, f"{part}, one axis", each, priors.SINGLE_AXIS_SHARE
+            )
 
 
 def _walks(

@@ -27,10 +27,10 @@ from fieldcal.model.turns.turn import select_rows
 
 NAME = "sinking"
 
-TERMS = 4
+POLYNOMIALS = 4
 """Polynomials of each angle."""
 
-FEWEST = 4
+MIN_POSITIONS = 4
 """Positions of known angles that tell a base that turns from biases."""
 
 
@@ -38,13 +38,13 @@ def sinking(table: ColumnTable) -> Group | None:
     """Group of all positions with known angles; None if there are too few."""
     x = table.x
     known = x.oriented & (x.position >= 0)
-    if len(np.unique(x.position[known])) < FEWEST:
+    if len(np.unique(x.position[known])) < MIN_POSITIONS:
         return None
     tilt = effect_basis(catalogue()["base_tilt"], {}, 0)
     begin, end = float(x.t[known].min()), float(x.t[known].max())
 
     def columns(view: RowView) -> Array:
-        out = np.zeros((len(view.x), 6, 2 * TERMS))
+        out = np.zeros((len(view.x), 6, 2 * POLYNOMIALS))
         rows = np.flatnonzero(view.nominal.oriented & (view.nominal.position >= 0))
         if not len(rows):
             return out
@@ -56,11 +56,11 @@ def sinking(table: ColumnTable) -> Group | None:
         )  # fmt: skip
         by = tilt.evaluate(some)  # of one degree
         u = 2 * (view.x.t[rows] - begin) / (end - begin) - 1
-        course = legvander(u, TERMS)[:, 1:]
+        course = legvander(u, POLYNOMIALS)[:, 1:]
         out[rows] = (by[..., None] * course[:, None, None]).reshape(len(rows), 6, -1)
         return out
 
-    start = table.add(General(NAME, columns), 2 * TERMS)
-    fading = priors.SINKS_FADES ** np.arange(TERMS)
-    size = np.tile(np.rad2deg(priors.SINKS_RAD) * fading, 2)
+    start = table.add(General(NAME, columns), 2 * POLYNOMIALS)
+    fading = priors.SINK_FADING ** np.arange(POLYNOMIALS)
+    size = np.tile(np.rad2deg(priors.SINK_RAD) * fading, 2)
     return Group(NAME, "", start + np.arange(len(size)), size, random=True)

@@ -20,11 +20,11 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
 
-WAVES = 40
-SPANS = (1.5, 4.0, 9.0, 20.0)
+MAX_COSINES = 40
+HALF_WAVES = (1.5, 4.0, 9.0, 20.0)
 """Half waves of a smooth course over the session, from slow to fast."""
 
-FAINT = 1e-3
+MIN_COSINE_SIZE = 1e-3
 """Relative size below which a cosine is omitted from a course."""
 
 HARMONICS = 4
@@ -42,7 +42,7 @@ class CourseSpan:
 
     """
 
-    def __init__(self, t: Array, count: int = WAVES) -> None:
+    def __init__(self, t: Array, count: int = MAX_COSINES) -> None:
         self.start, self.length = float(t[0]), max(float(np.ptp(t)), 1e-9)
         self.count = count
 
@@ -72,9 +72,9 @@ class CourseSpan:
 
 def smooth_course_sizes(span: float) -> Array:
     """Standard deviation of each cosine of a course of `span` half waves, (k,)."""
-    k = np.arange(1, WAVES + 1)
+    k = np.arange(1, MAX_COSINES + 1)
     sizes: Array = np.exp(-0.5 * (k / span) ** 2)
-    sizes = sizes[sizes > FAINT]
+    sizes = sizes[sizes > MIN_COSINE_SIZE]
     even: Array = sizes / np.sqrt((sizes**2).sum() / 2)
     return even
 

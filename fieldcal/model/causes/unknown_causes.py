@@ -12,7 +12,7 @@ from fieldcal.model.causes import smooth
 from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS, Cause, Group
 from fieldcal.model.causes.column_table import ColumnTable
 
-FORCES = 3
+ACC_CHANNELS = 3
 """Number of accelerometer channels."""
 
 
@@ -23,7 +23,7 @@ def unknown_causes(table: ColumnTable) -> Iterator[Cause]:
         if _has_times(table):
             groups = [
                 _smooth_course(table, CHANNELS[c], [c], sizes, span)
-                for span in smooth.SPANS
+                for span in smooth.HALF_WAVES
             ]
             yield _cause("time", CHANNELS[c], groups)
         at = table.window_columns(c)
@@ -62,7 +62,7 @@ def _triad_courses(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
         if len(some) < 2:
             continue
         groups = [
-            _smooth_course(table, part, some, sizes, span) for span in smooth.SPANS
+            _smooth_course(table, part, some, sizes, span) for span in smooth.HALF_WAVES
         ]
         yield _cause("time", part, groups)
 
@@ -87,7 +87,7 @@ def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
         for c in table.observed.tolist():
             at = first + c * width + np.arange(width)
             parts = [at]
-            if covariate == "force and time" and c < FORCES:
+            if covariate == "force and time" and c < ACC_CHANNELS:
                 parts.append(
                     at[smooth.force_time_columns(c)]
                 )  # a scale factor that changes
@@ -97,7 +97,7 @@ def _covariate_causes(table: ColumnTable, sizes: Array) -> Iterator[Cause]:
 
 
 def _cause(name: str, part: str, groups: Sequence[Group]) -> Cause:
-    return Cause(name, part, priors.UNKNOWN, tuple(groups), "unknown")
+    return Cause(name, part, priors.UNKNOWN_FUNCTION_CHANCE, tuple(groups), "unknown")
 
 
 def _covers(table: ColumnTable, covariate: str) -> bool:

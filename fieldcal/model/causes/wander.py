@@ -41,10 +41,10 @@ from fieldcal.model.causes.wander_sizes import wander_sizes
 from fieldcal.model.rows.lean_modes import lean_modes
 from fieldcal.model.rows.reduce import Rows
 
-MORE = 2.0
+COSINES_PER_VISIBLE = 2.0
 """Number of cosines used, in those that each exceed the noise of the rows."""
 
-NEAR = 1e-12
+MIN_PHASE = 1e-12
 """Least phase between two means; flicker diverges at zero."""
 
 
@@ -85,9 +85,9 @@ class Wander:
         information = np.where(rows.used, 1 / rows.sd**2, 0.0).sum(axis=0) / 2
         walks = speed * np.sqrt(2 * length * information) / np.pi  # (5)
         resolved = np.fmax(walks, flicker**2 * information)  # (5)
-        modes = np.clip(MORE * resolved, smooth.WAVES, priors.MOST_WAVES).astype(
-            np.intp
-        )
+        modes = np.clip(
+            COSINES_PER_VISIBLE * resolved, smooth.MAX_COSINES, priors.MAX_COSINES
+        ).astype(np.intp)
         leans = lean_modes(rows)
         out = cls(speed, flicker, share, modes, length, leans=leans)
         if not len(np.unique(rows.x.position)) < MIN_WINDOWS < len(rows.x):
@@ -104,7 +104,7 @@ class Wander:
     def none(cls) -> Wander:
         """No random walk and no flicker."""
         nothing = np.zeros(6)
-        return cls(nothing, nothing, nothing, np.full(6, smooth.WAVES), 0.0)
+        return cls(nothing, nothing, nothing, np.full(6, smooth.MAX_COSINES), 0.0)
 
     def residual_variance_of_rows(self, length: Array, channel: int) -> Array:
         """Variance of all rows that neither cosines nor series describe, (n,)."""
@@ -136,7 +136,7 @@ class Wander:
             left = np.pi**2 / 6 - np.pi * y / 2 + y**2 / 4 - waves @ (1 / k**2)
             out[c] = q**2 * self.length / np.pi**2 * left  # (3)
             if a:
-                every = -np.log(2 * np.sin(np.clip(y, NEAR, np.pi) / 2))
+                every = -np.log(2 * np.sin(np.clip(y, MIN_PHASE, np.pi) / 2))
                 out[c] += a**2 / 2 * (every - waves @ (1 / k))  # (4)
             out[c].flat[diagonal] = alone
         return out
@@ -158,7 +158,7 @@ def _left_of_walk(whole: float, length: Array, count: int) -> Array:
 
 def _left_of_flicker(whole: float, length: Array, count: int) -> Array:
     """Variance that cosines leave of means of flicker with a = 1, (n,)."""
-    z, k = np.maximum(np.pi * length / whole, NEAR), np.arange(1, count + 1)
+    z, k = np.maximum(np.pi * length / whole, MIN_PHASE), np.arange(1, count + 1)
     taken = _means(z, k) ** 2 @ (1 / k)
     out: Array = np.maximum(1.5 - np.log(z) + z**2 / 144 - taken, 0.0) / 2  # (2)
     return out

@@ -34,26 +34,26 @@ from fieldcal.model.causes.cause import MIN_WINDOWS, TRIADS
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.physics.effect import Scatter
 
-CHI2_MEDIAN, SCATTERS = 0.4549, 2.7
+CHI2_MEDIAN, MEDIAN_LOG_SCATTER = 0.4549, 2.7
 """Of chi squared with one degree of freedom: median; scatter of the median's ln."""
 
-FINER = 4
+VALUES_PER_SIZE = 4
 """Values of v for each value of `priors.SIZES`."""
 
-SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], FINER * 32 + 1)
+SIZES: Array = np.geomspace(priors.SIZES[0], priors.SIZES[-1], VALUES_PER_SIZE * 32 + 1)
 
 DENSITY: Array = (
-    np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / FINER
+    np.interp(np.log(SIZES), np.log(priors.SIZES), priors.density()) / VALUES_PER_SIZE
 )
 """Probability of each."""
 
-LAGS = (1, 3, 9)
+DIFFERENCE_LAGS = (1, 3, 9)
 """Distances of the three means of a difference, in rows."""
 
-FEWEST = 8
+MIN_DIFFERENCES = 8
 """Least number of differences from which a size is estimated."""
 
-TINY = 1e-12
+MIN_RATIO = 1e-12
 """Of ratios, where a channel repeats one value."""
 
 
@@ -78,8 +78,8 @@ class Differences(NamedTuple):
     def scores(self, grown: Array, squares: Array) -> Array:
         """Log likelihood of squared sizes (v,); `grown` (n,) is variance at size 1."""
         known = self.squares / (self.white + np.multiply.outer(squares, grown))
-        ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, TINY)
-        out: Array = -self.alone / 2 * (np.log(ratio) / SCATTERS) ** 2
+        ratio = np.maximum(np.median(known, axis=1) / CHI2_MEDIAN, MIN_RATIO)
+        out: Array = -self.alone / 2 * (np.log(ratio) / MEDIAN_LOG_SCATTER) ** 2
         return out
 
 
@@ -97,15 +97,18 @@ def wander_sizes(rows: Rows, unit: Array) -> tuple[Array, Array, Array]:
     few = len(np.unique(rows.x.position)) < MIN_WINDOWS
     for _, triad in TRIADS:
         at = list(triad)
-        seen = [[d for lag in LAGS for d in _differences(rows, c, lag)] for c in at]
-        by = WanderHypotheses(walk[at] * unit[at], chance, priors.ALONE)
+        seen = [
+            [d for lag in DIFFERENCE_LAGS for d in _differences(rows, c, lag)]
+            for c in at
+        ]
+        by = WanderHypotheses(walk[at] * unit[at], chance, priors.SINGLE_AXIS_SHARE)
         out[0, at], evidence[0, at] = by.sizes(
             [[(d, d.walks) for d in some] for some in seen]
         )
         if few:
             evidence[1, at] = -np.inf
             continue
-        by = WanderHypotheses(flicker[at] * unit[at], priors.FLICKERS, 0.0)
+        by = WanderHypotheses(flicker[at] * unit[at], priors.FLICKER_CHANCE, 0.0)
         out[1, at], evidence[1, at] = by.sizes(
             [[(d, d.flickers) for d in some] for some in seen]
         )
@@ -168,7 +171,7 @@ def _differences(rows: Rows, c: int, lag: int) -> Iterator[Differences]:
     y, sd, t = rows.y[:, c], rows.sd[:, c], rows.x.t
     known = rows.used[:, c]
     at = at[known[at] & known[at + lag] & known[at + 2 * lag]]
-    if len(at) < FEWEST:
+    if len(at) < MIN_DIFFERENCES:
         return
     length, tau = rows.length[at + lag], (t[at + 2 * lag] - t[at]) / 2
     x = np.maximum(tau / length, 1.0)

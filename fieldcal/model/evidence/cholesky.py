@@ -6,7 +6,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-SMALL = 64
+UNDIVIDED_SIZE = 64
 """Largest matrix that is inverted without division into halves."""
 
 
@@ -38,7 +38,7 @@ def triangular_inverse(root: Array) -> Array:
     np.True_
     """
     width = root.shape[-1]
-    if width <= SMALL:
+    if width <= UNDIVIDED_SIZE:
         out: Array = np.linalg.inv(root)
         return out
     k = width // 2

@@ -34,7 +34,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.priors import SIZES
 
-ROUNDED = 1e-9
+MIN_EIGENVALUE = 1e-9
 """Relative size of an eigenvalue below which it is a rounding error."""
 
 
@@ -305,7 +305,7 @@ def evidence_gains(inner: Array, rhs: Array, own: Array | float) -> Array:
     else:
         strength, axes = np.linalg.eigh(inner)
         power = (np.swapaxes(axes, -1, -2) @ rhs[..., None])[..., 0] ** 2
-    seen = strength > ROUNDED * np.maximum(np.asarray(own)[..., None], 1e-300)
+    seen = strength > MIN_EIGENVALUE * np.maximum(np.asarray(own)[..., None], 1e-300)
     strength, power = np.where(seen, strength, 0.0), np.where(seen, power, 0.0)
     return gains_from_eigenvalues(strength, power)
 

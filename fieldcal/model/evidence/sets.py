@@ -60,7 +60,7 @@ def log_chances(cause: Cause, there: Iterable[Member]) -> Array:
     """
     share = np.array(np.log(cause.chance / len(cause.variants)))
     if cause.expected:
-        share = _with_other_odds(cause, share, cause.expected, priors.RESTARTED)
+        share = _with_other_odds(cause, share, cause.expected, priors.RESTART_CHANCE)
     if cause.kind != "effect":
         return share
     there = list(there)
@@ -69,11 +69,11 @@ def log_chances(cause: Cause, there: Iterable[Member]) -> Array:
     if at_once:
         off = any(g in other.expected for other, g in same)
         both = cause.expected & at_once if off else frozenset[Group]()
-        odds = 1 / priors.BOTH_RESTART if both else priors.AGAIN
+        odds = 1 / priors.BOTH_RESTART_ODDS if both else priors.COMPANION_CHANCE
         share = _with_other_odds(cause, share, at_once - both, odds)
-        return _with_other_odds(cause, share, both, priors.BOTH_RESTART)
+        return _with_other_odds(cause, share, both, priors.BOTH_RESTART_ODDS)
     if same or (cause.usual and any(other.usual for other, _ in there)):
-        share = np.array(np.log(priors.AGAIN / len(cause.variants)))
+        share = np.array(np.log(priors.COMPANION_CHANCE / len(cause.variants)))
     return share
 
 

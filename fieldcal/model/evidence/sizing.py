@@ -23,25 +23,25 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, gains_from_eigenvalues
 
 LOG_DENSITY = np.log(priors.density())
-INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.STEEP))
+INSTABILITY_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
 """Log prior of the sizes of instabilities."""
 
 UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
 """Index of v = 1."""
 
-STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
+LOG_SIZE_STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
 """Step of ln v between neighbouring sizes."""
 
-FINER = 129
+REFINED_SIZES = 129
 """Number of sizes that are tried between the neighbours of a size."""
 
-PRIOR_INFO = 0.1
+MIN_SIZE_INFORMATION = 0.1
 """Least information on ln v."""
 
-ROUNDS = 5
+MAX_ROUNDS = 5
 """Largest number of passes over all sizes."""
 
-LEAST = 1e-14
+MIN_VARIANCE_RATIO = 1e-14
 """Least ratio of posterior to prior variance; smaller ones are rounding errors."""
 
 TRIADS = ((0, 1, 2), (3, 4, 5), (6,))
@@ -84,7 +84,7 @@ def instability_log_prior(
 def triad_log_prior(some: Array, density: Array = INSTABILITY_LOG_DENSITY) -> Array:
     """Log prior of the instabilities (..., n) of the axes of one triad, (...)."""
     middle = some.sum(axis=-1) / some.shape[-1]
-    apart = (some - middle[..., None]) * (STEP / priors.UNLIKE)
+    apart = (some - middle[..., None]) * (LOG_SIZE_STEP / priors.AXES_LOG_SPREAD)
     likely = np.interp(middle, np.arange(len(density)), density)
     out: Array = likely - 0.5 * (apart * apart).sum(axis=-1)
     return out
@@ -98,7 +98,7 @@ def gain_terms(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, A
     wide, size = state.prior_sigma[at], np.asarray(v)[..., None]
     cov = state.inverse[at[..., :, None], at[..., None, :]]
     part, axes = np.linalg.eigh(cov / wide[..., :, None] / wide[..., None, :])
-    part = np.clip(part, LEAST, 1.0)
+    part = np.clip(part, MIN_VARIANCE_RATIO, 1.0)
     along = (np.swapaxes(axes, -1, -2) @ (state.estimate[at] / wide)[..., None])[..., 0]
     return (1 / part - 1) / size**2, (along / (part * size)) ** 2
 
@@ -109,13 +109,13 @@ def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, f
     The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
     """
     strength, power = gain_terms(state, at, v)
-    near = v * np.exp(np.linspace(-STEP, STEP, FINER))
+    near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))
     before = np.interp(np.log(near), np.log(priors.SIZES), LOG_DENSITY)
     best = float(
         near[np.argmax(gains_from_eigenvalues(strength, power, near) + before)]
     )
     share = best**2 * strength / (1 + best**2 * strength)
-    return best, float(np.maximum(2 * (share**2).sum(), PRIOR_INFO) ** -0.5)
+    return best, float(np.maximum(2 * (share**2).sum(), MIN_SIZE_INFORMATION) ** -0.5)
 
 
 def most_probable_axis_size(
@@ -127,17 +127,17 @@ def most_probable_axis_size(
     """
     strength, power = gain_terms(state, at, v)
     middle, part = triad
-    apart = np.linspace(-4.0, 4.0, FINER)
-    near = middle * np.exp(priors.UNLIKE * apart)
+    apart = np.linspace(-4.0, 4.0, REFINED_SIZES)
+    near = middle * np.exp(priors.AXES_LOG_SPREAD * apart)
     top = int(np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * apart**2))
     best = float(near[top])
     share = best**2 * strength / (1 + best**2 * strength)
-    alike = priors.UNLIKE**-2
+    alike = priors.AXES_LOG_SPREAD**-2
     info = alike + 2 * float((share**2).sum())
     return best, float(np.hypot(info**-0.5, alike / info * part))
 
 
-ROUNDED = 1e-6
+LOG_ROUNDING_ERROR = 1e-6
 """Rounding error of F, ln."""
 
 
@@ -188,7 +188,7 @@ class Sizing:
         free = [i for i, g in enumerate(self.groups) if g.fixed_size is None]
         channels = np.flatnonzero(self.typical_instability > 0).tolist()
         profiles: list[Array] = []
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             before = (*self.sizes, *self.instability)
             profiles = self._groups(free)
             for triad in TRIADS:
@@ -276,7 +276,7 @@ class Sizing:
         if self.instability == before or self._level() >= (
             state.score
             + float(instability_log_prior(before, self.typical_instability))
-            - ROUNDED
+            - LOG_ROUNDING_ERROR
         ):
             return profiles
         self.instability = before
@@ -298,7 +298,7 @@ class Sizing:
         """F over the instabilities of each channel; sets all to the joint maximum."""
         alone = [self._channel(c) for c in channels]
         index = np.arange(len(LOG_DENSITY))
-        apart = np.subtract.outer(index, index) * STEP / priors.UNLIKE
+        apart = np.subtract.outer(index, index) * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD
         best = [gain - 0.5 * apart**2 for gain in alone]  # by middle, size
         total = sum(b.max(axis=1) for b in best) + INSTABILITY_LOG_DENSITY
         middle = int(np.argmax(total))
@@ -330,7 +330,7 @@ class Sizing:
         inner, rhs = self.eliminated().schur_complement_of_means(c, 1.0)
         tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
         told, axes = np.linalg.eigh(inner)
-        told = np.clip(told, 0.0, (1 - LEAST) / tau**2)
+        told = np.clip(told, 0.0, (1 - MIN_VARIANCE_RATIO) / tau**2)
         left = 1 - tau**2 * told
         size = float(self.typical_instability[c])
         power = (axes.T @ rhs / left * size) ** 2

@@ -73,5 +73,5 @@ def _of_coarser(state: Eliminated, at: Index, part: float) -> float:
     gain = gains_from_eigenvalues(
         *gain_terms(state, at, 1.0), np.array([part, 1.0])
     )  # (1)
-    ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED - 1)
+    ahead = gain[1] - gain[0] + np.log(1 / priors.AS_STATED_CHANCE - 1)
     return float(probability_of_log_odds(ahead))

@@ -25,14 +25,14 @@ from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
 from fieldcal.model.system.turn_rows import TurnRows
 
-FOLDS = 12
+MAX_FOLDS = 12
 """Largest number of parts that are held out; each is one or several positions."""
 
-STRETCHES = 24
+STRETCHES_PER_WINDOW = 24
 """Number of parts of each window if there are too few windows. They are short, since
 random processes predict for a short time only."""
 
-IN_QUESTION, BEHIND = 6, 20.0
+MAX_COMPARED_SETS, MAX_LOG_DISTANCE = 6, 20.0
 """Largest number of sets that are compared again without a part, and their largest
 distance from the best, ln."""
 
@@ -151,9 +151,9 @@ def held_out_residuals(fitted: FittedSet, sets: Sequence[Set]) -> Array:
 def candidate_sets(best: Set, visited: Sequence[Set]) -> list[Set]:
     """Sets that may be the best without a part: those near the best, and the empty."""
     ranked = sorted(visited, key=lambda s: -s.score)
-    near = [s for s in ranked if s.score > best.score - BEHIND]
+    near = [s for s in ranked if s.score > best.score - MAX_LOG_DISTANCE]
     none = [s for s in ranked if not s.members]
-    return list(dict.fromkeys([best, *near[:IN_QUESTION], *none]))
+    return list(dict.fromkeys([best, *near[:MAX_COMPARED_SETS], *none]))
 
 
 def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Array:
@@ -161,8 +161,8 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     d, out = fitted.dictionary, []
     columns = _columns(d, [fitted.set]) | (fitted.values != 0)
     linear = [_select_columns(part, columns) for part in fitted.linear]
-    for i in range(min(len(turns), FOLDS)):
-        left = turns[i::FOLDS]
+    for i in range(min(len(turns), MAX_FOLDS)):
+        left = turns[i::MAX_FOLDS]
         kept = [t for t in turns if all(t is not one for one in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
         chosen = Search(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
@@ -181,14 +181,14 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
     """Number of the part that each row is left out in, (n,)."""
     index = np.searchsorted(d.window_positions, d.x.position)
     if len(d.window_positions) >= MIN_WINDOWS:
-        out: NDArray[np.intp] = (index % FOLDS).astype(np.intp)
+        out: NDArray[np.intp] = (index % MAX_FOLDS).astype(np.intp)
         return out
     out = np.zeros(len(index), dtype=np.intp)
     for p in d.window_positions:
         for i, part in enumerate(
-            np.array_split(np.flatnonzero(d.x.position == p), STRETCHES)
+            np.array_split(np.flatnonzero(d.x.position == p), STRETCHES_PER_WINDOW)
         ):
-            out[part] = i % FOLDS
+            out[part] = i % MAX_FOLDS
     return out
 
 

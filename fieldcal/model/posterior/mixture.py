@@ -33,19 +33,19 @@ from fieldcal.model.evidence.sizing import (
     instability_log_prior,
 )
 
-KEPT = 4.0
+MAX_LOG_DISTANCE = 4.0
 """Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
 
 GIVEN_SET_LOG_DENSITY = np.log(priors.instability_density_of_given_set())
 """Log prior of instabilities if no causes were searched: others may scatter windows."""
 
-DEVICE_LOG_DENSITY = np.log(priors.density(priors.STEEP))
+DEVICE_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
 """Log prior of instabilities if every other scatter has a cause of its own."""
 
 NONE: Index = np.empty((0, 1), dtype=np.intp)
 """No columns."""
 
-SHOWS = 0.2
+MIN_INSTABILITY = 0.2
 """Instability below which it is not distinguishable, in the noise of a mean."""
 
 
@@ -139,7 +139,7 @@ class Mixing:
         lists = [self._of_triad(triad) for triad in TRIADS]
         best = sum(max(h.score for h in some) for some in lists)
         near = [parts for parts in product(*lists)
-                if sum(h.score for h in parts) > best - KEPT]  # fmt: skip
+                if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
         tau = (
             priors.SIZES[[self._sizes_of(parts) for parts in near]]
             * self.typical_instability
@@ -184,16 +184,20 @@ class Mixing:
             for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
         ]
         if len(doubted):
-            chance = known[:, None] + float(np.log(priors.BAD)) + LOG_DENSITY  # (n, v)
+            chance = (
+                known[:, None] + float(np.log(priors.BAD_WINDOW_CHANCE)) + LOG_DENSITY
+            )  # (n, v)
             every = self._with_bad(there) + there.score[:, None, None] + chance[:, None]
             each = np.logaddexp.reduce(every, axis=(0, 2))
             self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
             found += [
                 Hypothesis(sizes[n], i, v, float(chance[n, v]), float(every[n, i, v]))
-                for n, i, v in np.argwhere(every > alone.max() - KEPT).tolist()
+                for n, i, v in np.argwhere(
+                    every > alone.max() - MAX_LOG_DISTANCE
+                ).tolist()
             ]
         best = max(h.score for h in found)
-        return [h for h in found if h.score > best - KEPT]
+        return [h for h in found if h.score > best - MAX_LOG_DISTANCE]
 
     def _shifted(self, triad: Sequence[int]) -> tuple[list[tuple[int, ...]], Array]:
         """Instabilities of a triad, all scaled together, with their log priors.
@@ -222,7 +226,7 @@ class Mixing:
         seen = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
         noise = 1 / np.sqrt(self.gram.info[seen].max(initial=1e-300))
         typical = float(self.typical_instability[list(triad)].max())
-        return int(np.searchsorted(priors.SIZES * typical, SHOWS * noise))
+        return int(np.searchsorted(priors.SIZES * typical, MIN_INSTABILITY * noise))
 
     def _bad_columns(self) -> Index:
         """Columns of the windows that may be bad, (w, k)."""

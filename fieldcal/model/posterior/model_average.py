@@ -32,7 +32,7 @@ from fieldcal.model.evidence.cholesky import cholesky_root, triangular_inverse
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import KEPT, covariance_of_means
+from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE, covariance_of_means
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.posterior.size_average import average_over_sizes
 
@@ -64,7 +64,7 @@ class ModelAverage:
     def sets(self) -> list[tuple[Set, float]]:
         """Sets with enough weight, averaged over sizes, and their weights."""
         every, out = self.posterior.weights_on_grid, list[tuple[Set, float]]()
-        least = np.exp(-KEPT) * max(w for _, w in every)
+        least = np.exp(-MAX_LOG_DISTANCE) * max(w for _, w in every)
         for one, weight in every:
             if weight > least:
                 alike = self._with_mixed_sizes(one)

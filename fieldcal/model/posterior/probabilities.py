@@ -20,7 +20,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import BOTH, Group, triads_of
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-from fieldcal.model.posterior.mixture import KEPT
+from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.search.offer import Offer
 from fieldcal.model.search.selection import ALTERNATIVE_MARGIN, Search
 
@@ -74,7 +74,7 @@ class Posterior:
         instead = {name: self._alternatives_to(name) for name in every}
         self.alternatives = {name: instead[name] for name in self.cause_names(best)}
         for one in list(search.visited.values()) if best.members else ():
-            if one.score > best.score - KEPT:
+            if one.score > best.score - MAX_LOG_DISTANCE:
                 search.visit_variations(one, best.score)
         self._visit_likely_additions()
 
@@ -127,7 +127,7 @@ class Posterior:
             there = self._with_both_triads(less, offer, parts, offers)
             if not cause.reportable:  # its set counts, but noise is no alias
                 continue
-            if self._refined_evidence(there, own) > own - thresholds.SAME:
+            if self._refined_evidence(there, own) > own - thresholds.ALIAS_LOG_MARGIN:
                 if cause.name not in found or there.score > found[cause.name].score:
                     found[cause.name] = there
         return found
@@ -138,7 +138,7 @@ class Posterior:
         The best set is refined, so a set on the grid would be at a disadvantage.
         """
         at_points = self.evidence(there)
-        if self._refined is None or at_points > own - thresholds.SAME:
+        if self._refined is None or at_points > own - thresholds.ALIAS_LOG_MARGIN:
             return at_points
         if not any(
             _has_time_constant(m[1])

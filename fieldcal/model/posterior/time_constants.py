@@ -18,7 +18,7 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.search.inference import InferenceResult
 
-MOST = 1.0
+MAX_LOG_SIGMA = 1.0
 """Largest sigma of the logarithm of a time constant that is used."""
 
 
@@ -28,7 +28,7 @@ def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
     Empty if it has no time constant, or none with a known sigma.
     """
     some = [
-        (i, name, min(group.shape_sigma / value, MOST))
+        (i, name, min(group.shape_sigma / value, MAX_LOG_SIGMA))
         for i, (_, group) in enumerate(found.best.members)
         for name, value in group.shape.items()
         if np.isfinite(group.shape_sigma)

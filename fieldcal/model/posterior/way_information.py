@@ -20,7 +20,7 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.system.turn_rows import TurnRows
 
-LEAST = 1e-6
+MIN_EIGENVALUE = 1e-6
 """Part of the largest eigenvalue of P below which rounding made one."""
 
 
@@ -52,7 +52,7 @@ def way_information(
     info = a.T @ a - a.T @ b @ solved[:, :-1]
     rhs = a.T @ (white - b @ solved[:, -1])
     size, along = np.linalg.eigh(info)
-    kept = size > LEAST * max(size.max(initial=0.0), LEAST)
+    kept = size > MIN_EIGENVALUE * max(size.max(initial=0.0), MIN_EIGENVALUE)
     root = np.sqrt(size[kept])
     rows, off = along[:, kept].T * root[:, None], along[:, kept].T @ rhs / root
     left = white @ white - white @ b @ solved[:, -1] - off @ off

@@ -25,14 +25,14 @@ from fieldcal.windows.sway import find_sway
 from fieldcal.windows.sway_process import needed_seconds
 from fieldcal.windows.sway_waves import SwayWaves
 
-WIDE = float(np.deg2rad(0.2))
+MIN_SWAY_RAD = float(np.deg2rad(0.2))
 """Turning from which it is taken out so, rad. What is less moves gravity by less than
 3e-5 m/s^2 in the mean, and is a line as any other where it is regular."""
 
-SHARE = 0.5
+MIN_SWAYING_SHARE = 0.5
 """Part of the windows that must sway: a base does not sway in one of them alone."""
 
-TURN_S, NEAR_S = 0.1, 0.03
+ROTATION_STEP_S, WINDOW_MARGIN_S = 0.1, 0.03
 """In which a rotation is added to the way, s, and before a window in which the way may
 end already: its steps are as long."""
 
@@ -95,13 +95,13 @@ def find_base_sway(block: Block, about: Description) -> BaseSway | None:
         for p, (a, b) in enumerate(windows)
         if b > a and (some := find_sway(block.t[a:b], block[a:b].six, scale))
     }
-    if len(found) < SHARE * len(windows):
+    if len(found) < MIN_SWAYING_SHARE * len(windows):
         return None
     sizes = np.array(
         [np.mean([w.mean_squares for w in some], axis=0) for some in found.values()]
     )
     amplitude = np.sqrt(2 * sizes[:, 0])
-    if np.sqrt((amplitude**2).mean()) < WIDE:
+    if np.sqrt((amplitude**2).mean()) < MIN_SWAY_RAD:
         return None
     hz = np.sqrt(sizes[:, 1] / sizes[:, 0]) / (2 * np.pi)
     lost = about.gravity * float(sizes[:, 0].mean()) / 2  # <phi^2> / 2 of gravity
@@ -155,7 +155,7 @@ def _without_sway(
         edges = [a, *np.searchsorted(block.t, middles).tolist(), b]
         for waves, (first, last) in zip(some, pairwise(edges), strict=True):
             six[first:last] -= waves.outputs(block.t[first:last])
-    few = max(1, round(TURN_S * rate))
+    few = max(1, round(ROTATION_STEP_S * rate))
     ordered = sorted((int(a), int(b), p) for p, (a, b) in enumerate(windows) if b > a)
     for (_, end, p), (start, _, q) in pairwise(ordered):
         if start - end < 4 * few:
@@ -164,7 +164,7 @@ def _without_sway(
             turned = found[p][-1].turn_angle(block.t[end : end + 1])[0]
             six[end + few : end + 2 * few, 3:] += turned * scale * rate / few
         if q in found:
-            waves, last = found[q][0], start - 1 - round(NEAR_S * rate)
+            waves, last = found[q][0], start - 1 - round(WINDOW_MARGIN_S * rate)
             # the rate falls to rest from this sample to the next one
             turned = waves.turn_angle(block.t[last : last + 2].mean(keepdims=True))[0]
             six[last + 1 : start, 3:] -= waves.outputs(block.t[last + 1 : start])[:, 3:]

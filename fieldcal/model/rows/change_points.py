@@ -20,10 +20,10 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import Rows
 
-WIDTHS = (1, 2, 4, 8)
+ROWS_BESIDE = (1, 2, 4, 8)
 """Rows on either side: a jump amid flicker shows best in some of them."""
 
-CLEAR = 16.0
+CLEAR_JUMP_SIGMAS = 16.0
 """Standard deviations of the difference, by the scatter beside it, of a clear jump: a
 sine of any frequency comes to 12.7 at most, a ramp to 7.9."""
 
@@ -34,7 +34,7 @@ def change_points(rows: Rows) -> Array:
     for window in _windows(rows):
         for c in range(6):
             some = window[rows.used[window, c]]
-            for m in WIDTHS:
+            for m in ROWS_BESIDE:
                 if len(some) < 2 * m:
                     break
                 size = _changes(rows.y[some, c], rows.sd[some, c] ** 2, m)
@@ -50,7 +50,7 @@ def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
 
     Of each output of a window the largest.
     """
-    found, m = set[tuple[float, float]](), WIDTHS[-1]
+    found, m = set[tuple[float, float]](), ROWS_BESIDE[-1]
     for window in _windows(rows):
         for c in range(6):
             some = window[rows.used[window, c]]
@@ -60,8 +60,8 @@ def clear_jumps(rows: Rows) -> list[tuple[float, float]]:
             before, after = beside[: -m - 1], beside[m + 1 :]  # a row lies between
             scatter = (before.var(axis=1, ddof=1) + after.var(axis=1, ddof=1)) / m
             change = after.mean(axis=1) - before.mean(axis=1)
-            k = int(np.argmax(np.abs(change) - CLEAR * np.sqrt(scatter)))
-            if abs(change[k]) > CLEAR * np.sqrt(scatter[k]):
+            k = int(np.argmax(np.abs(change) - CLEAR_JUMP_SIGMAS * np.sqrt(scatter)))
+            if abs(change[k]) > CLEAR_JUMP_SIGMAS * np.sqrt(scatter[k]):
                 start, end = rows.span[some[k + m]].tolist()
                 found.add((start, end))
     return sorted(found)

@@ -31,29 +31,29 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-RATIO, FEWEST = 1.25, 5
+BAND_RATIO, MIN_BAND_COEFFICIENTS = 1.25, 5
 """Of the ends of a band, and coefficients of one at least."""
 
-STEEP = 1.0
+USUAL_SLOPE = 1.0
 """Usual change of ln P in a factor e of frequency: flicker makes 1, a walk 2."""
 
-STEEPEST, OVER = 2.0, 1.5
+WALK_SLOPE, SLOPE_REACH = 2.0, 1.5
 """Slope of ln P of a walk, and how far beyond the lowest frequency slopes are told by,
 in ln of it."""
 
-UNLIKE = 0.5
+AXES_LOG_SPREAD = 0.5
 """Spread of ln P among the axes of a triad, but for how loud each is: made alike."""
 
-NEWTON = 30
+MAX_NEWTON_STEPS = 30
 """Steps at most; each is damped."""
 
-CLOSEST, SETTLED = 0.1, 1e-6
+MIN_LOG_DISTANCE, CONVERGED = 0.1, 1e-6
 """Least distance of two places that is counted, and largest last step, both ln."""
 
-NONE = 1e-3
+MIN_BAND_DOF = 1e-3
 """Degrees of freedom of a band of which columns take all."""
 
-LEAST = 1e-24
+MIN_POWER = 1e-24
 """Power below which a channel repeats its reference, in its unit squared."""
 
 
@@ -77,9 +77,9 @@ class Bands:
         rising = np.sort(frequency[frequency > 0])
         starts, at = [0], 0
         while at < len(rising):
-            end = int(np.searchsorted(rising, rising[at] * RATIO, side="right"))
-            end = max(end, at + FEWEST)
-            at = len(rising) if len(rising) - end < FEWEST else end
+            end = int(np.searchsorted(rising, rising[at] * BAND_RATIO, side="right"))
+            end = max(end, at + MIN_BAND_COEFFICIENTS)
+            at = len(rising) if len(rising) - end < MIN_BAND_COEFFICIENTS else end
             starts.append(at)
         middle = [float(np.mean(np.log(rising[a:b]))) for a, b in pairwise(starts)]
         edges = np.append(rising[starts[:-1]], np.inf)
@@ -101,13 +101,15 @@ class Bands:
         of = np.searchsorted(self.edges, frequency[moves], side="right") - 1
         of, count = np.maximum(of, 0), len(self.edges) - 1
         free = np.array([np.bincount(of, 1 - h[moves], count) for h in leverage])
-        free = np.maximum(free, NONE)
+        free = np.maximum(free, MIN_BAND_DOF)
         square = np.array([np.bincount(of, r[moves] ** 2, count) for r in left])
-        raw = np.log(np.maximum(square / free, LEAST))
-        loud = np.average(raw, axis=1, weights=np.minimum(free, FEWEST))
+        raw = np.log(np.maximum(square / free, MIN_POWER))
+        loud = np.average(raw, axis=1, weights=np.minimum(free, MIN_BAND_COEFFICIENTS))
         even = (square * np.exp(-loud)[:, None]).sum(axis=0) / free.sum(axis=0)
         apart = np.diff(self.place[1:])
-        both = _smooth(np.log(np.maximum(even, LEAST)), free.sum(axis=0), apart, None)
+        both = _smooth(
+            np.log(np.maximum(even, MIN_POWER)), free.sum(axis=0), apart, None
+        )
         return [
             self._with_mean_level(_smooth(one, some, apart, both + by))
             for one, some, by in zip(raw, free, loud, strict=True)
@@ -115,11 +117,11 @@ class Bands:
 
     def _with_mean_level(self, level: Array) -> Array:
         """Levels with that of the mean before them."""
-        near = self.place[1:] < self.place[1] + OVER
+        near = self.place[1:] < self.place[1] + SLOPE_REACH
         slope = 0.0
         if near.sum() > 1:
             slope = float(np.polyfit(self.place[1:][near], level[near], 1)[0])
-        steep = np.clip(-slope, 0.0, STEEPEST) * (self.place[1] - self.place[0])
+        steep = np.clip(-slope, 0.0, WALK_SLOPE) * (self.place[1] - self.place[0])
         return np.concatenate([[level[0] + steep], level])
 
     def power(self, levels: Array, frequency: Array) -> Array:
@@ -131,20 +133,20 @@ class Bands:
 
 def _smooth(raw: Array, free: Array, apart: Array, about: Array | None) -> Array:
     """Ln of the mean power of (1), (b,); `about` are a + S_b, where that is known."""
-    stiff = 1 / (STEEP**2 * np.maximum(apart, CLOSEST))
-    near = 0.0 if about is None else UNLIKE**-2
+    stiff = 1 / (USUAL_SLOPE**2 * np.maximum(apart, MIN_LOG_DISTANCE))
+    near = 0.0 if about is None else AXES_LOG_SPREAD**-2
     middle = raw if about is None else about
     level = middle.copy()
     inner = np.diag(np.append(stiff, 0.0) + np.append(0.0, stiff) + near)
     inner -= np.diag(stiff, 1) + np.diag(stiff, -1)
     bend = inner
-    for _ in range(NEWTON):
+    for _ in range(MAX_NEWTON_STEPS):
         ratio = np.exp(np.clip(raw - level, -20.0, 3.0))
         slope = free / 2 * (1 - ratio) + inner @ level - near * middle
         bend = inner + np.diag(free / 2 * np.maximum(ratio, 0.2))
         step = np.clip(np.linalg.solve(bend, slope), -2.0, 2.0)
         level = level - step
-        if np.abs(step).max() < SETTLED:
+        if np.abs(step).max() < CONVERGED:
             break
     out: Array = level + np.diag(np.linalg.inv(bend)) / 2
     return out

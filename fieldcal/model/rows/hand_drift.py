@@ -25,14 +25,14 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-TREMBLES, WALKS = 2.0, 15.0
+STEADY_HAND_K, WALKING_HAND_K = 2.0, 15.0
 """k of a hand that does not drift, and of one that does as a random walk, with its
 standard deviation from one hand to the next."""
 
-FEWEST = 10
+MIN_SAMPLES = 10
 """Samples that tell a slope and its noise."""
 
-STEPS = 30
+MAX_STEPS = 30
 """Until k stays to a thousandth."""
 
 
@@ -61,7 +61,7 @@ def force_turn_rate(acc: Array, length: float) -> ForceTurn:
     """
     known = np.isfinite(acc).all(axis=1)
     t = (np.linspace(-0.5, 0.5, len(acc)) * length)[known]
-    if len(t) < FEWEST:
+    if len(t) < MIN_SAMPLES:
         return ForceTurn(0.0, np.inf)
     t -= t.mean()
     some = acc[known]
@@ -88,12 +88,12 @@ def drift_factor(windows: list[ForceTurn], trembles: Array) -> float:
     square, noise = np.array(windows).T
     some = np.isfinite(noise) & (trembles > 0)
     square, noise, trembles = square[some], noise[some], trembles[some]
-    k = WALKS
-    for _ in range(STEPS):
+    k = WALKING_HAND_K
+    for _ in range(MAX_STEPS):
         # the square of a normal rate about two axes scatters by itself
         info = 1 / (noise + k * trembles) ** 2
         told = float(info @ trembles**2)
         seen = float(info @ (trembles * (square - noise)))
-        k = (seen + 1 / WALKS) / (told + 1 / WALKS**2)
-        k = max(k, TREMBLES)
+        k = (seen + 1 / WALKING_HAND_K) / (told + 1 / WALKING_HAND_K**2)
+        k = max(k, STEADY_HAND_K)
     return k

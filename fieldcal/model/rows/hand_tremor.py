@@ -42,30 +42,30 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import GYR, Array, Index
 from fieldcal.model.rows.block_means import masked
-from fieldcal.model.rows.hand_drift import TREMBLES, drift_factor, force_turn_rate
+from fieldcal.model.rows.hand_drift import STEADY_HAND_K, drift_factor, force_turn_rate
 from fieldcal.model.rows.means import median_sigma
 from fieldcal.model.rows.noise import rounding_noise
 from fieldcal.model.rows.reduce import Rows, RowSource, reduce_to_rows
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.windows.noise import is_to_and_fro, quickest_noise
 
-WANDERS = 6.0
+WANDER_SIGMAS = 6.0
 """Standard deviations of what the squares across the force have too many."""
 
-FEWEST = 4
+MIN_HELD_WINDOWS = 4
 """Windows of a device in a hand; what lies still for long drifts by itself."""
 
-MORE = 1.5
+ACROSS_RATIO = 1.5
 """And by how much more than along the force."""
 
-PUSHED = 1.5
+PUSHED_NOISE_RATIO = 1.5
 """Times their quickest noise that accelerometers show where a hand pushes the device:
 on a table that trembles 1.3 at most in published recordings."""
 
-QUIET = 0.25
+MIN_QUIET_SHARE = 0.25
 """Share of the windows that show no more than the sensors' own noise."""
 
-STILL = 3.0
+LYING_NOISE_RATIO = 3.0
 """Times that noise which one shows in which the device lies still: in published
 recordings 2 at most on a table, 4 to 60 in a hand."""
 
@@ -86,7 +86,7 @@ def rows_of_recording(source: RowSource) -> Rows:
         one = _add_hand_motion(
             source, reduce_to_rows(source, whole=True, level=noise), angle
         )
-        pushed = (rows.noise[:3] > PUSHED * one.noise[:3]).any()
+        pushed = (rows.noise[:3] > PUSHED_NOISE_RATIO * one.noise[:3]).any()
         return one if angle or pushed else _separate_triads(source, one)
     some = _trembling_windows(rows, pieces, source.rate)
     if not some.any():
@@ -121,13 +121,13 @@ def _add_hand_motion(source: RowSource, rows: Rows, angle: float) -> Rows:
     square = np.where(known, turned, 0.0) ** 2
     trembles = square.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     k = drift_factor(turns, trembles / rows.length**2)
-    slow = np.sqrt(TREMBLES * angle**2 + k * turned**2) / length  # (1)
+    slow = np.sqrt(STEADY_HAND_K * angle**2 + k * turned**2) / length  # (1)
     sd[:, 3:] = np.hypot(sd[:, 3:], slow)
-    fast = np.sqrt(TREMBLES) * pushed[:, None] / length * unit  # (1)
+    fast = np.sqrt(STEADY_HAND_K) * pushed[:, None] / length * unit  # (1)
     sd[:, :3] = np.hypot(sd[:, :3], fast)
     # difference between the angle at the end of a rest and the mean angle
     some = np.where(known, square, trembles[:, None])
-    most = np.sqrt(np.maximum(angle**2, k / TREMBLES * some))
+    most = np.sqrt(np.maximum(angle**2, k / STEADY_HAND_K * some))
     return replace(rows, sd=sd, hand_angle=most)
 
 
@@ -172,14 +172,16 @@ def _trembling_windows(
 
     `pieces` are the (n_i, 6) samples of each, nan where missing, at `rate` Hz.
     """
-    if len(pieces) < FEWEST:
+    if len(pieces) < MIN_HELD_WINDOWS:
         return np.zeros(len(pieces), dtype=bool)
     shown = np.array([_relative_tremor(piece[:, GYR], rate) for piece in pieces])
     told = np.isfinite(shown).all(axis=0) & (shown > 0).all(axis=0)
     if not told.any():
         return np.zeros(len(pieces), dtype=bool)
-    sensors = np.quantile(shown[:, told], QUIET, axis=0)
-    apart: NDArray[np.bool_] = (shown[:, told] / sensors).mean(axis=1) > STILL
+    sensors = np.quantile(shown[:, told], MIN_QUIET_SHARE, axis=0)
+    apart: NDArray[np.bool_] = (shown[:, told] / sensors).mean(
+        axis=1
+    ) > LYING_NOISE_RATIO
     return apart
 
 
@@ -220,7 +222,7 @@ def _noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array
 
     `pieces` are the (n_i, 6) samples of windows, `least` (6,) the noise of rounding.
     """
-    free = ~rows.x.oriented.any() and len(pieces) >= FEWEST
+    free = ~rows.x.oriented.any() and len(pieces) >= MIN_HELD_WINDOWS
     if not free or not is_to_and_fro([piece[:, GYR] for piece in pieces]):
         return None
     # where a hand is quick, differences of samples show it as well
@@ -228,7 +230,7 @@ def _noise_beside_tremor(rows: Rows, pieces: list[Array], least: Array) -> Array
         [_high_frequency_noise(piece[:, GYR]) for piece in pieces]
     )
     loud = (each / each.mean(axis=0)).mean(axis=1).filled(np.inf)
-    quiet = np.argsort(loud)[: max(round(QUIET * len(pieces)), 1)]
+    quiet = np.argsort(loud)[: max(round(MIN_QUIET_SHARE * len(pieces)), 1)]
     beside: Array = np.fmax(quickest_noise([pieces[i] for i in quiet]), least)
     return beside
 
@@ -263,7 +265,7 @@ def force_wander_angle(rows: Rows) -> float:
     x, some = rows.x, rows.used[:, :3].all(axis=1) & ~rows.x.oriented
     held = [some & (x.position == p) for p in np.unique(x.position[some])]
     held = [at for at in held if at.sum() > 1]
-    if len(held) < FEWEST:
+    if len(held) < MIN_HELD_WINDOWS:
         return 0.0
     offs = [rows.y[at, :3] - rows.y[at, :3].mean(axis=0) for at in held]
     along, across, dof, angle = 0.0, 0.0, 0.0, []
@@ -277,7 +279,7 @@ def force_wander_angle(rows: Rows) -> float:
         dof += free
         length = np.linalg.norm(rows.y[at, :3].mean(axis=0))
         angle.append(((off - part) ** 2).sum() / (2 * free) / length**2)
-    if across / 2 < max(dof + WANDERS * np.sqrt(dof), MORE * along):
+    if across / 2 < max(dof + WANDER_SIGMAS * np.sqrt(dof), ACROSS_RATIO * along):
         return 0.0
     return float(np.sqrt(np.mean(angle)))
 

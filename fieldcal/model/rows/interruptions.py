@@ -13,7 +13,7 @@ from fieldcal.core.sampling import sampling_rate
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
-OFF_S, PERIODS = 0.5, 5.0
+MIN_INTERRUPTION_S, MIN_INTERRUPTION_PERIODS = 0.5, 5.0
 """Time, and periods of the samples, without any in which a device may restart."""
 
 
@@ -22,7 +22,7 @@ def interruptions(block: Block, about: Description) -> list[tuple[float, float]]
     bound = window_bounds(block, about)
     held = bound[bound[:, 1] > bound[:, 0]]
     held = held[np.argsort(held[:, 0])]
-    least = max(OFF_S, PERIODS / sampling_rate(block))
+    least = max(MIN_INTERRUPTION_S, MIN_INTERRUPTION_PERIODS / sampling_rate(block))
     out = []
     for (_, end), (start, _) in zip(held[:-1], held[1:], strict=True):
         between = block.t[max(end - 1, 0) : start + 1]

@@ -36,10 +36,10 @@ from fieldcal.core.samples import Array
 
 ROOT2 = np.sqrt(2)
 
-PAUSE = 3.5
+RESTART_INTERVALS = 3.5
 """Intervals between knots from which the input is taken up anew, at rest."""
 
-NODES, FORGOTTEN = 48, 40.0
+QUADRATURE_NODES, FORGOTTEN_EXPONENT = 48, 40.0
 """Of the integral of a cubic from one instant to the next, times the exponential, and
 the exponent from which on that has nothing left."""
 
@@ -87,7 +87,7 @@ def _even_knots(spline: CubicSpline) -> CubicSpline:
     step = float(np.median(np.diff(t)))
     if np.allclose(np.diff(t), step, rtol=1e-6, atol=0.0):
         return spline
-    breaks = np.flatnonzero(np.diff(t) > PAUSE * step) + 1
+    breaks = np.flatnonzero(np.diff(t) > RESTART_INTERVALS * step) + 1
     even = [
         np.linspace(some[0], some[-1], max(round((some[-1] - some[0]) / step), 1) + 1)
         for some in np.split(t, breaks)
@@ -103,7 +103,7 @@ def _filter_state(even: CubicSpline, u: Array, pole: complex) -> Any:
     change = even(t, 1)
     out = np.empty(u.shape, dtype=np.result_type(pole, float))
     steps = np.diff(t)
-    pauses = np.flatnonzero(steps > PAUSE * np.median(steps)) + 1
+    pauses = np.flatnonzero(steps > RESTART_INTERVALS * np.median(steps)) + 1
     for some in np.split(np.arange(len(t)), pauses):
         step = float(np.mean(np.diff(t[some]))) if len(some) > 1 else 0.0
         out[some] = _from_rest(u[some], change[some], step, pole)
@@ -113,8 +113,8 @@ def _filter_state(even: CubicSpline, u: Array, pole: complex) -> Any:
 def _from_rest(u: Array, change: Array, step: float, pole: complex) -> Any:
     """Z of (4) at even instants of an input with a derivative, (n, k)."""
     keep = np.exp(pole * step)
-    place, weight = np.polynomial.legendre.leggauss(NODES)
-    part = min(1.0, FORGOTTEN / max(-pole.real * step, 1e-300))
+    place, weight = np.polynomial.legendre.leggauss(QUADRATURE_NODES)
+    part = min(1.0, FORGOTTEN_EXPONENT / max(-pole.real * step, 1e-300))
     x = 1 - (1 - place) / 2 * part
     weight = weight / 2 * part * step * np.exp(pole * step * (1 - x))
     # Hermite's cubics: values and derivatives at both ends

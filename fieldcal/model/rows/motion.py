@@ -30,16 +30,16 @@ from scipy.fft import dct, idct
 
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
-from fieldcal.model.rows.reference import FEWEST, GAP, Reference
+from fieldcal.model.rows.reference import GAP_INTERVALS, MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.response import Response
 from fieldcal.physics.experience import Experience
 
 TRIADS = (ACC, GYR)
 
-EVEN = 1e-6
+STAMP_ROUNDING = 1e-6
 """Part of the interval of samples by which rounding has stamps be off even times."""
 
-PARTS = 8
+RECORDING_PARTS = 8
 """Parts of a recording, of whole stretches, that something may happen to."""
 
 
@@ -117,7 +117,7 @@ class MotionRows:
     def part(self) -> Index:
         """Number of the part of the recording that each row lies in, (n,)."""
         count = len(self) // self.length
-        return self.stretch * min(PARTS, count) // count
+        return self.stretch * min(RECORDING_PARTS, count) // count
 
     @property
     def middles(self) -> Array:
@@ -230,12 +230,12 @@ def rows_in_motion(
     """
     six = block.six
     six[:, np.repeat(~reference.observed.reshape(2, 3).any(axis=1), 3)] = np.nan
-    measured = np.isfinite(six).sum(axis=0) >= FEWEST
+    measured = np.isfinite(six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
     good = np.isfinite(six[:, measured]).all(axis=1)
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))
-    broken = (np.diff(block.t[kept]) > GAP * step) | (np.diff(kept) > 1)
+    broken = (np.diff(block.t[kept]) > GAP_INTERVALS * step) | (np.diff(kept) > 1)
     length = max(int(stretch_s / step / per_row), 1)
     stretches = [
         run[: len(run) // (per_row * length) * per_row * length]
@@ -264,4 +264,4 @@ def _stamp_errors(t: Array, stretches: Sequence[Index]) -> Array:
             off.append(stamps - count * (count @ stamps) / max(count @ count, 1.0))
     out: Array = np.concatenate(off)
     step = float(np.median(np.diff(t)))
-    return np.where(np.abs(out) > EVEN * step, out, 0.0)
+    return np.where(np.abs(out) > STAMP_ROUNDING * step, out, 0.0)

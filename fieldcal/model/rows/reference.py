@@ -17,10 +17,10 @@ from scipy.interpolate import CubicSpline
 
 from fieldcal.core.samples import Array, Block, Index
 
-GAP = 3.5
+GAP_INTERVALS = 3.5
 """Intervals between samples from which there is a gap."""
 
-FEWEST = 8
+MIN_CHANNEL_SAMPLES = 8
 """Samples of a channel from which a reference has it."""
 
 
@@ -42,7 +42,7 @@ class Reference:
 
     def __init__(self, block: Block) -> None:
         six = block.six
-        self.observed = np.isfinite(six).sum(axis=0) >= FEWEST
+        self.observed = np.isfinite(six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
         whole = np.isfinite(six[:, self.observed]).any(axis=1)
         self.t, self.step = block.t[whole], float(np.median(np.diff(block.t[whole])))
         self.start, self.end = float(self.t[0]), float(self.t[-1])
@@ -84,4 +84,4 @@ class Reference:
         """Which instants, s, are inside the reference by a margin and in no gap."""
         inside = (s > self.start + margin) & (s < self.end - margin)
         after = np.clip(np.searchsorted(self.t, s), 1, len(self.t) - 1)
-        return inside & (self.t[after] - self.t[after - 1] < GAP * self.step)
+        return inside & (self.t[after] - self.t[after - 1] < GAP_INTERVALS * self.step)

@@ -31,10 +31,10 @@ from fieldcal.model.rows.low_pass import (
 )
 from fieldcal.model.rows.reference import Reference
 
-LEAST = 2e-3
+MIN_TIME_CONSTANT_S = 2e-3
 """Time constant of first order that hardly a motion of a body tells from a delay, s."""
 
-LEAST_SECOND = 0.015
+MIN_SECOND_ORDER_S = 0.015
 """The same of second order, s: what tells it from a delay is a part (w tau)^3 / 2 of a
 motion at w, 7e-4 of one at 1 Hz."""
 
@@ -74,8 +74,8 @@ class Response:
             sensed = sensed.filtered_by(partial(first_order, tau=tau))
         if second:
             sensed = sensed.filtered_by(partial(second_order, tau=second))
-        slope = partial(first_order_slope, tau=max(abs(tau), LEAST))
-        bend = partial(second_order_slope, tau=max(abs(second), LEAST_SECOND))
+        slope = partial(first_order_slope, tau=max(abs(tau), MIN_TIME_CONSTANT_S))
+        bend = partial(second_order_slope, tau=max(abs(second), MIN_SECOND_ORDER_S))
         return cls(
             late,
             tau,
@@ -110,19 +110,21 @@ class Response:
         if not tau:
             return 0.0
         now = self.tau
-        square = now * abs(now) + (abs(now) + max(abs(now), LEAST)) * (tau - now)  # (1)
+        square = now * abs(now) + (abs(now) + max(abs(now), MIN_TIME_CONSTANT_S)) * (
+            tau - now
+        )  # (1)
         return float(np.sign(square) * np.sqrt(abs(square)))
 
     def _second_towards(self, second: float) -> float:
         if not second:
             return 0.0
         now = self.second
-        step = 3 * max(abs(now), LEAST_SECOND) ** 2 * (second - now)
+        step = 3 * max(abs(now), MIN_SECOND_ORDER_S) ** 2 * (second - now)
         return float(np.cbrt(now**3 + step))  # (2)
 
     def distance_to(self, other: Self) -> float:
         """Largest difference of the time constants, relative to the least ones."""
         return max(
-            abs(self.tau - other.tau) / LEAST,
-            abs(self.second - other.second) / LEAST_SECOND,
+            abs(self.tau - other.tau) / MIN_TIME_CONSTANT_S,
+            abs(self.second - other.second) / MIN_SECOND_ORDER_S,
         )

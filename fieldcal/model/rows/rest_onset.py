@@ -18,10 +18,10 @@ from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
 PIECE_S = 0.2
-MOVING = 7.0
+MOVING_SIGMAS = 7.0
 """Difference of a short mean from the window's that is motion, in standard errors."""
 
-RATE, FORCE = 2e-3, 0.05
+MAX_REST_RATE, MAX_REST_FORCE = 2e-3, 0.05
 """Differences that are never motion, however low the noise, rad/s and m/s^2."""
 
 
@@ -47,7 +47,9 @@ def _last_motion(gap: Array, held: Array, noise: Array, m: int) -> int:
         return len(gap)
     start = len(gap) - whole * m
     mean = gap[start:].reshape(whole, m, 6).mean(axis=1)
-    limit = np.maximum(MOVING * noise / np.sqrt(m), [FORCE] * 3 + [RATE] * 3)
+    limit = np.maximum(
+        MOVING_SIGMAS * noise / np.sqrt(m), [MAX_REST_FORCE] * 3 + [MAX_REST_RATE] * 3
+    )
     moving = np.abs(mean - held) > limit
     rated = bool(np.isfinite(mean[:, 3:]).all())
     at = np.flatnonzero((moving[:, 3:] if rated else moving[:, :3]).any(axis=1))

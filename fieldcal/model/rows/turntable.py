@@ -35,18 +35,18 @@ from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array
 
-TURNS = 1.0
+MIN_REVOLUTIONS = 1.0
 """Whole turns of a window from which what goes round is told from the mean."""
 
-SPREAD_AXES = 1e-3
+MIN_AXES_SPREAD = 1e-3
 """Least singular value of (3), of the largest, from which axes tell a bias."""
 
-ENOUGH, STRAIGHT = 6, 0.2
+MIN_POSITIONS, MIN_RESIDUAL_FALL = 6, 0.2
 """Positions from which the Earth's rate is sought in them, and share by which what is
 left then may be longer or shorter: beyond, directions are not known well enough for
 what is linear about them."""
 
-CLEARLY = 5.0
+EARTH_RATE_SIGMAS = 5.0
 """Standard deviations by which something may seem larger than the Earth's rate."""
 
 
@@ -108,12 +108,12 @@ class GyroReadings:
             for p in np.unique(self.position)
             if not (self.positions[p].oriented or self.positions[p].on_turning_table)
         ]
-        if not (self.earth and len(free) >= ENOUGH):
+        if not (self.earth and len(free) >= MIN_POSITIONS):
             return out
         speed, _ = unknown_axis_speeds(self.positions)
         mean, known = self._pointing(speed)
         length = np.linalg.norm(mean[free], axis=1) / self.earth
-        if known and np.abs(length - 1).max() < STRAIGHT:
+        if known and np.abs(length - 1).max() < MIN_RESIDUAL_FALL:
             for p in free:
                 out[self.position == p] = self.earth * _unit(mean[p])
         return out
@@ -145,7 +145,7 @@ def _bias_from_norms(w: Array, length: Array) -> tuple[Array, bool]:
     size = float(np.abs(w).max(initial=1e-12))
     design = np.column_stack([2 * w / size, -np.ones(len(w))])
     squares = (np.sum(w**2, axis=1) - length**2) / size**2
-    found, _, rank, _ = np.linalg.lstsq(design, squares, SPREAD_AXES)
+    found, _, rank, _ = np.linalg.lstsq(design, squares, MIN_AXES_SPREAD)
     if rank < design.shape[1]:
         return np.zeros(3), False
     return size * found[:3], True
@@ -171,7 +171,7 @@ def fit_rotating_earth_rate(
     none = RotatingEarthRate(
         np.zeros_like(gyr), _unseen_rate_covariance(rate / speed, turned)
     )
-    if turned < 2 * np.pi * TURNS or used.sum() < 3:
+    if turned < 2 * np.pi * MIN_REVOLUTIONS or used.sum() < 3:
         return none
     shape = scale[:, None] * _unit_vectors(rate / speed, speed * (t - t[0]))
     shape *= np.broadcast_to(np.sinc(speed * length / (2 * np.pi)), t.shape)[
@@ -186,7 +186,7 @@ def fit_rotating_earth_rate(
         return none
     covariance = np.linalg.inv(design.T @ design)[3:, 3:]
     sigma = float(np.sqrt(covariance.diagonal().max()))
-    if np.linalg.norm(found[3:]) > EARTH_RATE + CLEARLY * sigma:
+    if np.linalg.norm(found[3:]) > EARTH_RATE + EARTH_RATE_SIGMAS * sigma:
         return none
     mean = shape[used].mean(axis=0)
     return RotatingEarthRate(shape @ found[3:], mean @ covariance @ mean.T)

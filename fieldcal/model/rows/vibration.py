@@ -18,22 +18,22 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.noise import noise_of, rounding_noise
 from fieldcal.windows.noise import ChannelNoise, short_lag_noise
 
-LOUDER = 6.0
+NOISIER_SIGNIFICANCE = 6.0
 """Significance from which a window counts as noisier than the others."""
 
-LINES = 8
+MAX_LINES = 8
 """Of one window at most."""
 
-STANDS = 30.0
+LINE_POWER_RATIO = 30.0
 """Power of a line, in those of its neighbours at the median."""
 
 LOWEST_HZ = 2.0
 """What is slower may be the sensors' own."""
 
-LONGEST = 1 << 16
+MAX_SEARCHED_SAMPLES = 1 << 16
 """Samples of a window in which lines are looked for."""
 
-STEPS = 4
+FREQUENCY_STEPS = 4
 """Of Gauss and Newton, to a line's frequency."""
 
 
@@ -107,7 +107,7 @@ def _compare_windows(
     known = np.maximum(np.isfinite(out).sum(axis=0), 1)
     first = np.sort(out, axis=0)[(known - 1) // 4, np.arange(6)]  # nan comes last
     low = np.fmax(first, grain)
-    margin = LOUDER / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
+    margin = NOISIER_SIGNIFICANCE / np.sqrt(np.maximum(np.diff(windows, axis=1), 2))
     louder = out > low * np.exp(margin)
     loud: NDArray[np.bool_] = np.any(louder, axis=1)
     quiet = ~loud & ~stands.any(axis=1)
@@ -148,9 +148,9 @@ def without_lines(piece: Array, rate_hz: float) -> Array:
     known: NDArray[np.bool_] = np.all(np.isfinite(piece), axis=1)
     t = np.arange(len(piece)) / rate_hz
     out = piece.copy()
-    if known.sum() < 64 or len(piece) > LONGEST:
+    if known.sum() < 64 or len(piece) > MAX_SEARCHED_SAMPLES:
         return out
-    for _ in range(LINES):
+    for _ in range(MAX_LINES):
         hz = _strongest_line_hz(out[known], rate_hz)
         if hz is None:
             break
@@ -170,12 +170,12 @@ def _strongest_line_hz(y: Array, rate_hz: float) -> float | None:
     level = np.maximum(np.median(power, axis=0), 1e-300)
     total = (power / level).max(axis=1)
     at = int(np.argmax(total))
-    return float(hz[hz >= LOWEST_HZ][at]) if total[at] > STANDS else None
+    return float(hz[hz >= LOWEST_HZ][at]) if total[at] > LINE_POWER_RATIO else None
 
 
 def _fit_line(t: Array, y: Array, known: NDArray[np.bool_], hz: float) -> Array:
     """The line near a frequency, (n, c), its frequency fitted to all outputs."""
-    for _ in range(STEPS):
+    for _ in range(FREQUENCY_STEPS):
         design = _waves(t, hz)
         amplitude = np.linalg.lstsq(design[known], y[known], rcond=None)[0]
         left = (y - design @ amplitude)[known]

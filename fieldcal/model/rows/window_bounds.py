@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.session.description import Description
 
-ROWS = 360
+TARGET_ROWS = 360
 """Rows aimed at, over all windows."""
 
-FEWEST, MOST = 8, 120
+MIN_WINDOW_ROWS, MAX_WINDOW_ROWS = 8, 120
 """Rows of one window."""
 
 FIRST_S = 1.0
@@ -42,7 +42,9 @@ def block_edges(start: float, end: float, windows: int) -> Array:
     [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     """
     length = end - start
-    count = int(np.clip(ROWS // max(windows, 1), FEWEST, MOST))
+    count = int(
+        np.clip(TARGET_ROWS // max(windows, 1), MIN_WINDOW_ROWS, MAX_WINDOW_ROWS)
+    )
     if length <= count * FIRST_S:
         return np.linspace(start, end, max(1, round(length / FIRST_S)) + 1)
     low, high = 1.0, 10.0

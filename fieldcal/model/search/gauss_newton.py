@@ -24,7 +24,7 @@ from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import Turn
 from fieldcal.physics.effect import Motion, Sensor
 
-NEWTON = 6
+MAX_NEWTON_STEPS = 6
 """Steps of Gauss and Newton for one set."""
 
 CONVERGED = 0.03
@@ -95,7 +95,7 @@ class GaussNewton:
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
         values = self.pad(values)
-        for _ in range(NEWTON):
+        for _ in range(MAX_NEWTON_STEPS):
             wanted = self.wanted_columns(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
             rows = self.gram_of(linear, values, wanted)

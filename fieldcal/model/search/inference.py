@@ -18,22 +18,22 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
-from fieldcal.model.search.selection import SETTLED, Search
+from fieldcal.model.search.selection import MIN_LOG_RISE, Search
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import estimates_by_column
 from fieldcal.model.system.turn_rows import TurnRows
 
-PASSES = 8
+MAX_LINEARISATIONS = 8
 """Largest number of linearisations; of sets that alternate, the likelier is kept."""
 
-OWN_SIGMA = 0.5
+TIME_CONSTANT_LOG_LOSS = 0.5
 """Decrease of ln Z if a time constant is off by its own uncertainty."""
 
-SMALL_STEP = 1.0
+MAX_KEPT_STEP = 1.0
 """Largest step of a column, in standard deviations, after which rows of turns need not
 be linearised again."""
 
-SCATTERED = 4.0
+LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
 
 Key = tuple[tuple[str, int], ...]
@@ -119,7 +119,7 @@ class Inference(Refinement):
         members: tuple[Member, ...] = ()
         seen = set(been)
         passed: dict[tuple[Member, ...], None] = {}
-        for _ in range(PASSES):
+        for _ in range(MAX_LINEARISATIONS):
             seen.add(Search.key(found.members))
             if found.members != members:
                 state, values, _ = self.settle(
@@ -141,10 +141,12 @@ class Inference(Refinement):
                 own = search.evaluate(members, found.sizes)  # with its own shapes
                 # a point of the grid next to where a time constant was refined
                 back = Search.key(found.members) in seen
-                if found.score <= own.score + (OWN_SIGMA if back else SETTLED):
+                if found.score <= own.score + (
+                    TIME_CONSTANT_LOG_LOSS if back else MIN_LOG_RISE
+                ):
                     found = own
                     there, moved, _ = self.settle(state, values, members, found.sizes)
-                    if self.largest_step(found, values, moved) < SMALL_STEP:
+                    if self.largest_step(found, values, moved) < MAX_KEPT_STEP:
                         break
                     state, values = there, moved
                     continue
@@ -177,7 +179,7 @@ class Inference(Refinement):
         usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
         keys = {c.key for c, _ in usual}
         scatter = priors.SIZES[list(found.sizes.instability)]
-        if (scatter.max() > SCATTERED and not keys <= found.keys) or (
+        if (scatter.max() > LARGE_INSTABILITY and not keys <= found.keys) or (
             self._turns_need_usual_causes(found, keys)
         ):
             yield search.evaluate(usual)

@@ -16,7 +16,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
-from fieldcal.model.causes.smooth import WAVES
+from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram, evidence_gains
 from fieldcal.model.evidence.sets import Set, Sets, log_chances
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
@@ -30,16 +30,16 @@ from fieldcal.model.search.offer import (
     ranked_offers,
 )
 
-LEVELS = (3, 6, 9, 40)
+INSTABILITY_STEPS_DOWN = (3, 6, 9, 40)
 """Steps in size by which instability may decrease when a cause explains it."""
 
-FLICKER = (1, 2)
+FLICKER_STEPS_DOWN = (1, 2)
 """The same for flicker: at its full size it leaves little for a random walk."""
 
-FALLING = ((0, 1, 2), (3, 4, 5, 6))
+LOWERED_TOGETHER = ((0, 1, 2), (3, 4, 5, 6))
 """Instabilities that decrease together: of a triad; closures with the gyroscopes."""
 
-RAISED = (UNIT_INDEX + 1, UNIT_INDEX + 5)
+RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
 """Sizes to which that of closures may rise when that of the accelerometers decreases:
 a closure's error has a part from accelerometers and a part of its own."""
 
@@ -49,16 +49,16 @@ Level = tuple[InstabilityIndices, Eliminated, float]
 OfferKey = tuple[tuple[tuple[str, int], ...], Sizes | None]
 """Key of a set, and the sizes to which its offers are restricted, if any."""
 
-TRIAD = 3
+FLICKER_OUTPUTS = 3
 """Number of outputs of a group of flicker."""
 
-WIDE = 30
+MIN_CACHED_COLUMNS = 30
 """Number of columns of a group from which its gains are cached."""
 
-LEAST = 0.5
+MIN_LOG_GAIN = 0.5
 """Gain of ln L below which there is no offer, unless the cause is likely a priori."""
 
-NEAR = 12.0
+MAX_LOG_DISTANCE = 12.0
 """Largest distance of an offer from the best to be evaluated, ln."""
 
 
@@ -113,8 +113,8 @@ class Offers(Sets):
         Random walks and flicker far above the noise need more than the leading columns.
         """
         group = offer.member[1]
-        outputs = TRIAD if group.random else len(group.params)
-        if not outputs or len(group.columns) <= WAVES * outputs:
+        outputs = FLICKER_OUTPUTS if group.random else len(group.params)
+        if not outputs or len(group.columns) <= MAX_COSINES * outputs:
             return offer
         profile = LOG_DENSITY + table.state.gain_by_size(group.columns, group.typical)
         chance = self.log_chance([*there.members, offer.member])
@@ -147,13 +147,15 @@ class Offers(Sets):
             profile = gain + LOG_DENSITY
             size = profile.argmax(axis=2)
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
-            level, number = np.nonzero(taken >= LEAST - extra_log_odds(alike, apart))
+            level, number = np.nonzero(
+                taken >= MIN_LOG_GAIN - extra_log_odds(alike, apart)
+            )
             evidence = np.logaddexp.reduce(profile[level, number], axis=1)
             evidence += share[at[number]]
             for i, shares in apart.items():
                 some = at[number] == i
                 evidence[some] += shares[alike.variant[number[some]]] - share[i]
-            near = evidence > share[at].min() - NEAR
+            near = evidence > share[at].min() - MAX_LOG_DISTANCE
             each = (level[near], number[near], evidence[near])
             for i, m, worth in zip(*(e.tolist() for e in each), strict=True):
                 cause = self.dictionary.causes[at[m]]
@@ -203,7 +205,7 @@ class Offers(Sets):
                 group.changes_together or not group.in_state
             ):
                 # flicker is what few windows have instead of instability
-                down = [max(size - d, 0) for d in FLICKER if group.random]
+                down = [max(size - d, 0) for d in FLICKER_STEPS_DOWN if group.random]
                 for lower in dict.fromkeys([*down, 0]):
                     small = wide.copy()
                     small[some] = group.prior_sigma(float(priors.SIZES[lower]))
@@ -236,16 +238,18 @@ class Offers(Sets):
         if beside is not None:
             return list(dict.fromkeys([instability, beside]))
         found = [instability]
-        for some in FALLING if self.typical_instability.any() else ():
-            for down in LEVELS:
+        for some in LOWERED_TOGETHER if self.typical_instability.any() else ():
+            for down in INSTABILITY_STEPS_DOWN:
                 found.append(lowered_instability(instability, some, down))
-        acc = FALLING[0]
+        acc = LOWERED_TOGETHER[0]
         if (
             self.typical_instability[CLOSURE]
             and max(instability[c] for c in acc) > UNIT_INDEX
         ):
-            steady = lowered_instability(instability, acc, LEVELS[-1])
-            found += [steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED]
+            steady = lowered_instability(instability, acc, INSTABILITY_STEPS_DOWN[-1])
+            found += [
+                steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED_CLOSURES
+            ]
         return list(dict.fromkeys(found))
 
     def with_typical_calibration(self, there: Set) -> tuple[Array, float]:
@@ -270,12 +274,12 @@ class Offers(Sets):
         wide = there.state.prior_sigma.copy()
         for group, some, _ in self._permanent_groups(there):
             if group.in_state and group.fixed_size is None:
-                wide[some] = group.prior_sigma(priors.FREE)
+                wide[some] = group.prior_sigma(priors.FREE_SIZE)
         free = Eliminated.of(there.state.rows, there.state.columns, wide)
 
         def is_shown(group: Group) -> bool:
             gains = free.gain_by_size(group.columns, group.typical)
-            return bool(gains.max() >= LEAST)
+            return bool(gains.max() >= MIN_LOG_GAIN)
 
         return is_shown
 
@@ -323,7 +327,7 @@ class Offers(Sets):
         A group that is not connected with a triad has the same gain at all of its
         instabilities.
         """
-        if inner.shape[-1] < WIDE:
+        if inner.shape[-1] < MIN_CACHED_COLUMNS:
             return evidence_gains(inner, rhs, own)
         shape, k = rhs.shape[:-1], rhs.shape[-1]
         inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()

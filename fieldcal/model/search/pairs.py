@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.evidence.gram import (
-    ROUNDED,
+    MIN_EIGENVALUE,
     Eliminated,
     evidence_gains,
     gains_from_eigenvalues,
@@ -151,7 +151,7 @@ class _Alone:
         own, right = inner[at[:, :, None], at[:, None, :]], rhs[at]
         strength, axes = np.linalg.eigh(own)
         top = np.diagonal(own, 0, 1, 2).max(axis=1, keepdims=True)
-        seen = strength > ROUNDED * np.maximum(top, 1e-300)
+        seen = strength > MIN_EIGENVALUE * np.maximum(top, 1e-300)
         axes, strength = axes * seen[:, None, :], np.where(seen, strength, 0.0)
         along = (right[:, None, :] @ axes)[:, 0]
         profile = gains_from_eigenvalues(strength, along**2) + LOG_DENSITY

@@ -41,7 +41,7 @@ def proportional_causes(dictionary: Dictionary, sets: Sequence[Set]) -> Iterator
         groups = tuple(
             _proportional_group(dictionary, part, some, left) for left in about
         )
-        yield Cause("position", part, priors.UNKNOWN, groups, "unknown")
+        yield Cause("position", part, priors.UNKNOWN_FUNCTION_CHANCE, groups, "unknown")
 
 
 def _window_offsets(d: Dictionary, there: Set, some: Array) -> Array:

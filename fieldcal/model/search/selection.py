@@ -14,26 +14,26 @@ from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import LOG_DENSITY, Member, Sizes
 from fieldcal.model.search.offer import Offer, OfferTable
-from fieldcal.model.search.offers import NEAR, Offers
+from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
 from fieldcal.model.search.pairs import Pair, pair_gains
 
-SETTLED = 0.02
+MIN_LOG_RISE = 0.02
 """Rise of ln Z that is none."""
 
-MOST = 30
+MAX_STEPS = 30
 """Steps of one search."""
 
-FOLLOWED = 4
+EVALUATED_OFFERS = 4
 """Offers that are evaluated in full, at each step."""
 
-PROMISING = 16
+PAIRED_CAUSES = 16
 """Causes of which pairs are tried."""
 
 ALTERNATIVE_MARGIN = 6.0
 """Largest predicted distance of alternatives, other parameters or causes, to be
 evaluated, ln."""
 
-SLACK = 3.0
+PREDICTION_SLACK = 3.0
 """Log evidence that a full evaluation may add to the predicted score of an offer."""
 
 
@@ -56,7 +56,7 @@ class Search(Offers):
                 self._beside_usual,
             ]
         best = self.evaluate(start)
-        for _ in range(MOST):
+        for _ in range(MAX_STEPS):
             better = self._step(best, changes)
             if better is best:
                 break
@@ -136,7 +136,7 @@ class Search(Offers):
         """The set after the first change that raises its weight, or the set itself."""
         for change in changes:
             better = change(there)
-            if better.score > there.score + SETTLED:
+            if better.score > there.score + MIN_LOG_RISE:
                 return better
         return there
 
@@ -219,8 +219,11 @@ class Search(Offers):
         level = there.score if level is None else level
         offers = self.offers(there, beside)
         found = [there]
-        for offer in offers[:FOLLOWED]:
-            if offer.score > level - SLACK and offer.score > offers[0].score - NEAR:
+        for offer in offers[:EVALUATED_OFFERS]:
+            if (
+                offer.score > level - PREDICTION_SLACK
+                and offer.score > offers[0].score - MAX_LOG_DISTANCE
+            ):
                 found.append(self.accept(there, offer))
         return max(found, key=_score)
 
@@ -234,14 +237,14 @@ class Search(Offers):
         for table in self.tables(there):
             if table.instability == there.sizes.instability:
                 continue
-            least = level - 2 * SLACK - table.score
+            least = level - 2 * PREDICTION_SLACK - table.score
             for one, two, worth, (u, v) in self._pairs(there, table, least):
                 key = (one.member[0].key, two.member[0].key)
                 total = table.score + worth
                 if key not in tried or total > tried[key][0]:
                     tried[key] = total, replace(one, size=u), replace(two, size=v)
-        near = sorted(tried.values(), key=lambda t: -t[0])[:FOLLOWED]
-        near = [t for t in near if t[0] > level - 2 * SLACK]
+        near = sorted(tried.values(), key=lambda t: -t[0])[:EVALUATED_OFFERS]
+        near = [t for t in near if t[0] > level - 2 * PREDICTION_SLACK]
         found = [self.accept(there, one, two) for _, one, two in near]
         return max(found, key=_score, default=there)
 
@@ -253,7 +256,7 @@ class Search(Offers):
         Offers are also tried with all their parameters. Pairs that are worth less than
         `least` may be omitted.
         """
-        known = [o for o in table.offers if not is_function(o.member)][:PROMISING]
+        known = [o for o in table.offers if not is_function(o.member)][:PAIRED_CAUSES]
         every = [*known, *(_with_all_parameters(o) for o in known)]
         new = [a is not b for a, b in zip(known, every[len(known) :], strict=True)]
         wanted, more = [], {}

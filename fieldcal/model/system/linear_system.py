@@ -27,7 +27,7 @@ from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.turn_rows import TurnRows
 
-SHOWS = 1.0
+MIN_VISIBLE_SIGMAS = 1.0
 """Least size of a column that rows show, in standard deviations of all rows together,
 for a parameter of typical size."""
 

@@ -16,7 +16,12 @@ from fieldcal.model.rows.coloured_noise import Bands
 from fieldcal.model.rows.motion import MotionRows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.linear_system import SHOWS, Parts, System, append_course
+from fieldcal.model.system.linear_system import (
+    MIN_VISIBLE_SIGMAS,
+    Parts,
+    System,
+    append_course,
+)
 
 
 class MotionSystem(System):
@@ -69,7 +74,7 @@ class MotionSystem(System):
         if wanted is None:
             for part in out:
                 size = np.linalg.norm(part.design, axis=0) * d.typical[part.columns]
-                d.shown[part.columns] |= size > SHOWS
+                d.shown[part.columns] |= size > MIN_VISIBLE_SIGMAS
         return out
 
     def _views(self, state: State) -> list[RowView]:

@@ -32,10 +32,10 @@ from fieldcal.model.turns.attitude import closures, first_row_of_each, turn_geom
 from fieldcal.model.turns.turn import Turn, TurnTracker, apply_way_effects, select_rows
 from fieldcal.physics.experience import Experience
 
-SMALL = 1e-3
+FORCE_STEP = 1e-3
 """Step of the force for a derivative, m/s^2."""
 
-STEADY = 3.0
+MAX_WAY_CHI2 = 3.0
 """Mean square of a row on the way, after a fit of all columns, above which a hand shook
 the device and the rows on the way are not used."""
 
@@ -204,7 +204,7 @@ class Turns:
         length = float(np.ptp(turn.x.t))
         white = self.rows.noise[3:] / scale * np.sqrt(turn.interval)
         fading = settling_amplitudes(view.state, turn.x, view.since)[3:] / scale
-        built_up = priors.BUILT_UP * length * float(np.abs(fading).max())
+        built_up = priors.BUILD_UP_ON_WAY * length * float(np.abs(fading).max())
         earth = (
             EARTH_RATE / 3**0.5 * length if self.dictionary.unoriented.any() else 0.0
         )
@@ -317,12 +317,12 @@ def _output_slopes(state: State, x: Experience, since: Array) -> Array:
     """
     seen, out = state.experienced(x), np.zeros((len(x), 3, 3))
     for c in range(3):
-        step = SMALL * np.eye(3)[c]
+        step = FORCE_STEP * np.eye(3)[c]
         up, down = (
             state.output(replace(seen, f=seen.f + s * step), since)[:, :3]
             for s in (1.0, -1.0)
         )
-        out[:, :, c] = (up - down) / (2 * SMALL)
+        out[:, :, c] = (up - down) / (2 * FORCE_STEP)
     return out
 
 
@@ -339,7 +339,7 @@ def _drop_shaken_way(rows: list[TurnRows]) -> list[TurnRows]:
         white[there] = r.way
     some = design[:, np.abs(design).max(axis=0) > 0]
     rest = white - some @ np.linalg.lstsq(some, white, rcond=1e-9)[0]
-    if float(rest @ rest) <= STEADY * max(size - some.shape[1], 1):
+    if float(rest @ rest) <= MAX_WAY_CHI2 * max(size - some.shape[1], 1):
         return rows
     return [
         replace(r, way=np.zeros(0), way_design=np.zeros((0, len(r.columns))))

@@ -128,7 +128,9 @@ class WayRows:
         built = _settling_covariance(x, self.view.since, middle)
         cov += np.kron(built, np.outer(fading[:3], fading[:3]))
         density = self.noise[3:] / np.abs(state.scale[3:]) * np.sqrt(turn.interval)
-        building = priors.BUILT_UP * np.sqrt(length) * fading[3:] / state.scale[3:]
+        building = (
+            priors.BUILD_UP_ON_WAY * np.sqrt(length) * fading[3:] / state.scale[3:]
+        )
         density = np.hypot(density, building)
         for axis in range(3):
             along = np.broadcast_to(np.eye(3)[axis][:, None], (len(x.t), 3, 1))
@@ -139,7 +141,7 @@ class WayRows:
         sizes = priors.SIZES[list(self.known.sizes.instability)]
         loose = (sizes * self.dictionary.typical_instability)[:3]
         # the instability of windows may change with the attitude during a turn
-        apart = np.subtract.outer(middle, middle) / priors.BUILDS_S
+        apart = np.subtract.outer(middle, middle) / priors.BUILD_UP_S
         course = 1.0 + np.exp(-(apart**2) / 2)
         walks = self.dictionary.wander.residual_covariance(
             middle, np.diff(x.t[turn.cut])
@@ -177,8 +179,10 @@ def _settling_covariance(x: Experience, since: Array, middle: Array) -> Array:
     k = int(np.argmax(rest)) if rest.any() else len(x.t) - 1
     arrived = x.t[k] - (since[0, k] if rest.any() else 0.0) - x.t[0]
     unsure = np.where(
-        middle < arrived + priors.ARRIVAL_S, priors.BUILT_UP, priors.AFTERWARDS
+        middle < arrived + priors.ARRIVAL_S,
+        priors.BUILD_UP_ON_WAY,
+        priors.BUILD_UP_AT_END,
     )
-    apart = np.subtract.outer(middle, middle) / priors.BUILDS_S
+    apart = np.subtract.outer(middle, middle) / priors.BUILD_UP_S
     out: Array = np.outer(unsure, unsure) * np.exp(-(apart**2) / 2)
     return out

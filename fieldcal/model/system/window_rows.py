@@ -14,9 +14,14 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
 from fieldcal.model.system.linear_rows import LinearRows
-from fieldcal.model.system.linear_system import SHOWS, Parts, System, append_course
+from fieldcal.model.system.linear_system import (
+    MIN_VISIBLE_SIGMAS,
+    Parts,
+    System,
+    append_course,
+)
 
-NOTHING = 1e-6
+MIN_VISIBLE_ACC = 1e-6
 """Least change of an accelerometer by a column of typical size that windows show,
 m/s^2."""
 
@@ -96,7 +101,9 @@ class WindowSystem(System):
         if part.channel < 3:
             there: NDArray[np.bool_] = (table / part.weight[:, None]).max(
                 axis=0
-            ) > NOTHING
+            ) > MIN_VISIBLE_ACC
             return there
-        stands_out: NDArray[np.bool_] = np.linalg.norm(table, axis=0) > SHOWS
+        stands_out: NDArray[np.bool_] = (
+            np.linalg.norm(table, axis=0) > MIN_VISIBLE_SIGMAS
+        )
         return stands_out

@@ -15,10 +15,10 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
-SMOOTH_S = 0.1
+ACCELERATION_MEAN_S = 0.1
 """Means that the angular acceleration is taken from."""
 
-LOST_ANGLE = 0.3
+MAX_MISCLOSURE_RAD = 0.3
 """Misclosure that no gyroscope error makes, rad: outputs clipped, or another turn."""
 
 
@@ -77,9 +77,9 @@ def antisymmetric_vector(matrix: Array) -> Array:
 
 
 def accelerations(t: Array, w: Array) -> Array:
-    """Angular acceleration at the edges (m + 1, 3), from means over `SMOOTH_S`."""
+    """Angular acceleration at the edges (m + 1, 3), from short means of the rate."""
     step = float(t[1] - t[0])
-    m = max(1, round(SMOOTH_S / step)) | 1
+    m = max(1, round(ACCELERATION_MEAN_S / step)) | 1
     kernel = np.ones(m) / m
     padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
     smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
@@ -91,7 +91,7 @@ def vertical_lost(x: Experience, pair: tuple[int, int], attitude: Array) -> bool
     """Whether the gyroscopes lost track of the vertical in a turn."""
     p, q = (x.f[int(np.argmax(x.position == i))] for i in pair)
     along = float(p @ (attitude.T @ q)) / float(np.linalg.norm(p) * np.linalg.norm(q))
-    return bool(along < np.cos(LOST_ANGLE))
+    return bool(along < np.cos(MAX_MISCLOSURE_RAD))
 
 
 def turn_geometry(
@@ -135,7 +135,7 @@ def closures(f: Array, held: Array, end: Array) -> tuple[Array, NDArray[np.bool_
 
     """
     off = end.T @ held[:, 1] @ np.swapaxes(held[:, 0], 1, 2)  # I + [phi]x
-    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(LOST_ANGLE)
+    whole = (np.trace(off, axis1=1, axis2=2) - 1) / 2 > np.cos(MAX_MISCLOSURE_RAD)
     if whole.all():
         return antisymmetric_vector(off), whole
     up = f[:, 0] / np.linalg.norm(f[:, 0], axis=1, keepdims=True)

@@ -21,16 +21,16 @@ from fieldcal.model.turns.attitude import interpolate_vectors
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
 
-FINE_S = 0.02
+INTEGRATION_STEP_S = 0.02
 """Step of the integration at high sampling rates."""
 
-PIECE_S = 0.15
+WAY_MEAN_S = 0.15
 """Means of the accelerometers on the way."""
 
-PIECES = 60
+MAX_WAY_MEANS = 60
 """Of one turn at most."""
 
-FEWEST = 8
+MIN_STEPS = 8
 """Steps that a turn takes at least."""
 
 
@@ -105,14 +105,14 @@ class IntegratedTurn:
 
 
 def divide_into_steps(leg: Leg) -> Steps | None:
-    """Steps of about `FINE_S`, and pieces of about `PIECE_S`; None if too few."""
+    """Steps of about 0.02 s and pieces of about 0.15 s; None if there are too few."""
     block, first = leg.source.block, leg.first
     rate = leg.source.rate
-    each = max(1, round(FINE_S * rate))
+    each = max(1, round(INTEGRATION_STEP_S * rate))
     count = (leg.last - first - 1) // each
-    if count < FEWEST:
+    if count < MIN_STEPS:
         return None
-    piece = max(1, round(PIECE_S * rate / each), -(-count // PIECES))
+    piece = max(1, round(WAY_MEAN_S * rate / each), -(-count // MAX_WAY_MEANS))
     cut = np.append(np.arange(0, count - piece // 2, piece), count).astype(np.intp)
     t = block.t[first : first + count * each + 1]
     return Steps(first, t, each, np.arange(count + 1) * each, cut)

@@ -11,16 +11,16 @@ from fieldcal.model.rows.reduce import Rows, RowSource
 MARGIN_S = 0.6
 """Time before and after the motion that is integrated too, s."""
 
-LONGEST_S = 60.0
+MAX_TURN_S = 60.0
 """A turn that takes longer is not followed."""
 
-CLEARLY = 2.0
+MIN_MOTION_RATIO = 2.0
 """Least ratio of motion to limit; below, the whole gap is used."""
 
-TOUCH_S = 5.0
+BELONGING_S = 5.0
 """Time before and after a motion in which smaller ones belong to it, s."""
 
-AWAY = 5.0
+MOVING_SIGMAS = 5.0
 """Standard deviations of the integrated angle from which the device moves."""
 
 
@@ -43,7 +43,7 @@ def motion_bounds(
         return None
     if not has_no_pause(block.t, first, last, rate):
         return None
-    whole = (first, last) if block.t[last - 1] - block.t[first] < LONGEST_S else None
+    whole = (first, last) if block.t[last - 1] - block.t[first] < MAX_TURN_S else None
     seen = [rows.y[rows.x.position == p, 3:] for p in pair]
     if not all(np.isfinite(one).any(axis=0).all() for one in seen):
         return whole  # nothing tells how they rest
@@ -52,16 +52,16 @@ def motion_bounds(
     level = np.abs(total[m:] - total[:-m]) / m
     limit = np.maximum(8 * rows.noise[3:] / np.sqrt(m), 3e-3)
     at = np.flatnonzero((level > limit).any(axis=1))
-    if not (len(at) and level.max() > CLEARLY * limit.min()):
+    if not (len(at) and level.max() > MIN_MOTION_RATIO * limit.min()):
         return whole
-    noise, each = rows.noise[3:], round(TOUCH_S * rate)
+    noise, each = rows.noise[3:], round(BELONGING_S * rate)
     before = block.gyr[gap][max(at[0] - each, 0) : at[0]] - rest[0]
     after = block.gyr[gap][at[-1] + m : at[-1] + m + each] - rest[1]
     margin = round(MARGIN_S * rate)
     start = first + int(at[0]) - _moving_at_end(before, noise) - margin
     end = first + int(at[-1]) + m + _moving_at_end(after[::-1], noise) + margin
     start, end = max(start, first), min(end, last)
-    return (start, end) if block.t[end - 1] - block.t[start] < LONGEST_S else None
+    return (start, end) if block.t[end - 1] - block.t[start] < MAX_TURN_S else None
 
 
 def _moving_at_end(off: Array, noise: Array) -> int:
@@ -71,5 +71,5 @@ def _moving_at_end(off: Array, noise: Array) -> int:
     """
     angle = np.abs(np.cumsum(off, axis=0))
     spread = noise * np.sqrt(np.arange(1, len(off) + 1))[:, None]
-    moved = (angle > AWAY * spread).any(axis=1)
+    moved = (angle > MOVING_SIGMAS * spread).any(axis=1)
     return len(off) - int(np.argmax(moved)) if moved.any() else 0

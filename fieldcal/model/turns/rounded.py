@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
 
-NEXT = 0.99
+MAX_STEP_PART = 0.99
 """Part of a step: a mean between two values is less than one from both."""
 
 
@@ -85,7 +85,7 @@ class StandingOutputs:
 
     def _there(self, gyr: Array) -> NDArray[np.bool_]:
         """Samples whose outputs (n, 3) are those of the windows."""
-        found: NDArray[np.bool_] = np.abs(gyr - self.value) < NEXT * self.step
+        found: NDArray[np.bool_] = np.abs(gyr - self.value) < MAX_STEP_PART * self.step
         return found
 
 

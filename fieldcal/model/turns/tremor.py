@@ -21,10 +21,10 @@ import numpy as np
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import RowSource
 
-EDGE_S = 10.0
+WINDOW_EDGE_S = 10.0
 """Time of a window next to the turn that is looked at, s."""
 
-LEAST = 16
+MIN_SAMPLES = 16
 """Least number of samples."""
 
 
@@ -37,7 +37,7 @@ def sway_at_ends(source: RowSource, windows: Index) -> float:
     windows : (2, 2) bounds of those before and after the turn, in samples
 
     """
-    most = round(EDGE_S * source.rate)
+    most = round(WINDOW_EDGE_S * source.rate)
     (first, end), (start, last) = windows.tolist()
     before = slice(max(first, end - most), end)
     after = slice(start, min(last, start + most))
@@ -59,7 +59,7 @@ def sway_variance(rate: Array, step: float) -> float:
 
     """
     n = len(rate)
-    if n < LEAST:
+    if n < MIN_SAMPLES:
         return 0.0
     angle = np.cumsum((rate - rate.mean(axis=0)) * step, axis=0)
     flat = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]

@@ -47,7 +47,7 @@ from fieldcal.model.turns.tremor import sway_at_ends
 from fieldcal.physics.effect import Motion
 from fieldcal.physics.experience import Experience
 
-LEAST = np.deg2rad(1.0)
+MIN_TURN_RAD = np.deg2rad(1.0)
 """Smaller turns are not used."""
 
 PER_ROW = (
@@ -57,7 +57,7 @@ PER_ROW = (
 )  # fmt: skip
 """Fields of `Experience` that have one value per row."""
 
-CORRECTIONS = 3
+MAX_CORRECTIONS = 3
 """Largest number of corrections for the gyroscopes' other errors; each leaves 1 %."""
 
 
@@ -215,7 +215,7 @@ class TurnTracker:
         if (steps := divide_into_steps(leg)) is None:
             return None
         rid: Array = np.zeros((len(steps.edge), 3))
-        for _ in range(CORRECTIONS):
+        for _ in range(MAX_CORRECTIONS):
             way = integrate_turn(leg, steps, rid)
             x = self._edges(ends, steps.at, pair, way, steps.edge)
             felt, x = x.f, apply_way_effects(x, state)
@@ -229,7 +229,7 @@ class TurnTracker:
         if vertical_lost(ends, pair, end):
             self.contradicted_turns.append(pair)
             return None
-        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < LEAST:
+        if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < MIN_TURN_RAD:
             return None
         noise = self.rows.noise[3:] / np.abs(state.scale[3:])
         unsure = sampling_error(steps.t, way.rate - way.earth, steps.each, noise)

@@ -9,7 +9,7 @@ import pytest
 from spectra_windows import NOISE, RATE, noise, pieces, windows_of
 
 from fieldcal.diagnosis.signal.peaks import Peak, highest_peak
-from fieldcal.diagnosis.signal.periodogram import TRIADS, compute_spectra
+from fieldcal.diagnosis.signal.periodogram import CHANNEL_GROUPS, compute_spectra
 
 
 def test_the_noise_beside_a_line_is_that_of_its_frequency() -> None:
@@ -76,7 +76,7 @@ def test_a_line_of_one_output_is_not_lost_among_those_of_its_triad() -> None:
         windows, *channel_groups = compute_spectra(p := windows_of(seed, 1.1e-4))
         line = highest_peak(p, [windows, *channel_groups], [])
         found += line is not None and abs(line.hz - 41.9) < 0.2
-        sums = [replace(one, channel_groups=TRIADS) for one in channel_groups]
+        sums = [replace(one, channel_groups=CHANNEL_GROUPS) for one in channel_groups]
         line = highest_peak(p, [windows, *sums], [])
         by_triads += line is not None and abs(line.hz - 41.9) < 0.2
     # of a power 24 times the noise, with the square root of twice that as its spread

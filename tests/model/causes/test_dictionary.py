@@ -164,7 +164,7 @@ def test_where_columns_are() -> None:
     assert d.cosine_columns(2, 3).tolist() == [
         d.waves + 2 * d.span.count + i for i in range(3)
     ]
-    assert len(d.cosine_columns(1)) == smooth.WAVES
+    assert len(d.cosine_columns(1)) == smooth.MAX_COSINES
     assert d.window_columns(4).tolist() == [d.windows + 4 * 9 + i for i in range(9)]
     assert d.position_count == 9 and d.window_positions.tolist() == list(range(9))
     assert d.scale - d.bias == 6 and d.windows - d.small_rotation == 18
@@ -188,7 +188,10 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
     for c, channel in enumerate(NAMES):
         for kind in ("alpha", "joints", "force", "temperature", "since turn"):
             cause = CAUSES[f"{kind}:{channel}"]
-            assert (cause.kind, cause.chance) == ("unknown", priors.UNKNOWN)
+            assert (cause.kind, cause.chance) == (
+                "unknown",
+                priors.UNKNOWN_FUNCTION_CHANCE,
+            )
             (group,) = cause.variants
             np.testing.assert_allclose(group.typical, both[c])
         whole = CAUSES[f"position:{channel}"].variants[0]
@@ -204,14 +207,14 @@ def test_what_no_effect_makes_is_of_the_size_of_effects() -> None:
         if c < 3:
             own = fading[0].columns[4 * c : 4 * c + 4]
             np.testing.assert_array_equal(fading[1].columns, own)
-        for span, group in zip(smooth.SPANS, CAUSES[f"time:{channel}"].variants,
+        for span, group in zip(smooth.HALF_WAVES, CAUSES[f"time:{channel}"].variants,
                                strict=True):  # fmt: skip
             np.testing.assert_allclose(
                 group.typical, both[c] * smooth.smooth_course_sizes(span)
             )
             assert group.shape == {"waves": span}
     for part, some in (("acc", range(3)), ("gyr", range(3, 6))):
-        for span, group in zip(smooth.SPANS, CAUSES[f"time:{part}"].variants,
+        for span, group in zip(smooth.HALF_WAVES, CAUSES[f"time:{part}"].variants,
                                strict=True):  # fmt: skip
             shape = smooth.smooth_course_sizes(span)
             at = [WHOLE.waves + c * WHOLE.span.count + i for c in some
@@ -303,7 +306,7 @@ def test_positions_that_were_set_elsewhere() -> None:
 
 def test_biases_that_wander() -> None:
     effect = catalogue()["random_walk"]
-    shape = WHOLE.span.walk()[: smooth.WAVES]
+    shape = WHOLE.span.walk()[: smooth.MAX_COSINES]
     for part, some in (("acc", (0, 1, 2)), ("gyr", (3, 4, 5))):
         cause = CAUSES[f"random_walk:{part}"]
         assert cause.chance == effect.chance(WHOLE.x) and cause.kind == "random"
@@ -442,7 +445,7 @@ def test_flicker_is_noise_of_as_many_cosines_as_biases_wander_by() -> None:
         assert (cause.kind, cause.reportable, cause.chance) == ("noise", False, 0.1)
         (group,) = cause.variants
         assert group.random and group.effect is None
-        k = np.arange(1, smooth.WAVES + 1)
+        k = np.arange(1, smooth.MAX_COSINES + 1)
         size = {"acc": 2e-3, "gyr": 1e-4}[part]
         sizes = [size * UNIT[c] / np.sqrt(k) for c in some]
         np.testing.assert_allclose(group.typical, np.concatenate(sizes))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.causes.flicker_series import MOST, FlickerSeries
+from fieldcal.model.causes.flicker_series import MAX_TERMS, FlickerSeries
 
 DRAWS = 4000
 
@@ -110,7 +110,7 @@ def test_a_row_that_was_not_measured_changes_little() -> None:
 
 def test_between_rows_a_term_goes_on() -> None:
     series = FlickerSeries.of(*growing(200, 1.02))
-    assert series.terms.shape[1] == MOST
+    assert series.terms.shape[1] == MAX_TERMS
     np.testing.assert_allclose(series.at(series.t), series.terms)
     middle = series.at((series.t[:1] + series.t[1:2]) / 2)
     np.testing.assert_allclose(middle[0], series.terms[:2].mean(axis=0))

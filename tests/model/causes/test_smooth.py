@@ -21,10 +21,12 @@ def test_waves_are_cosines_over_the_session() -> None:
     k = np.arange(1, 6)
     for row, part in zip(found, [0.0, 0.25, 0.5, 1.0, 1.0, 0.0], strict=False):
         np.testing.assert_allclose(row, np.cos(np.pi * k * part), atol=1e-12)
-    assert CourseSpan(X.t).count == smooth.WAVES == CourseSpan(X.t).waves(X).shape[1]
+    assert (
+        CourseSpan(X.t).count == smooth.MAX_COSINES == CourseSpan(X.t).waves(X).shape[1]
+    )
     alone = CourseSpan(np.array([3.0]))
     still = replace(ladder(1), t=np.full(9, 3.0))
-    np.testing.assert_array_equal(alone.waves(still), np.ones((9, smooth.WAVES)))
+    np.testing.assert_array_equal(alone.waves(still), np.ones((9, smooth.MAX_COSINES)))
 
 
 def test_a_row_has_the_mean_of_a_cosine_over_what_it_lasts() -> None:
@@ -43,7 +45,7 @@ def test_a_walk_has_the_variance_of_its_series() -> None:
     np.testing.assert_allclose(sizes[0] / sizes[:4], [1, 2, 3, 4])
 
 
-@pytest.mark.parametrize("span", smooth.SPANS)
+@pytest.mark.parametrize("span", smooth.HALF_WAVES)
 def test_a_smooth_course_has_unit_variance_and_fades(span: float) -> None:
     sizes = smooth.smooth_course_sizes(span)
     assert (sizes**2).sum() / 2 == pytest.approx(1.0)
@@ -52,7 +54,7 @@ def test_a_smooth_course_has_unit_variance_and_fades(span: float) -> None:
         np.log(sizes / sizes[0]), -0.5 * (k**2 - 1) / span**2, atol=1e-9
     )
     beyond = np.exp(-0.5 * ((len(sizes) + 1) / span) ** 2)
-    assert beyond <= 1e-3 or len(sizes) == smooth.WAVES
+    assert beyond <= 1e-3 or len(sizes) == smooth.MAX_COSINES
     assert np.exp(-0.5 * (len(sizes) / span) ** 2) > 1e-3
 
 

@@ -14,7 +14,7 @@ from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (
-    STEP,
+    LOG_SIZE_STEP,
     UNIT_INDEX,
     instability_log_prior,
     most_probable_axis_size,
@@ -22,13 +22,13 @@ from fieldcal.model.evidence.sizing import (
 )
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.offer import lowered_instability
-from fieldcal.model.search.offers import FALLING, LEVELS
+from fieldcal.model.search.offers import INSTABILITY_STEPS_DOWN, LOWERED_TOGETHER
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")
 SESSION = Session.of(ladder(), KEYS)
 DENSITY = np.log(priors.density())
-UNSTEADY = np.log(priors.density(priors.STEEP))
+UNSTEADY = np.log(priors.density(priors.INSTABILITY_TAIL))
 
 
 def test_numbers_that_everything_is_compared_with() -> None:
@@ -46,7 +46,7 @@ def test_numbers_that_everything_is_compared_with() -> None:
     np.testing.assert_allclose(beside[wide], 0.2 / wide.sum())
     np.testing.assert_allclose(beside[~wide], 0.0, atol=1e-15)
     assert SIZES[UNIT_INDEX] == pytest.approx(1.0, rel=0.4)
-    np.testing.assert_allclose(np.diff(np.log(SIZES)), STEP)
+    np.testing.assert_allclose(np.diff(np.log(SIZES)), LOG_SIZE_STEP)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -61,7 +61,7 @@ def test_a_size_between_those_tried_is_where_the_evidence_is_highest(
         one.gram.with_instability(TAU), SET, typical * [1.0, v, v, 1.0]
     )
     best, unsure = most_probable_size(state, at, v)
-    fine = v * np.exp(np.linspace(-STEP, STEP, 129))
+    fine = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, 129))
     score = [one.dense.evidence(SET, typical * [1.0, u, u, 1.0]) for u in fine]
     score += np.interp(np.log(fine), np.log(SIZES), DENSITY)
     assert best == pytest.approx(fine[int(np.argmax(score))], rel=1e-9)
@@ -88,14 +88,14 @@ def test_the_size_of_one_axis_of_several_by_dense_rows(seed: int) -> None:
     )
     best, unsure = most_probable_axis_size(state, np.array([2]), v, (middle, part))
     apart = np.linspace(-4.0, 4.0, 129)
-    near = middle * np.exp(apart * priors.UNLIKE)
+    near = middle * np.exp(apart * priors.AXES_LOG_SPREAD)
     score = [one.dense.evidence(SET, typical * [1.0, v, u, 1.0]) for u in near]
     assert best == pytest.approx(near[int(np.argmax(score - apart**2 / 2))])
     column = one.dense.design[:, SET[2]]
     rest = one.dense.total(SET[[0, 1, 3]], typical[[0, 1, 3]] * [1.0, v, 1.0])
     strength = column @ np.linalg.solve(rest, column)
     share = best**2 * strength / (1 + best**2 * strength)
-    before = priors.UNLIKE**-2
+    before = priors.AXES_LOG_SPREAD**-2
     info = before + 2 * share**2
     assert unsure == pytest.approx(np.sqrt(1 / info + (before * part / info) ** 2))
 
@@ -113,17 +113,20 @@ def test_gains_at_sizes_by_hand() -> None:
 def test_how_alike_instabilities_are_by_hand() -> None:
     unstable = np.array([1.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0])
     found = instability_log_prior((10, 14, 99, 20, 99, 99, 16), unstable)
-    apart = 2 * (2 * STEP / priors.UNLIKE) ** 2 / 2
+    apart = 2 * (2 * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD) ** 2 / 2
     assert found == pytest.approx(UNSTEADY[12] + UNSTEADY[20] + UNSTEADY[16] - apart)
     between = instability_log_prior((10, 11, 0, 20, 0, 0, 16), unstable)
     middle = (UNSTEADY[10] + UNSTEADY[11]) / 2
-    apart = 2 * (STEP / 2 / priors.UNLIKE) ** 2 / 2
+    apart = 2 * (LOG_SIZE_STEP / 2 / priors.AXES_LOG_SPREAD) ** 2 / 2
     assert between == pytest.approx(middle + UNSTEADY[20] + UNSTEADY[16] - apart)
     other = np.linspace(0.0, -1.0, len(SIZES))
     assert instability_log_prior(
         (10, 14, 0, 20, 0, 0, 16), unstable, other
     ) == pytest.approx(
-        other[12] + other[20] + other[16] - 2 * (2 * STEP / priors.UNLIKE) ** 2 / 2
+        other[12]
+        + other[20]
+        + other[16]
+        - 2 * (2 * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD) ** 2 / 2
     )
     assert instability_log_prior((5,) * 7, np.zeros(7)) == 0.0
 
@@ -197,7 +200,11 @@ def test_what_a_set_may_be_given_is_asked_beside_other_instabilities(seed: int) 
     kept = {t.instability for t in tables}
     expected = {
         mode,
-        *(lowered_instability(mode, some, down) for some in FALLING for down in LEVELS),
+        *(
+            lowered_instability(mode, some, down)
+            for some in LOWERED_TOGETHER
+            for down in INSTABILITY_STEPS_DOWN
+        ),
     }
     assert kept == expected
     rest = (

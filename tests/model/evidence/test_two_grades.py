@@ -45,7 +45,7 @@ def test_the_chance_is_that_of_both_sizes_by_dense_rows(seed: int) -> None:
         less = SIZES.copy()
         less[at] *= part
         ahead = full - one.dense.evidence(SET, less)
-        odds = np.exp(ahead) * (1 - priors.AS_STATED) / priors.AS_STATED
+        odds = np.exp(ahead) * (1 - priors.AS_STATED_CHANCE) / priors.AS_STATED_CHANCE
         assert chances[kind] == pytest.approx(odds / (1 + odds), rel=1e-6)
 
 
@@ -58,7 +58,7 @@ def test_each_triad_warms_up_by_its_own() -> None:
     chances = chances_of_coarser(state, [warming], coarser, stated)
     less = SIZES * [0.1, 0.1, 1.0, 1.0]
     ahead = one.dense.evidence(SET, SIZES) - one.dense.evidence(SET, less)
-    odds = np.exp(ahead) * (1 - priors.AS_STATED) / priors.AS_STATED
+    odds = np.exp(ahead) * (1 - priors.AS_STATED_CHANCE) / priors.AS_STATED_CHANCE
     assert chances == pytest.approx({"acc_per_k": odds / (1 + odds)}, rel=1e-6)
 
 

@@ -51,7 +51,7 @@ def test_what_stands_in_a_cause_s_place_stands_on_both_triads() -> None:
     alias = posterior.alternatives[name][other]
     assert alias.keys == {f"{other}:acc", f"{other}:gyr"}
     near = posterior.evidence(best) - posterior.evidence(alias)
-    assert abs(near) < thresholds.SAME
+    assert abs(near) < thresholds.ALIAS_LOG_MARGIN
     assert posterior.without(name).members == ()
     (found,) = posterior.probable_causes()
     assert (found.name, found.aliases) == (name, (other,))

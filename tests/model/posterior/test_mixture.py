@@ -24,7 +24,7 @@ SD = 1e-3
 PLACES = tuple(
     Position.deg(a, b) for a, b in [(0, 0), (60, 20), (-50, 40), (20, -70), (150, 10)]
 )
-WIDE = priors.FREE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
+WIDE = priors.FREE_SIZE * np.array([priors.BIAS_ACC] * 3 + [priors.SCALE] * 3)
 UNSTABLE = priors.INSTABILITY_ACC
 
 
@@ -80,9 +80,9 @@ def steep(power: float) -> Array:
 
 def scattered() -> Array:
     """Chance of each size of what windows wander by, ln: or of a fixture that does."""
-    wide = (priors.SIZES > 1) & (priors.SIZES <= priors.LOOSEST)
-    usual = (1 - priors.LOOSE) * np.exp(steep(priors.STEEP))
-    return np.asarray(np.log(usual + priors.LOOSE * wide / wide.sum()))
+    wide = (priors.SIZES > 1) & (priors.SIZES <= priors.LOOSEST_FIXTURE)
+    usual = (1 - priors.LOOSE_FIXTURE_CHANCE) * np.exp(steep(priors.INSTABILITY_TAIL))
+    return np.asarray(np.log(usual + priors.LOOSE_FIXTURE_CHANCE * wide / wide.sum()))
 
 
 def known(sizes: Array) -> float:
@@ -90,7 +90,7 @@ def known(sizes: Array) -> float:
     apart = np.log(priors.SIZES[sizes])
     apart = apart - apart.mean()
     middle = np.interp(sizes.mean(), np.arange(33), scattered())
-    return float(middle - 0.5 * ((apart / priors.UNLIKE) ** 2).sum())
+    return float(middle - 0.5 * ((apart / priors.AXES_LOG_SPREAD) ** 2).sum())
 
 
 def hypotheses(one: Case) -> list[tuple[float, int, Array]]:
@@ -106,7 +106,7 @@ def hypotheses(one: Case) -> list[tuple[float, int, Array]]:
             for v in range(33):
                 push = np.zeros((n, 3))
                 push[i] = (priors.SIZES[v] * priors.UNKNOWN_ACC) ** 2
-                chance = np.log(priors.BAD) + steep(priors.TAIL)[v]
+                chance = np.log(priors.BAD_WINDOW_CHANCE) + steep(priors.SIZE_TAIL)[v]
                 bad = cov + np.diag(push.ravel())
                 out.append((known(sizes) + float(chance), i, bad))
     return out

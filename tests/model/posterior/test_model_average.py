@@ -13,7 +13,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.posterior.mixture import KEPT
+from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.posterior.model_average import (
     ModelAverage,
     average_of_columns,
@@ -157,8 +157,12 @@ def test_only_sets_count_that_are_likely_beside_the_best() -> None:
     average, _ = average_of(search)
     top = max(w for _, w in average.posterior.weights_on_grid)
     weights = [w for _, w in average.sets]
-    assert min(weights) > np.exp(-KEPT) * top
-    kept = [w for _, w in average.posterior.weights_on_grid if w > np.exp(-KEPT) * top]
+    assert min(weights) > np.exp(-MAX_LOG_DISTANCE) * top
+    kept = [
+        w
+        for _, w in average.posterior.weights_on_grid
+        if w > np.exp(-MAX_LOG_DISTANCE) * top
+    ]
     assert sorted(weights) == sorted(kept)
 
 

@@ -14,7 +14,7 @@ from fieldcal.model.evidence.sets import Set, log_chances
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
 from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.selection import SLACK, Search
+from fieldcal.model.search.selection import PREDICTION_SLACK, Search
 
 KEYS = ("bias_drift:acc", "bias_drift:gyr", "cross_coupling", "settling:acc",
         "time:acc", "time:ax")  # fmt: skip
@@ -43,7 +43,7 @@ def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
     assert not apart, "the variants of each are alike"
     for key, cause in CAUSES.items():
         again = key.startswith("bias_drift")
-        chance = priors.AGAIN if again else cause.chance
+        chance = priors.COMPANION_CHANCE if again else cause.chance
         assert found[key] == pytest.approx(np.log(chance / len(cause.variants)))
     np.testing.assert_array_equal(
         search._chances(search.evaluate(()))[0], SESSION.dictionary.log_chances
@@ -117,7 +117,7 @@ def test_what_wanders_far_above_the_noise_is_offered_by_all_its_waves(
         return offer
 
     by_some = offered()
-    monkeypatch.setattr(offers, "WAVES", 20)
+    monkeypatch.setattr(offers, "MAX_COSINES", 20)
     by_all, search = offered(), session.search(off)
     found = search.accept(search.evaluate(()), by_all)
     assert by_all.score == pytest.approx(found.score, abs=8.0)
@@ -134,11 +134,11 @@ def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     at = np.array([g.shape["at_s"] for g in ACC.variants])
     at_once = np.abs(at - one.shape["at_s"]) == np.abs(at - one.shape["at_s"]).min()
     assert at_once.sum() == 4, "all axes together, or one"
-    assert np.exp(shares[at_once]).sum() == pytest.approx(priors.AGAIN)
+    assert np.exp(shares[at_once]).sum() == pytest.approx(priors.COMPANION_CHANCE)
     np.testing.assert_allclose(shares[~at_once], np.log(ACC.chance / len(at)))
     for other in ([], [(DRIFT, DRIFT.variants[0])]):
         assert log_chances(ACC, other) == pytest.approx(np.log(ACC.chance / len(at)))
-    again = np.log(priors.AGAIN / len(DRIFT.variants))
+    again = np.log(priors.COMPANION_CHANCE / len(DRIFT.variants))
     assert (
         log_chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
     )
@@ -151,19 +151,19 @@ def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> 
     assert whole.shape["at_s"] == at and len(whole.params) == 3
     assert acc.variants == (*ACC.variants, whole) and whole.fixed_size == 1.0
     alone, usual = log_chances(acc, []), np.log(ACC.chance / len(acc.variants))
-    assert alone[-1] == pytest.approx(np.log(priors.RESTARTED))
+    assert alone[-1] == pytest.approx(np.log(priors.RESTART_CHANCE))
     np.testing.assert_allclose(alone[:-1], usual)
     both = log_chances(acc, [(gyr, other)])
-    assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART))
+    assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART_ODDS))
     there = np.array([g.shape["at_s"] == at for g in ACC.variants])
-    assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART)
+    assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART_ODDS)
     np.testing.assert_allclose(both[:-1][~there], usual)
     assert DRIFT.expecting_within([(0.0, 1e3)]) is DRIFT, "it has no instant"
     assert ACC.expecting_within([]) is ACC
     (knock,) = Session.of(ladder(), ("base_step",)).dictionary.causes
     anew = knock.expecting_within([(at - 1e-3, at + 1e-3)])
     assert len(anew.expected) == 1, "set up anew meanwhile"
-    assert log_chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTARTED))
+    assert log_chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTART_CHANCE))
 
 
 @pytest.mark.parametrize("off", [True, False], ids=["off", "on"])
@@ -181,7 +181,7 @@ def test_what_no_row_shows_of_a_restart_is_offered_all_the_same(off: bool) -> No
     if off:
         offer = found[acc.key]
         assert offer.member[1] in acc.expected
-        assert 0 < offer.score - there.score < np.log(priors.BOTH_RESTART)
+        assert 0 < offer.score - there.score < np.log(priors.BOTH_RESTART_ODDS)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -201,7 +201,7 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     (offer,) = [o for o in offered if o.member[0] is ACC]
     assert offer.member[1].shape == acc[1].shape
     taken = search.accept(search.evaluate((gyr,)), offer)
-    assert abs(taken.score - offer.score) < 2 * SLACK
+    assert abs(taken.score - offer.score) < 2 * PREDICTION_SLACK
 
 
 def test_what_is_known_from_elsewhere_stays_so_large_beside_every_offer() -> None:

@@ -130,7 +130,7 @@ def test_where_nothing_is_nothing_is_said() -> None:
     session = Session.of(ladder(2), SUSPECTED)
     for seed in range(200):
         rng = np.random.default_rng(1000 + seed)
-        tau = unstable() * np.exp(rng.normal(-1.5, priors.UNLIKE, 7))
+        tau = unstable() * np.exp(rng.normal(-1.5, priors.AXES_LOG_SPREAD, 7))
         search = session.search(session.noise(rng, tau))
         best = search.run()
         empty += not best.members
@@ -254,12 +254,12 @@ def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
         np.log(acc.chance / len(acc.variants))
     )
     both = found.log_chance([first, (gyr, gyr.variants[3])])
-    again = np.log(priors.AGAIN / len(gyr.variants))
+    again = np.log(priors.COMPANION_CHANCE / len(gyr.variants))
     assert both == pytest.approx(found.log_chance([first]) + again)
     three = found.log_chance(
         [first, (gyr, gyr.variants[3]), (other, other.variants[0])]
     )
-    assert three == pytest.approx(both + np.log(priors.UNKNOWN))
+    assert three == pytest.approx(both + np.log(priors.UNKNOWN_FUNCTION_CHANCE))
 
 
 def test_an_offer_foretells_the_set_with_it() -> None:

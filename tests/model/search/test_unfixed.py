@@ -14,7 +14,7 @@ from fieldcal.cli import main
 from fieldcal.diagnosis.explain import Explanation, explain
 from fieldcal.diagnosis.prepare import prepare_recording
 from fieldcal.model.evidence.sizing import UNIT_INDEX, Sizes
-from fieldcal.model.search.inference import SMALL_STEP
+from fieldcal.model.search.inference import MAX_KEPT_STEP
 from fieldcal.model.search.selection import Search
 from fieldcal.session.folder import Session
 
@@ -51,7 +51,7 @@ def test_the_state_stays_where_the_set_does() -> None:
     own, best = inferred.inference, inferred.best
     own.gram(inferred.state, inferred.values, None)
     _, moved, _ = own.settle(inferred.state, inferred.values, best.members, best.sizes)
-    assert own.largest_step(best, inferred.values, moved) < SMALL_STEP
+    assert own.largest_step(best, inferred.values, moved) < MAX_KEPT_STEP
 
 
 def test_how_a_position_lies_moves_no_closure() -> None:

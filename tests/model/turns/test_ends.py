@@ -14,7 +14,7 @@ from fieldcal.model.rows.reduce import RowSource
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.model.turns import integration
 from fieldcal.model.turns.attitude import (
-    LOST_ANGLE,
+    MAX_MISCLOSURE_RAD,
     accelerations,
     antisymmetric_vector,
     interpolate_vectors,
@@ -77,7 +77,7 @@ def test_an_attitude_that_is_far_off_is_lost(off: float, lost: bool) -> None:
     x, f = ends(), ends().f[0] / np.linalg.norm(ends().f[0])
     across = np.cross(f, [0.3, -0.8, 0.5])
     across /= np.linalg.norm(across)
-    assert LOST_ANGLE == 0.3
+    assert MAX_MISCLOSURE_RAD == 0.3
     assert vertical_lost(x, (0, 1), way() @ rotation_matrices(off * across)) == lost
     about = way() @ rotation_matrices(off * f)
     assert not vertical_lost(x, (0, 1), about)
@@ -224,7 +224,7 @@ def test_a_turn_of_few_steps_is_none_and_a_long_one_has_no_more_pieces() -> None
     found = divide_into_steps(leg(100.0, 0.19, np.ones(3)))
     assert found is not None and len(found.edge) == 10
     long = divide_into_steps(leg(100.0, 50.0, np.ones(3)))
-    assert long is not None and integration.PIECES - 1 <= len(long.cut) - 1 <= 60
+    assert long is not None and integration.MAX_WAY_MEANS - 1 <= len(long.cut) - 1 <= 60
 
 
 def test_integrated_rates_are_rid_of_what_is_known() -> None:

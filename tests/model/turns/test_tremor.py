@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldcal.core.samples import Array
-from fieldcal.model.turns.tremor import LEAST, sway_variance
+from fieldcal.model.turns.tremor import MIN_SAMPLES, sway_variance
 
 STEP, SECONDS = 0.01, 10.0
 
@@ -36,4 +36,4 @@ def test_noise_is_no_swaying() -> None:
 
 
 def test_of_a_few_samples_nothing_is_known() -> None:
-    assert sway_variance(rates(2e-3, 1.6, 0.0, 1)[: LEAST - 1], STEP) == 0.0
+    assert sway_variance(rates(2e-3, 1.6, 0.0, 1)[: MIN_SAMPLES - 1], STEP) == 0.0

@@ -166,4 +166,4 @@ def whole(
     stream = opened.streams()[0].name
     opened.notes(stream)
     judge = RowValidator(str(path), opened.place, repair)
-    return concat(judge.good(block) for block in opened.blocks(stream))
+    return concat(judge.through(opened.blocks(stream)))

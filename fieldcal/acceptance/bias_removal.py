@@ -56,7 +56,7 @@ from fieldcal.core.probability import chi2_tail, probability_of_log_odds
 from fieldcal.core.samples import Array, Block
 from fieldcal.windows import Average
 
-LEAST = 2
+MIN_WINDOWS = 2
 """Fewest windows for (1)."""
 
 TRACKING = 0.01
@@ -125,7 +125,7 @@ def _removal_probability(
 ) -> tuple[float, str]:
     """Probability (5) for means about zero, whose error is one of `every`."""
     seen = np.isfinite(means) & (own > 0)
-    if (count := int(seen.sum())) < 3 * LEAST or not seen.any(axis=0).all():
+    if (count := int(seen.sum())) < 3 * MIN_WINDOWS or not seen.any(axis=0).all():
         return 0.0, ""
     sigma = min(
         every, key=lambda one: _minus_two_log_likelihood(means[seen], one[seen])

@@ -16,7 +16,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.model import thresholds
 
-SHARE = 0.1
+MAX_HARMLESS_RATIO = 0.1
 """Largest r over s, (1)."""
 
 
@@ -27,7 +27,7 @@ def harmless_scatter_note(
     of = calibration.info if sensor == "acc" else calibration.info["gyroscopes"]
     scatter, unit = of.get("extra_scatter"), "m/s²" if sensor == "acc" else "rad/s"
     doubt = max(calibration.info.get("bad_position", ()), default=0.0)
-    most = SHARE * (limits.sigma(f"{sensor}_bias") or 0.0)
+    most = MAX_HARMLESS_RATIO * (limits.sigma(f"{sensor}_bias") or 0.0)
     if scatter is None or not 0 < scatter <= most or doubt >= thresholds.SUSPECT:
         return ""
     return (

@@ -27,7 +27,10 @@ accepted. The error of a bias, in its sigmas, is then half as large again as tha
 tilt. Without the statement the tilt is estimated."""
 
 
-OTHER = {"angle_offset": "a tilt of the base", "base_tilt": "offsets of the joints"}
+OTHER_TILT = {
+    "angle_offset": "a tilt of the base",
+    "base_tilt": "offsets of the joints",
+}
 """The other kind of tilt, by the kind that a result contains."""
 
 
@@ -82,7 +85,7 @@ def check_level(calibration: Calibration, about: Description) -> list[Check]:
 
 def _other_tilt_checks(calibration: Calibration) -> Iterator[Check]:
     """Report the assumed size of the other kind of tilt."""
-    kinds = [OTHER[group] for group in calibration.groups if group in OTHER]
+    kinds = [OTHER_TILT[group] for group in calibration.groups if group in OTHER_TILT]
     if kinds and (off := calibration.info.get("beside_tilt_sigma_deg")):
         says = f"each ± includes {kinds[0]} of 0 ± {off:.2g}°, beside the tilt found"
         yield Check("level", None, says)

@@ -32,16 +32,16 @@ from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
 from fieldcal.solve.doubtful_position import DoubtfulPosition
 
-MOST = 3
+MAX_POSITIONS = 3
 """Largest number of further positions; if more are needed, repeat the run."""
 
-SURE = 0.9
+LIMIT_SHARE = 0.9
 """Part of a limit that is aimed at, since the result differs from the expectation."""
 
-LONGEST = 600.0
+MAX_HOLD_S = 600.0
 """Longest time that is asked for at one position, s."""
 
-STEP = 1e-4
+DERIVATIVE_STEP_RAD = 1e-4
 """Step of the numerical derivatives t in (1), rad."""
 
 
@@ -146,11 +146,11 @@ def _hold_longer(
     for name, part in over.items():
         sigma = calibration.uncertainty(name) if np.isfinite(part) else np.inf
         kept = stays if group_of(name) == "gyr_bias" else 0.0
-        room = (SURE * sigma / part) ** 2 - kept**2
+        room = (LIMIT_SHARE * sigma / part) ** 2 - kept**2
         times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
     whole = seconds * len(about.positions)
     last = about.positions[-1].degrees
-    if not whole * (times - 1) <= LONGEST or last is None:
+    if not whole * (times - 1) <= MAX_HOLD_S or last is None:
         return None
     more = float(np.ceil(whole * (times - 1) / 5) * 5)
     number = len(about.positions)
@@ -174,7 +174,7 @@ def _further_positions(
     before = _expected_sigma(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
     chosen: list[Position] = []
-    for _ in range(MOST):
+    for _ in range(MAX_POSITIONS):
         ratios = []
         candidates = [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
         for one in candidates:
@@ -182,7 +182,7 @@ def _further_positions(
             ratios.append(_largest_limit_ratio(names, over, before, then, allowed))
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
-        if ratios[best] <= SURE:
+        if ratios[best] <= LIMIT_SHARE:
             return _as_remedy(chosen, over, seconds)
     return None
 
@@ -248,7 +248,10 @@ def _expected_sigma(
     every = [*names, *more]
     j = design_matrix(every, positions, about.gravity, about.mounting)
     t = np.stack(
-        [_force_slopes(positions, about, a, b) for a, b in ((STEP, 0.0), (0.0, STEP))],
+        [
+            _force_slopes(positions, about, a, b)
+            for a, b in ((DERIVATIVE_STEP_RAD, 0.0), (0.0, DERIVATIVE_STEP_RAD))
+        ],
         axis=2,
     )
     r = known.sigma**2 * np.eye(3) + known.angle**2 * t @ t.transpose(0, 2, 1)
@@ -270,5 +273,5 @@ def _force_slopes(
     change = specific_forces(off, about.gravity) - specific_forces(
         positions, about.gravity
     )
-    moved: Array = change @ about.mounting / STEP
+    moved: Array = change @ about.mounting / DERIVATIVE_STEP_RAD
     return moved

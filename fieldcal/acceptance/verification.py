@@ -26,7 +26,7 @@ from fieldcal.session.description import Description
 from fieldcal.solve.reliability import WrongAngles
 from fieldcal.windows import Average
 
-STEP = 1e-6
+DERIVATIVE_STEP_RAD = 1e-6
 """Of numerical derivatives, rad."""
 
 
@@ -100,8 +100,11 @@ def verify(
     turned = np.column_stack([
         (specific_forces([moved], about.gravity)
          - specific_forces([position], about.gravity))[0]
-        @ about.mounting / STEP
-        for moved in (_rotated(position, STEP, 0.0), _rotated(position, 0.0, STEP))
+        @ about.mounting / DERIVATIVE_STEP_RAD
+        for moved in (
+            _rotated(position, DERIVATIVE_STEP_RAD, 0.0),
+            _rotated(position, 0.0, DERIVATIVE_STEP_RAD),
+        )
     ])  # fmt: skip
     return Verification(
         position, residual, np.sqrt(np.diag(s)), chance, s, slope, turned

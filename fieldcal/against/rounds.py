@@ -25,9 +25,9 @@ from fieldcal.core.escaping import escape_invisible
 CompareOutput = Callable[[Path], tuple[Match, list[str]]]
 """Compares a simulator's file; returns the match, and notices for the user."""
 
-PATCH, OUT = "{patch}", "{out}"
+PATCH_PLACEHOLDER, OUT_PLACEHOLDER = "{patch}", "{out}"
 
-SAID = 5
+SHOWN_LINES = 5
 """Last lines of a failed simulator that are shown."""
 
 
@@ -51,7 +51,7 @@ class SimulatorRun:
 
 def is_command(text: str) -> bool:
     """Whether the simulator is given as a command and not as a file."""
-    return OUT in text
+    return OUT_PLACEHOLDER in text
 
 
 def run_and_patch(
@@ -83,9 +83,10 @@ def run_and_patch(
     """
     if most < 0:
         raise InputError(f"--rounds {most}: name how many patches are tried, or 0")
-    if PATCH not in command:
+    if PATCH_PLACEHOLDER not in command:
         raise InputError(
-            f"{command}: has no {PATCH}, in the place of which the patch's file stands"
+            f"{command}: has no {PATCH_PLACEHOLDER}, in the place of which the"
+            " patch's file stands"
         )
     done: list[SimulatorRun] = []
     model = SensorModel(rate_hz=rate_hz)
@@ -110,12 +111,12 @@ def _run_and_compare(
         ending = patches.patch_format(form).ENDING
         patch, out = Path(folder) / f"patch{ending}", Path(folder) / "out"
         patches.write(form, model, patch)
-        places = {PATCH: str(patch), OUT: str(out)}
+        places = {PATCH_PLACEHOLDER: str(patch), OUT_PLACEHOLDER: str(out)}
         _run_command([_with_paths(word, places) for word in _words(command)], command)
         if not out.exists():
             raise InputError(
-                f"{command}: ended well and wrote nothing to {OUT}: let it write its"
-                " recording to the file that stands there"
+                f"{command}: ended well and wrote nothing to {OUT_PLACEHOLDER}: let it"
+                " write its recording to the file that stands there"
             )
         return compare(out)
 
@@ -145,7 +146,9 @@ def _run_command(words: list[str], command: str) -> None:
         said = [
             line for line in (done.stdout + done.stderr).splitlines() if line.strip()
         ]
-        last = " | ".join(escape_invisible(line.strip()) for line in said[-SAID:])
+        last = " | ".join(
+            escape_invisible(line.strip()) for line in said[-SHOWN_LINES:]
+        )
         raise InputError(
             f"{command}: failed with exit code {done.returncode}; it said:"
             f" {last or 'nothing'}"

@@ -22,16 +22,16 @@ from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.physics.effect import Chain, Line
 
-LOUDER = 0.5
+NOISE_LOG_SPREAD = 0.5
 """Typical difference of the noise of two devices, ln."""
 
-NONE = 1e-3
+NO_NOISE_RATIO = 1e-3
 """Noise, relative to the other recording's, that counts as none."""
 
 CERTAIN = 5.0
 """Difference of two sizes of a fault that is significant, standard deviations."""
 
-FAINT = 5.0
+FAINT_LINE_SIGMAS = 5.0
 """Least amplitude of a line at a frequency that the other recording has, in standard
 deviations; four are exceeded by chance at one of the frequencies nearby."""
 
@@ -67,11 +67,11 @@ def _triad_noise_difference(
 ) -> Iterator[Difference]:
     """Difference of one triad, by the logarithms of its noise levels."""
     one = real.noise[at]
-    two = np.maximum(sim.noise[at], NONE * one)
+    two = np.maximum(sim.noise[at], NO_NOISE_RATIO * one)
     off = np.log(one / two)
     sigma = np.hypot(real.noise_uncertainty[at], sim.noise_uncertainty[at])
     probability = probability_of_difference(
-        off, np.diag(sigma**2), np.full(len(at), LOUDER)
+        off, np.diag(sigma**2), np.full(len(at), NOISE_LOG_SPREAD)
     )
     if probability < thresholds.NAMED:
         return
@@ -79,7 +79,7 @@ def _triad_noise_difference(
         CHANNELS[c]: RealAndSimulated.of(noise_level(real, c), noise_level(sim, c))
         for c in at
     }
-    silent = bool((sim.noise[at] <= NONE * one).all())
+    silent = bool((sim.noise[at] <= NO_NOISE_RATIO * one).all())
     louder = [
         c
         for c, o, s in zip(at, off, sigma, strict=True)
@@ -153,7 +153,9 @@ def _faint_line(one: FoundEffect, other: DiagnosedRecording) -> FoundEffect | No
     hz = float(one.parameters["hz"].value)
     found = effect_of_line(tune_line(pieces, effect, moments_of(pieces, hz)), np.nan)
     sizes = {n: q for n, q in found.parameters.items() if n != "hz"}
-    clear = any(float(q.value) > FAINT * (q.sigma or 0.0) for q in sizes.values())
+    clear = any(
+        float(q.value) > FAINT_LINE_SIGMAS * (q.sigma or 0.0) for q in sizes.values()
+    )
     return found if clear and _is_near(one, found, other) else None
 
 

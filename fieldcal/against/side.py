@@ -24,7 +24,7 @@ from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
 from fieldcal.windows.noise import short_lag_noise
 
-PART = 0.1
+MIN_NOISE_RATIO = 0.1
 """Least noise of a simulator's output, relative to the recording's: it adds a hundredth
 to the variance of a difference."""
 
@@ -157,7 +157,7 @@ def _with_least_noise(
     Returns the block, and the channels to which noise was added.
     """
     rng, six = np.random.default_rng(SEED), block.six.copy()
-    quiet = np.flatnonzero(np.nan_to_num(noise, nan=np.inf) < PART * wanted)
+    quiet = np.flatnonzero(np.nan_to_num(noise, nan=np.inf) < MIN_NOISE_RATIO * wanted)
     for c in quiet:
-        six[:, c] += PART * wanted[c] * rng.standard_normal(len(six))
+        six[:, c] += MIN_NOISE_RATIO * wanted[c] * rng.standard_normal(len(six))
     return replace(block, acc=six[:, :3], gyr=six[:, 3:]), tuple(quiet.tolist())

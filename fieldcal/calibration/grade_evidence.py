@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from fieldcal.calibration import limits
 from fieldcal.calibration.names import ParameterName, sensor_of
 from fieldcal.calibration.parameters import COMPONENTS
-from fieldcal.calibration.plausible import UNSEEN
+from fieldcal.calibration.plausible import MIN_SCALE_SIGMAS
 from fieldcal.core.grade import GRADES, Grade
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join_words
@@ -89,7 +89,7 @@ def _beyond(
         scale = nominal[f"{sensor_of(parameter.group)}_scale"]
         size = abs(scale[parameter.axis])
         off = float(value - usual) / size
-        if abs(off) - UNSEEN * float(s) / size > most:
+        if abs(off) - MIN_SCALE_SIGMAS * float(s) / size > most:
             unit = COMPONENTS[parameter.group][1].replace("m/s^2", "m/s²")
             shown = "" if unit == "1" else f" {unit}"
             says = f"is {off:+.2g}{shown} from nominal, more than {most:g}{shown}"

@@ -10,7 +10,7 @@ from typing import Any
 
 from fieldcal.calibration.wording import format_unit, parameter_title
 
-MOST = 5
+MAX_SHOWN_TIMES = 5
 """Number of times that are shown: shortest, longest, and evenly between."""
 
 WINS = {
@@ -56,5 +56,5 @@ def sentences(told: Mapping[str, Any]) -> list[str]:
 
 def _shown(count: int) -> list[int]:
     """Indices of the times that are shown."""
-    few = min(count, MOST)
+    few = min(count, MAX_SHOWN_TIMES)
     return sorted({round(i * (count - 1) / max(few - 1, 1)) for i in range(few)})

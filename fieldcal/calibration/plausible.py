@@ -16,7 +16,7 @@ from fieldcal.calibration.parameters import Nominal
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join_words
 
-LEAST, UNSEEN = 0.1, 5.0
+MIN_SCALE_SHARE, MIN_SCALE_SIGMAS = 0.1, 5.0
 """A scale factor below this part of nominal, and below so many standard deviations,
 counts as zero."""
 
@@ -24,7 +24,7 @@ UNREAL = {"acc_scale": 0.1, "gyr_scale": 0.1, "acc_bias": 5.0, "gyr_bias": 0.5}
 """Difference from nominal that no sensor has: 10 %, three times the tolerance of
 consumer grade; half a g; 30 deg/s."""
 
-STEEP = 10.0
+MAX_TILT_DEG = 10.0
 """Largest plausible tilt of a base, deg; session.toml accepts no larger level."""
 
 MENTIONED = 3
@@ -72,7 +72,7 @@ def misdirected_turns(turns: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def _tilt(name: str, value: float, sigma: float) -> list[str]:
-    if abs(value) - UNSEEN * sigma <= STEEP:
+    if abs(value) - MIN_SCALE_SIGMAS * sigma <= MAX_TILT_DEG:
         return []
     return [
         f"{name} is {value:.3g}° ± {sigma:.2g}°: no base is that far out of level; the"
@@ -82,19 +82,19 @@ def _tilt(name: str, value: float, sigma: float) -> list[str]:
 
 
 def _scale(name: str, value: float, sigma: float, usual: float) -> list[str]:
-    if abs(value) < min(UNSEEN * sigma, LEAST * abs(usual)):
+    if abs(value) < min(MIN_SCALE_SIGMAS * sigma, MIN_SCALE_SHARE * abs(usual)):
         return [
             f"{name} is {value:.2g} ± {sigma:.2g}: the output does not follow at"
             " all; was the device turned as session.toml says?"
         ]
-    if value / usual < 0 and abs(value) > UNSEEN * sigma:
+    if value / usual < 0 and abs(value) > MIN_SCALE_SIGMAS * sigma:
         return [
             f"{name} is {value:.3g}, nominal {usual:.3g}: the axis points"
             " the other way; mend [frame] mounting, or the signs of the angles or"
             " rates"
         ]
     group = group_of(name)
-    if abs(value - usual) > max(UNREAL[group] * abs(usual), UNSEEN * sigma):
+    if abs(value - usual) > max(UNREAL[group] * abs(usual), MIN_SCALE_SIGMAS * sigma):
         return [
             f"{name} is {value:.3g} ± {sigma:.2g}, nominal {usual:.3g}: no sensor is"
             " that far off; the unit or full scale of the recording is another than"
@@ -110,7 +110,9 @@ def _bias(
     parameter = ParameterName.of(name)
     sensor = sensor_of(parameter.group)
     unit = abs(getattr(nominal, f"{sensor}_scale")[parameter.axis])
-    if abs(value - usual) <= max(UNREAL[parameter.group] * unit, UNSEEN * sigma):
+    if abs(value - usual) <= max(
+        UNREAL[parameter.group] * unit, MIN_SCALE_SIGMAS * sigma
+    ):
         return []
     si = "m/s^2" if sensor == "acc" else "rad/s"
     return [

@@ -17,8 +17,8 @@ from fieldcal.commands.run_page import LOCAL, serve_page, show_end_on_page
 from fieldcal.commands.run_results import report_broken_run, write_junit
 from fieldcal.commands.run_task import SESSIONS, make_task
 from fieldcal.commands.run_timeouts import (
-    PATIENCE,
-    PATIENCE_HEADLESS,
+    HEADLESS_PATIENCE_S,
+    OPERATOR_PATIENCE_S,
     can_ask_operator,
     give_up_seconds,
     reconnect_seconds,
@@ -116,7 +116,7 @@ def _add_device_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="S",
         help="how long to wait for a device that disconnected"
-        f" (default: {PATIENCE:g}, headless {PATIENCE_HEADLESS:g})",
+        f" (default: {OPERATOR_PATIENCE_S:g}, headless {HEADLESS_PATIENCE_S:g})",
     )
 
 

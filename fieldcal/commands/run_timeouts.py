@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 GIVE_UP, GIVE_UP_UNTURNED = 90.0, 600.0
 """Device time after which a position is given up, s: with and without a mover."""
 
-PATIENCE, PATIENCE_HEADLESS = 120.0, 20.0
+OPERATOR_PATIENCE_S, HEADLESS_PATIENCE_S = 120.0, 20.0
 """How long to wait for a device whose connection was lost, s."""
 
 
@@ -19,7 +19,7 @@ def reconnect_seconds(args: argparse.Namespace) -> float:
     """How long to wait for a device whose connection was lost, s."""
     if args.patience is not None:
         return float(args.patience)
-    return PATIENCE_HEADLESS if args.headless else PATIENCE
+    return HEADLESS_PATIENCE_S if args.headless else OPERATOR_PATIENCE_S
 
 
 def give_up_seconds(args: argparse.Namespace, task: PlanTask) -> float | None:

@@ -29,10 +29,10 @@ REGULAR = 0.2
 WHOLE = 0.15
 """Mean distance of gaps from whole steps, in steps, up to which samples are missing."""
 
-SPAN, BURSTS = 50, 2.0
+BURST_SAMPLES, BURST_RATIO = 50, 2.0
 """Samples that take so many times their steps' length come in bursts."""
 
-FEWEST = 2
+MIN_DROPPED = 2
 
 
 def count_missing_samples(t: Array) -> NDArray[np.int_]:
@@ -45,8 +45,8 @@ def count_missing_samples(t: Array) -> NDArray[np.int_]:
         lost = np.zeros(len(step), dtype=int)
         return lost
     lost = np.maximum(np.round(step / usual).astype(int) - 1, 0)
-    over = t[SPAN::SPAN] - t[:-SPAN:SPAN]
-    if len(over) and np.median(over) > BURSTS * SPAN * usual:
+    over = t[BURST_SAMPLES::BURST_SAMPLES] - t[:-BURST_SAMPLES:BURST_SAMPLES]
+    if len(over) and np.median(over) > BURST_RATIO * BURST_SAMPLES * usual:
         lost[:] = 0
     gaps = step[lost > 0] / usual
     if len(gaps) and np.mean(np.abs(gaps - np.round(gaps))) > WHOLE:
@@ -94,7 +94,7 @@ class Dropped(Chain):
                 lost = np.maximum(lost, counted.astype(int))
         lost = np.where(_is_pause(recording), 0, lost)
         total = int(lost.sum())
-        if total < FEWEST:
+        if total < MIN_DROPPED:
             return []
         sent = len(block) + total
         at = np.flatnonzero(lost)

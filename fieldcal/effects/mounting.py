@@ -47,13 +47,13 @@ FITS = 10.0
 """Largest mean square of the residuals of accepted axes, in the spreads above."""
 
 UNITS = {"g": G0, "mg": 1e-3 * G0, "m/s^2 read as g": 1 / G0, "deg/s": np.pi / 180}
-NEAR = 0.05
+GRAVITY_TOLERANCE = 0.05
 
 RATES = {"deg/s": np.pi / 180, "mrad/s": 1e-3, "rad/s read as deg/s": 180 / np.pi}
 ANGLES = {"rad": 180 / np.pi}
 """Factors for stated angles in another unit."""
 
-USUAL, AROUND = 1.5, 4.0
+USUAL_ANGLE_RATIO, ANGLE_RATIO_FACTOR = 1.5, 4.0
 """Angle turned over the least that it can be, and by what factor that may be off: units
 are 17 apart and more."""
 
@@ -142,7 +142,7 @@ def rate_unit(turns: Sequence[ObservedTurn]) -> str:
     if not 0.0 < ratio < np.inf:  # gyroscopes that say nothing
         return ""
     for name, size in RATES.items():
-        if abs(np.log(ratio * size / USUAL)) < np.log(AROUND):
+        if abs(np.log(ratio * size / USUAL_ANGLE_RATIO)) < np.log(ANGLE_RATIO_FACTOR):
             return name
     return ""
 
@@ -250,7 +250,7 @@ class Mounting(Chain):
     def _unit(acc: Array, gravity: float) -> str:
         length = float(np.median(np.linalg.norm(acc, axis=1)))
         for name, size in UNITS.items():
-            if name != "deg/s" and abs(length * size / gravity - 1) < NEAR:
+            if name != "deg/s" and abs(length * size / gravity - 1) < GRAVITY_TOLERANCE:
                 return name
         return ""
 

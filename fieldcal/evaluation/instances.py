@@ -16,13 +16,13 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 
-USUAL, BIASED = 0.01, 0.03
+USUAL_ERROR, USUAL_ERROR_WITH_BIAS = 0.01, 0.03
 """Usual error of a sensor as delivered, as a part of g, without and with its bias."""
 
-APART = 4.0
+MIN_OUTLIER_RATIO = 4.0
 """Smallest difference of an IMU that is out, in median differences of the others."""
 
-FEWEST = 6
+MIN_RESTS = 6
 """Fewest rests for a sphere."""
 
 ROUND = 1e-2
@@ -89,7 +89,7 @@ def compare_instances(rests: Mapping[str, Array], gravity: float) -> list[Instan
     for name, (size, sigma, every_way) in found.items():
         others = np.array([s for n, s in sizes.items() if n != name])
         of_others = size / float(np.median(others)) - 1 if len(others) else np.nan
-        usual = USUAL if every_way else BIASED
+        usual = USUAL_ERROR if every_way else USUAL_ERROR_WITH_BIAS
         is_out = _is_out(size, others, gravity, usual)
         of_g, many = size / gravity - 1, len(known[name])
         out.append(
@@ -107,13 +107,13 @@ def _is_out(size: float, others: Array, gravity: float, usual: float) -> bool:
     if off < usual or abs(size - gravity) < abs(middle - gravity):
         return False
     differ = float(np.median(np.abs(others / middle - 1)))
-    return len(others) == 1 or off > APART * differ
+    return len(others) == 1 or off > MIN_OUTLIER_RATIO * differ
 
 
 def _rest_length(means: Array) -> tuple[float, float, bool]:
     """R of (1), its standard uncertainty, and whether it is a sphere's."""
     lengths = np.linalg.norm(means, axis=1)
-    if len(means) >= FEWEST:
+    if len(means) >= MIN_RESTS:
         left = np.column_stack([2 * means, np.ones(len(means))])
         scaled = left / np.linalg.norm(left, axis=0)
         singular = np.linalg.svd(scaled, compute_uv=False)

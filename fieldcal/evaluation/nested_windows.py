@@ -48,7 +48,7 @@ TIMES = (5, 10, 15, 30, 45, 60, 120, 300, 600, 1800, 3600)
 SHORTER = 0.8
 """Largest length that is tried, as a part of the whole window."""
 
-FAR = 4.0
+MIN_CHANGE_SIGMAS = 4.0
 """Standard deviations of (2) beyond which a change, of a hundred, is not noise."""
 
 EXACT_DEG = 1e-6
@@ -80,7 +80,7 @@ class NestedWindows:
         x, n, rest = self.values[:, k], self.noise[:, k], self._systematic_sigma(k)
         share = 1 - self.seconds[:-1] / self.seconds[1:]
         apart = np.maximum(n[:-1], n[1:]) * np.sqrt(share)  # (2)
-        jumped = np.append(False, np.abs(np.diff(x)) > FAR * apart)
+        jumped = np.append(False, np.abs(np.diff(x)) > MIN_CHANGE_SIGMAS * apart)
         white = n[0] ** 2 * self.seconds[0]
         each = {
             "fixture": rest > n,  # (3)

@@ -31,7 +31,7 @@ from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
 from fieldcal.windows.dead_axis import dead_sensors, without_dead_axes
 
-ROUNDED = 1e-6
+RANGE_TOLERANCE = 1e-6
 """Tolerance of a full scale for rounding and conversion of units, as a share of it."""
 
 
@@ -222,7 +222,14 @@ def _windows_of_means(session: Session) -> UsableWindows:
             f"{session.folder}: no mean lies in a window of session.toml: give each"
             " [[position]] a start_s and end_s about its mean"
         )
-    return UsableWindows(tuple(rows), tuple(averages), session.warnings)
+    dead = dead_sensors(np.array([average.mean for average in averages]))
+    for one in dead:
+        averages = [_without_sensor(average, one.channels) for average in averages]
+    return UsableWindows(
+        tuple(rows),
+        tuple(averages),
+        (*session.warnings, *(one.message for one in dead)),
+    )
 
 
 def _range_warnings(session: Session) -> list[str]:
@@ -232,7 +239,7 @@ def _range_warnings(session: Session) -> list[str]:
     for (kind, values), si in zip(triads.items(), SI, strict=True):
         limit = session.about.limits.get(kind, np.inf)
         most = float(np.nanmax(np.abs(values), initial=0.0))
-        if most > limit * (1 + ROUNDED):
+        if most > limit * (1 + RANGE_TOLERANCE):
             said.append(
                 f"samples reach {most:.4g} {si}, beyond [range] {kind} ="
                 f" {limit:.4g} {si}: range or unit in session.toml is another"

@@ -34,13 +34,13 @@ from fieldcal.core.samples import Array, Grain
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.folder import Session
 
-CUT, DOWN = 0.3, 0.1
+CUT_CHANCE, DOWN_CHANCE = 0.3, 0.1
 """Prior probability that values were cut toward zero, and rounded down."""
 
 UNSTEADY = 0.3
 """S of (1), ln: scatter of the times in which a turn passes neighbouring values."""
 
-EVEN = 2.0
+MAX_DWELL_RATIO = 2.0
 """Largest ratio of the times at the two neighbours of zero: a device that comes to rest
 at zero or beside it does not pass it."""
 
@@ -73,7 +73,7 @@ class RoundingMode:
     @property
     def round_down_sigma(self) -> Array:
         """Error of values that may be rounded down, 1 sigma, (3,) m/s^2."""
-        chance = DOWN / (1 - CUT) * (1 - self.cut_probability)
+        chance = DOWN_CHANCE / (1 - CUT_CHANCE) * (1 - self.cut_probability)
         out: Array = np.sqrt(chance) * self.step / 2
         return out
 
@@ -140,7 +140,7 @@ def cut_probability(shown: list[tuple[int, float]]) -> float:
     >>> cut_probability([(40, 40.0)] * 4) < 0.01
     True
     """
-    log_odds = float(np.log(CUT / (1 - CUT)))
+    log_odds = float(np.log(CUT_CHANCE / (1 - CUT_CHANCE)))
     for zero, beside in shown:
         variance = UNSTEADY**2 + 2 / beside
         off = float(np.log(max(zero, 0.5) / beside))
@@ -157,5 +157,9 @@ def zero_crossings(value: NDArray[np.intp]) -> Iterator[tuple[int, float]]:
         between = value[first + 1 : last]
         below, zero, above = (int((between == k).sum()) for k in (-1, 0, 1))
         less, more = sorted((below, above))
-        if less >= PASSED and more <= EVEN * less and zero <= 2 * EVEN * more:
+        if (
+            less >= PASSED
+            and more <= MAX_DWELL_RATIO * less
+            and zero <= 2 * MAX_DWELL_RATIO * more
+        ):
             yield zero, (below + above) / 2

@@ -17,7 +17,7 @@ END_S = 1.0
 """Length of the part at an end of the window that is compared, s. At least as much lies
 between it and the calm part."""
 
-SAME = 0.05
+SAME_FORCE_TOLERANCE = 0.05
 """Largest difference of the force in the same position, as a part of it: 3 degrees."""
 
 Span = tuple[float, float]
@@ -53,4 +53,4 @@ def _feels_same_force(part: Block, calm: Average) -> bool:
     if not len(part):
         return False
     off = np.linalg.norm(part.acc.mean(axis=0) - calm.mean[:3])
-    return bool(off < SAME * np.linalg.norm(calm.mean[:3]))
+    return bool(off < SAME_FORCE_TOLERANCE * np.linalg.norm(calm.mean[:3]))

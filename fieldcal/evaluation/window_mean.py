@@ -18,7 +18,7 @@ from fieldcal.model.rows.turntable import fit_rotating_earth_rate
 from fieldcal.session.description import Description
 from fieldcal.windows import Average, LearnedNoise, Window, average
 
-SHORTEST = 5.0
+MIN_CALM_S = 5.0
 """Shortest calm part of a disturbed window that is worth using, s."""
 
 
@@ -133,7 +133,7 @@ def average_turntable_window(
 def _average_calm_part(
     block: Block, moved: Moved, noise: LearnedNoise | None, grain: Grain
 ) -> Average | None:
-    """Average of the longest calm part; None if all are shorter than `SHORTEST`."""
+    """Average of the longest calm part; None if all are shorter than `MIN_CALM_S`."""
     sides = [
         block.between(-float("inf"), moved.at),
         block.between(moved.at, float("inf")),
@@ -141,7 +141,7 @@ def _average_calm_part(
     best: Average | None = None
     for side in sorted(sides, key=len, reverse=True):
         length = float(side.t[-1] - side.t[0]) if len(side) > 1 else 0.0
-        if length < SHORTEST or (best and length <= best.end - best.start):
+        if length < MIN_CALM_S or (best and length <= best.end - best.start):
             continue
         try:
             found: Average | None = average(side, noise=noise, grain=grain)

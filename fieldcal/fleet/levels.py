@@ -29,7 +29,7 @@ from fieldcal.model.evidence.gram import evidence_gains
 DENSITY = np.log(priors.density())
 """Logarithm of the prior density of each size."""
 
-EVEN = int(np.argmin(np.abs(np.log(priors.SIZES))))
+UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
 """Index of v = 1."""
 
 ROUNDS = 4
@@ -156,7 +156,7 @@ class PooledSessions:
     def posterior(self, members: Sequence[LevelEffect]) -> EffectSetPosterior:
         """Posterior of a set of effects; each size is maximised in turn."""
         inner, rhs, places = self._combined_blocks(members)
-        sizes = [EVEN] * len(members)
+        sizes = [UNIT_INDEX] * len(members)
         profiles: list[Array] = []
         for _ in range(ROUNDS if len(members) > 1 else 1):
             before = list(sizes)

@@ -25,7 +25,7 @@ from fieldcal.fleet.odd import benjamini_hochberg, unit_p_values
 from fieldcal.fleet.shifts import Shift, find_shifts
 from fieldcal.history.sessions import LEVELS, StoredSession, parameter_values
 
-FEWEST = 5
+MIN_UNITS = 5
 """Smallest number of units for which a spread is estimated."""
 
 
@@ -148,14 +148,14 @@ def analyse_lot(
     Raises
     ------
     InputError
-        If fewer than `FEWEST` units have a result.
+        If fewer than `MIN_UNITS` units have a result.
 
     """
     units = latest_session_per_unit(sessions)
     useful = [one for one in units if one.good]
-    if len(useful) < FEWEST:
+    if len(useful) < MIN_UNITS:
         raise InputError(
-            f"units with a good result: {len(useful)}, a lot needs {FEWEST}: run"
+            f"units with a good result: {len(useful)}, a lot needs {MIN_UNITS}: run"
             " fieldcal batch on more sessions, or ask for fewer conditions"
         )
     names = dict.fromkeys(n for one in useful for n in one.parameters)
@@ -163,7 +163,7 @@ def analyse_lot(
     for name in names:
         x, sigma = parameter_values(useful, name)
         known = np.isfinite(x) & (sigma > 0)
-        if known.sum() >= FEWEST:
+        if known.sum() >= MIN_UNITS:
             found[name] = (np.flatnonzero(known), x[known], sigma[known])
     parameters = {
         name: lot_parameter(

@@ -33,20 +33,20 @@ from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
-from fieldcal.fleet.lot import FEWEST, latest_session_per_unit
+from fieldcal.fleet.lot import MIN_UNITS, latest_session_per_unit
 from fieldcal.fleet.spread import WIDER, UnitDistribution, estimate_distribution
 from fieldcal.history.sessions import StoredSession, parameter_values
 
-DRAWS, FIRST = 2000, 200
+KEPT_DRAWS, DROPPED_DRAWS = 2000, 200
 """Number of draws that are used, and of draws before them that are dropped."""
 
-MOST = 150
+MAX_UNITS = 150
 """Largest number of units that the sampler uses; they give a spread to 6 %."""
 
 SHAPE = 2.0
 """f: correlations are equally likely."""
 
-LARGE = 10.0
+SPREAD_FACTOR = 10.0
 """A: factor by which spreads may exceed their first estimate."""
 
 BY_GRAVITY = "acc_scale"
@@ -67,7 +67,7 @@ def estimate_lot_prior(
     Raises
     ------
     InputError
-        If fewer than `FEWEST` other units know any parameter.
+        If fewer than `MIN_UNITS` other units know any parameter.
 
     """
     others = [
@@ -81,13 +81,13 @@ def estimate_lot_prior(
             [one for one in units if _is_informative(one, name)], name
         )
         known = np.isfinite(x) & (sigma > 0)
-        if known.sum() >= FEWEST and group_of(name) in GROUPS:
+        if known.sum() >= MIN_UNITS and group_of(name) in GROUPS:
             found[name] = estimate_distribution(x[known], sigma[known])
     if not found:
         raise InputError(
             f"{label}: {len(units)} other units have a good result, a lot needs"
-            f" {FEWEST}: run fieldcal batch on more sessions, ask for fewer conditions,"
-            " or leave --lot out"
+            f" {MIN_UNITS}: run fieldcal batch on more sessions, ask for fewer"
+            " conditions, or leave --lot out"
         )
     names, about = tuple(found), list(found.values())
     mean, covariance = np.zeros(len(names)), np.zeros((len(names),) * 2)
@@ -160,7 +160,11 @@ class _UnitInformation:
             rhs[at] = told[np.ix_(at, at)] @ z
             every.append(told)
             pulls.append(rhs)
-        some = np.linspace(0, len(every) - 1, min(len(every), MOST)).round().astype(int)
+        some = (
+            np.linspace(0, len(every) - 1, min(len(every), MAX_UNITS))
+            .round()
+            .astype(int)
+        )
         return cls(middle, size, np.array(every)[some], np.array(pulls)[some])
 
     def predict_next_unit(self) -> tuple[Array, Array]:
@@ -169,7 +173,7 @@ class _UnitInformation:
         n, k = self.rhs.shape
         spread_: Array = np.eye(k)
         means, spreads = [], []
-        for draw in range(FIRST + DRAWS):
+        for draw in range(DROPPED_DRAWS + KEPT_DRAWS):
             inverse = np.linalg.inv(spread_)
             root = np.linalg.cholesky(inverse + self.information)
             half = np.linalg.solve(root, self.information)
@@ -182,12 +186,12 @@ class _UnitInformation:
             white = np.linalg.solve(root, (self.rhs + inverse @ mu)[..., None])
             white += rng.standard_normal((n, k, 1))
             theta = np.linalg.solve(root.transpose(0, 2, 1), white)[..., 0]  # (3)
-            rate = SHAPE * np.diag(inverse) + LARGE**-2
+            rate = SHAPE * np.diag(inverse) + SPREAD_FACTOR**-2
             over = rng.gamma((SHAPE + k) / 2, 1 / rate)  # (4)
             off = theta - mu
             whole = off.T @ off + 2 * SHAPE * np.diag(over)
             spread_ = _inverse_wishart(rng, SHAPE + n + k - 1, whole)  # (5)
-            if draw >= FIRST:
+            if draw >= DROPPED_DRAWS:
                 means.append(mu)
                 spreads.append(spread_)
         covariance = np.mean(spreads, axis=0) + np.cov(np.array(means).T)

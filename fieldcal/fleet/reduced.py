@@ -28,7 +28,7 @@ from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
 
-CLOSE = 0.1
+MAX_LOG_TIME_DISTANCE = 0.1
 """Largest distance of a session's time constant from a power of two, ln."""
 
 
@@ -148,7 +148,7 @@ def _groups_on_common_grid(cause: Cause) -> Iterator[tuple[Cause, str, Group]]:
         (tau,) = group.shape.values()
         power = round(np.log2(tau))
         off = abs(np.log(tau) - power * np.log(2))
-        if off < near.get(power, (CLOSE,))[0]:
+        if off < near.get(power, (MAX_LOG_TIME_DISTANCE,))[0]:
             near[power] = (off, group)
     for power, (_, group) in sorted(near.items()):
         yield cause, f"{2.0**power:g} s", group

@@ -30,7 +30,7 @@ from fieldcal.model import priors, thresholds
 FOLLOWED = 4
 """Number of candidates that are evaluated in full at each step."""
 
-MOST = 8
+MAX_STEPS = 8
 """Largest number of steps of a search."""
 
 EffectKey = tuple[str, str]
@@ -181,7 +181,7 @@ class SharedSearch:
         """Return the effects that are probable at their level, the surest first."""
         best = frozenset[int]()
         self.score(best)
-        for _ in range(MOST):
+        for _ in range(MAX_STEPS):
             better = max([best, *self._neighbouring_sets(best)], key=self.score)
             if better == best:
                 break

@@ -30,7 +30,7 @@ from fieldcal.model import thresholds
 CHANCE = 0.03
 """Prior probability that a given level shifts a given parameter."""
 
-TOGETHER = 2
+MAX_LEVELS = 2
 """Largest number of levels of a set."""
 
 SPREADS: Array = np.geomspace(0.3, 1.2, 8)
@@ -80,7 +80,9 @@ def find_shifts(
     """
     size = about.spread or float(np.median(sigma))
     everyone = Grouping.of("all", ["all"] * len(x))
-    sets = [c for k in range(TOGETHER + 1) for c in combinations(range(len(levels)), k)]
+    sets = [
+        c for k in range(MAX_LEVELS + 1) for c in combinations(range(len(levels)), k)
+    ]
     scores, found = np.zeros(len(sets)), dict[tuple[int, ...], EffectSetPosterior]()
     for number, some in enumerate(sets):
         members = [

@@ -44,7 +44,7 @@ ODD = 0.01
 
 COUNTS = 20.0
 
-STEPS = 25
+EM_STEPS = 25
 """Steps of expectation maximisation: the weights converge long before."""
 
 GRID = 160
@@ -97,7 +97,7 @@ def estimate_distribution(x: Array, sigma: Array) -> UnitDistribution:
     tried = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, GRID) * scale])
     variance = tried[:, None] ** 2 + sigma**2
     middle, share = np.full(len(tried), np.median(x)), np.full(len(tried), ODD)
-    for _ in range(STEPS):
+    for _ in range(EM_STEPS):
         square = (x - middle[:, None]) ** 2 / variance
         core = np.log1p(-share)[:, None] - 0.5 * square
         odd = np.log(share / WIDER)[:, None] + CAUCHY - np.log1p(square / WIDER**2)

@@ -19,20 +19,20 @@ from fieldcal.drivers import codec
 from fieldcal.importing.files.gzip_stream import first_bytes
 from fieldcal.importing.recording import ReadOptions, Recording
 
-LAST = ("csv_like", "wire")
+TRIED_LAST = ("csv_like", "wire")
 """Formats without a mark of their own, tried last, in this order."""
 
 TIMES = "timestamps.txt"
 """File by which a folder of samples is read."""
 
-MANY = 1 << 16
+PROBE_BYTES = 1 << 16
 """Bytes by which formats without a mark of their own are told."""
 
 
 @cache
 def formats() -> tuple[str, ...]:
     """Names of the formats there are, those with a mark of their own first."""
-    return (*(n for n in module_names(__path__) if n not in LAST), *LAST)
+    return (*(n for n in module_names(__path__) if n not in TRIED_LAST), *TRIED_LAST)
 
 
 def open_recording(
@@ -76,9 +76,9 @@ def open_recording(
         raise InputError(f"{path}: is empty; copy it again from where it came")
     for some in [name] if name else formats():
         module = import_module(f"{__name__}.{some}")
-        if some == LAST[0]:
+        if some == TRIED_LAST[0]:
             # what a device says while it starts may stand before the first frame
-            first = first_bytes(path, MANY)
+            first = first_bytes(path, PROBE_BYTES)
         if name or module.recognises(first, path):
             opened = plugin_class(module.__name__, Recording)  # type: ignore[type-abstract]
             return opened(path, wanted, repair)

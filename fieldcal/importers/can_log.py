@@ -69,7 +69,7 @@ KINDS = (
 BROADCAST = 240
 """First group of SAE J1939 that goes to all."""
 
-MOST = 8
+MAX_FRAME_BYTES = 8
 """Bytes of a frame; canboat joins those of longer messages, which are no frames."""
 
 PRINTED = re.compile(rb"\s*(\([\d. :-]+\))?\s*\w+\s+[0-9A-Fa-f]+\s+\[\d+\]\s")
@@ -224,7 +224,7 @@ def _canboat(recording: CanLog, text: io.TextIOWrapper) -> Iterator[Any]:
         to_one = (group >> 8) & 0xFF < BROADCAST
         last = destination if to_one else 0
         identifier = priority << 26 | (group | last) << 8 | source
-        if many <= MOST:
+        if many <= MAX_FRAME_BYTES:
             yield can.Message(since, identifier, is_extended_id=True, data=data)
 
 

@@ -60,7 +60,7 @@ BEGINNING = 1 << 16
 SECONDS = 1.0
 """Time that the first bytes are taken for, where the format asks."""
 
-PLAIN = "text"
+PLAIN_TEXT = "text"
 """Wire format of lines of numbers, whose units nobody says."""
 
 _CHECKED = re.compile(rb"\$.*\*[0-9A-Fa-f]{2}\s*$")
@@ -74,7 +74,7 @@ def recognises(head: bytes, path: Path) -> bool:
     if lines and sum(map(_is_checked, lines)) > len(lines) / 2:
         # of a format of its own, a port's bytes; of others physics tells the units
         fits = recognise_format(head, SECONDS)
-        return is_mostly_text(head) and (fits is None or fits[0] == PLAIN)
+        return is_mostly_text(head) and (fits is None or fits[0] == PLAIN_TEXT)
     return is_mostly_text(head)
 
 

@@ -25,7 +25,7 @@ from fieldcal.importing.messages.mcap_messages import (
 )
 from fieldcal.importing.messages.ros_messages import (
     IMU,
-    MANY,
+    MESSAGES_AT_ONCE,
     TEMPERATURE,
     message_row,
     samples_of_rows,
@@ -108,7 +108,7 @@ class McapLog(Recording):
                         f" they are called, by their schema in the file ({error});"
                         " record them again with the definition of their type"
                     ) from error
-                if len(rows) == MANY:
+                if len(rows) == MESSAGES_AT_ONCE:
                     yield samples_of_rows(rows)
                     rows = []
         if rows:

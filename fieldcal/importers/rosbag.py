@@ -19,7 +19,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.messages.ros_messages import (
     IMU,
-    MANY,
+    MESSAGES_AT_ONCE,
     TEMPERATURE,
     message_row,
     samples_of_rows,
@@ -78,7 +78,7 @@ class RosBag(Recording):
                     continue
                 degrees = warm.get(said.header.frame_id, np.nan)
                 rows.append(message_row(said, degrees, logged))
-                if len(rows) == MANY:
+                if len(rows) == MESSAGES_AT_ONCE:
                     yield samples_of_rows(rows)
                     rows = []
         if rows:

@@ -53,7 +53,7 @@ SAYS = {
 NOT_UPDATED = 0x7FFFFFFF
 """What accelerometer_timestamp_relative says where nothing new came."""
 
-MOST = 32
+MAX_FIFO_SAMPLES = 32
 """Samples that a message of a FIFO has room for."""
 
 
@@ -258,17 +258,17 @@ def _sensor(table: Table) -> Block:
 
 def _unpacked(table: Table, fifo: FifoTimes) -> Block:
     """Samples of the FIFO of one sensor, as if of an accelerometer."""
-    number = table["samples"].astype(int).clip(0, MOST)
+    number = table["samples"].astype(int).clip(0, MAX_FIFO_SAMPLES)
     some = number > 0
     number = number[some]
     if not len(number):
         return concat([])
     period = 1e-6 * table["dt"][some].astype(float)
     t = fifo.times(_stamps(table)[some], number, period)
-    valid = np.arange(MOST) < number[:, None]
+    valid = np.arange(MAX_FIFO_SAMPLES) < number[:, None]
     scale = np.repeat(table["scale"][some].astype(float), number)
     axes = [
-        _axis_columns(table, f"{axis}[{{}}]", range(MOST))[some][valid]
+        _axis_columns(table, f"{axis}[{{}}]", range(MAX_FIFO_SAMPLES))[some][valid]
         for axis in "xyz"
     ]
     return Block.of(t, scale[:, None] * np.column_stack(axes))

@@ -26,7 +26,7 @@ CUT = 1 << 20
 RANGES = {"witmotion": ("acc_range", "gyr_range")}
 """Options of formats that do not send their full scales."""
 
-USUAL = ((2.0, 4.0, 8.0, 16.0), (125.0, 250.0, 500.0, 1000.0, 2000.0))
+USUAL_FULL_SCALES = ((2.0, 4.0, 8.0, 16.0), (125.0, 250.0, 500.0, 1000.0, 2000.0))
 """Usual full scales, g and deg/s; the last is what formats take."""
 
 SECONDS = 1.0
@@ -61,7 +61,7 @@ class WireStream(Recording):
         given.text("format")
         says = []
         for name, usual, many in zip(
-            RANGES[self._name], USUAL, (acc, gyr), strict=True
+            RANGES[self._name], USUAL_FULL_SCALES, (acc, gyr), strict=True
         ):
             full = given.number(name, usual[-1], 0.0, 1e6) / many
             near = min(usual, key=lambda one: abs(np.log(one / full)))

@@ -12,7 +12,7 @@ from fieldcal.core.sentences import join_words
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers
-from fieldcal.importing.units.scales import FEWEST
+from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.session.text_files import SAMPLE_COLUMNS
 
 SKIP = "_"
@@ -40,7 +40,7 @@ def are_unsigned(values: Array) -> bool:
     What is a little below zero reads a little below 65 536, and nothing lies between.
     """
     known = values[np.isfinite(values)]
-    if len(known) < FEWEST or known.min() < 0 or known.max() >= 2 * HALF:
+    if len(known) < MIN_ROWS or known.min() < 0 or known.max() >= 2 * HALF:
         return False
     if known.max() < HALF or (known != np.round(known)).any():
         return False

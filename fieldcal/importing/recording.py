@@ -25,10 +25,10 @@ from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 ROWS = 1 << 15
 """Rows that are looked at together."""
 
-MOST = 12
+MAX_LISTED_FAULTS = 12
 """Faults of a file that are listed one by one."""
 
-LARGEST = 1e12
+MAX_READING = 1e12
 """Beyond every reading in SI units, and every count of 32 bits."""
 
 TEMP_UNITS = {
@@ -307,9 +307,11 @@ class Recording(ABC):
 
         """
         self._refuse(where, what, "leave such places out")
-        if len(self.mended) < MOST:
+        if len(self.mended) < MAX_LISTED_FAULTS:
             self.mended.append(f"{where}: {what}, left out")
             self._more = 0
             return
         self._more += 1
-        self.mended[MOST:] = [f"{self._more} more damaged places, left out"]
+        self.mended[MAX_LISTED_FAULTS:] = [
+            f"{self._more} more damaged places, left out"
+        ]

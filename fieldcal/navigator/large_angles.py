@@ -20,7 +20,7 @@ import numpy as np
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
-FINER = 5
+STEPS_PER_SAMPLE = 5
 """Steps of the integration in one of the run."""
 
 
@@ -38,7 +38,7 @@ def beyond_first_order(
 
     """
     (earth, force), (e, a, phi) = inputs, np.split(errors, 3)
-    t = np.arange(count * FINER + 1) * (step / FINER)
+    t = np.arange(count * STEPS_PER_SAMPLE + 1) * (step / STEPS_PER_SAMPLE)
     true = rotation_matrices(phi) @ c
     turned = rotation_matrices(-t[:, None] * earth) @ c
     computed = turned @ rotation_matrices(t[:, None] * (true.T @ earth + e))  # (1)
@@ -47,9 +47,9 @@ def beyond_first_order(
     angle = phi - drift * once - np.cross(earth, phi * once - drift * twice)  # (2)
     off = computed @ (true.T @ force + a) - force
     off -= np.cross(force, angle) + c @ a  # (3)
-    velocity = _integral(off, step / FINER)
-    place = _integral(velocity, step / FINER)
-    return np.hstack([velocity, place])[FINER::FINER]
+    velocity = _integral(off, step / STEPS_PER_SAMPLE)
+    place = _integral(velocity, step / STEPS_PER_SAMPLE)
+    return np.hstack([velocity, place])[STEPS_PER_SAMPLE::STEPS_PER_SAMPLE]
 
 
 def _integral(values: Array, step: float) -> Array:

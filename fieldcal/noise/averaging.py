@@ -20,7 +20,7 @@ from fieldcal.noise.prediction import SizeDraw
 from fieldcal.noise.processes import allan_variance
 
 PER_DECADE = 8
-EDGE = 0.01
+LENGTH_TOLERANCE = 0.01
 """Relative tolerance: a recording of 30 s is one sample shorter than 30 s."""
 
 
@@ -67,7 +67,7 @@ def averaging_error(
     dt, longest : s between samples, and of the longest stretch
 
     """
-    end = max(longest * (1 + EDGE), 4.0)
+    end = max(longest * (1 + LENGTH_TOLERANCE), 4.0)
     count = int(np.log10(end) * PER_DECADE) + 2
     seconds = np.geomspace(1.0, end, count)
     each = np.array([allan_variance(d.terms, d.x, seconds, dt) for d in drawn])

@@ -20,22 +20,22 @@ from fieldcal.noise.likelihood import Flags
 CELL = 0.5
 """Length of a cell, s."""
 
-FEWEST = 8
+MIN_CELL_SAMPLES = 8
 """Fewest samples of a cell."""
 
 ODD = 6.0
 """Robust z beyond which a cell is disturbed: one in a thousand million by chance."""
 
-MOST = 0.5
+MAX_DISTURBED_SHARE = 0.5
 """Largest disturbed part; more of it is the normal behaviour of the device."""
 
-LONGEST = 10.0
+MAX_BRIDGED_S = 10.0
 """Longest disturbance that is bridged, s; a longer one splits the recording."""
 
-SIDE = 16
+CELLS_BESIDE = 16
 """Cells on each side from which a disturbance is bridged."""
 
-ENOUGH = 20
+MIN_CELLS = 20
 """Fewest cells in which disturbances are looked for."""
 
 
@@ -65,9 +65,9 @@ def bridge_disturbances(rows: Array, dt: float, noisy: int) -> list[CalmStretch]
     noisy : columns that are channels
 
     """
-    size = max(FEWEST, round(CELL / dt))
+    size = max(MIN_CELL_SAMPLES, round(CELL / dt))
     cells = len(rows) // size
-    if cells < ENOUGH:
+    if cells < MIN_CELLS:
         return [CalmStretch(rows, False, 0)]
     some = rows[: cells * size, :noisy].reshape(cells, size, noisy)
     means = np.einsum("nsc->nc", some) / size
@@ -79,7 +79,7 @@ def bridge_disturbances(rows: Array, dt: float, noisy: int) -> list[CalmStretch]
     odd = (np.abs(bends) > ODD * scale).any(axis=1)
     odd |= (_robust_z(np.cbrt(squares)) > ODD).any(axis=1)
     odd = _with_neighbours(odd)
-    if not odd.any() or odd.mean() > MOST:
+    if not odd.any() or odd.mean() > MAX_DISTURBED_SHARE:
         return [CalmStretch(rows, False, 0)]
     return _split_and_bridge(rows, odd, size, dt, scale)
 
@@ -113,10 +113,12 @@ def _split_and_bridge(
     good = np.repeat(~odd, size)
     good = np.concatenate([good, np.ones(len(rows) - len(good), dtype=bool)])
     for first, end in (edges.reshape(-1, 2) * size).tolist():
-        before = whole[max(begun, first - SIDE * size) : first]
-        side = slice(end, end + SIDE * size)
+        before = whole[max(begun, first - CELLS_BESIDE * size) : first]
+        side = slice(end, end + CELLS_BESIDE * size)
         behind = whole[side][good[side]]
-        if (end - first) * dt > LONGEST or _level_changed(before, behind, scale, size):
+        if (end - first) * dt > MAX_BRIDGED_S or _level_changed(
+            before, behind, scale, size
+        ):
             out.append(CalmStretch(whole[begun:first], parts, bridged))
             begun, bridged, parts = end, 0, True
             continue

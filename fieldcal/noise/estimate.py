@@ -34,13 +34,13 @@ from fieldcal.noise.reduction import Reduction
 from fieldcal.noise.spectrum import CosineSpectrum
 from fieldcal.noise.terms import FILTERED_HZ, choose_processes
 
-SHORTEST = 30.0
+MIN_STRETCH_S = 30.0
 """Shortest stretch from which noise is estimated, s."""
 
-FEWEST = 5
+MIN_DRAWS = 5
 """Fewest draws with a process from which a limit for it is stated."""
 
-QUICK = 1 / (2 * np.pi * FILTERED_HZ)
+WHITE_TIME_S = 1 / (2 * np.pi * FILTERED_HZ)
 """Correlation time below which noise acts as white on means over a second, s."""
 
 
@@ -142,12 +142,12 @@ def estimate_noise(recordings: Sequence[Reduction]) -> NoiseModel:
     """
     every = [s for r in recordings for s in r.stretches]
     longest = max((s.samples * s.dt for s in every), default=0.0)
-    if longest < SHORTEST:
+    if longest < MIN_STRETCH_S:
         raise InputError(
             f"the longest stretch at rest lasts {longest:.0f} s: record"
-            f" {SHORTEST:.0f} s at least, an hour to see bias instability"
+            f" {MIN_STRETCH_S:.0f} s at least, an hour to see bias instability"
         )
-    kept = [s for s in every if s.samples * s.dt >= min(SHORTEST, longest / 4)]
+    kept = [s for s in every if s.samples * s.dt >= min(MIN_STRETCH_S, longest / 4)]
     spectrum = CosineSpectrum(kept, NOISY)
     warm = all(r.has_temperature for r in recordings)
     channels = {
@@ -236,7 +236,7 @@ def _white_noise_size(best: NoiseFit, alone: ProcessSize) -> ProcessSize:
     weights = np.zeros(len(best.x))
     weights[best.terms.index("N")] = np.exp(best.x[best.terms.index("N")])
     for place, j in zip(best.timed, range(len(best.terms), len(best.x)), strict=True):
-        if best.terms[place] == "G" and best.x[j] < np.log(QUICK):
+        if best.terms[place] == "G" and best.x[j] < np.log(WHITE_TIME_S):
             weights[[place, j]] = 2 * np.exp(best.x[place] + best.x[j])
     total = float(weights[: len(best.terms)].sum())
     share = weights / total
@@ -258,7 +258,7 @@ def _upper_limits(
             for d in drawn
             if set(terms) & set(d.terms)
         ]
-        if len(sizes) >= FEWEST:
+        if len(sizes) >= MIN_DRAWS:
             high = float(np.sqrt(np.quantile(sizes, 0.95)))
             out[name] = ProcessSize(high, np.nan, PROCESS_UNITS[name].format(unit))
     return out

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.noise.levels import ReducedStretch, neighbour_differences
 
-FEWEST = 2
+MIN_PAIRS = 2
 """Fewest pairs of means in a stretch at an averaging time."""
 
 
@@ -54,7 +54,7 @@ def measured_allan_deviation(
             _add_squares(sums, int(lag), float(row[channel]), float(number), s)
         y = s.means[:, channel] - per_degree * s.means[:, -1]
         lag = 1
-        while lag * 2 * FEWEST <= len(y):
+        while lag * 2 * MIN_PAIRS <= len(y):
             steps = neighbour_differences(y[:, None], lag)
             _add_squares(sums, lag * s.m, float(np.sum(steps**2)), float(len(steps)), s)
             lag *= 2

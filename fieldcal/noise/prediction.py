@@ -16,8 +16,8 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.noise.likelihood import NoiseFit, parameter_bounds
 from fieldcal.noise.processes import (
-    FAR,
-    STEPS,
+    DIFFERENCES_PER_TIME,
+    UNCORRELATED_TIMES,
     allan_variance,
     degrees_of_freedom,
     difference_covariances,
@@ -31,7 +31,7 @@ SHAPES = 8
 WIDER = 1.3
 """Factor that widens the distribution that is drawn from, to cover the tails."""
 
-FURTHEST = 3.0
+MAX_LOG_DISTANCE = 3.0
 """Largest distance of a drawn logarithm from the maximum."""
 
 
@@ -100,7 +100,7 @@ def _draws_of_fit(
     values, axes = np.linalg.eigh(one.covariance)
     spread = WIDER * axes * np.sqrt(np.maximum(values, 0.0))
     standard = rng.standard_normal((2 * number, len(one.x)))
-    steps = np.clip(standard @ spread.T, -FURTHEST, FURTHEST)
+    steps = np.clip(standard @ spread.T, -MAX_LOG_DISTANCE, MAX_LOG_DISTANCE)
     tried = np.clip(one.x + steps, *parameter_bounds(spectrum, one.terms))
     weights = _density(spectrum, chosen, one, tried)
     weights += 0.5 * np.sum(standard**2, axis=1)
@@ -153,7 +153,11 @@ def predict_allan_deviation(
     shapes = [
         [
             degrees_of_freedom(
-                difference_covariances(d.terms, d.x, t, dt, FAR * STEPS), t, length
+                difference_covariances(
+                    d.terms, d.x, t, dt, UNCORRELATED_TIMES * DIFFERENCES_PER_TIME
+                ),
+                t,
+                length,
             )
             for d in some
         ]

@@ -35,13 +35,13 @@ PROCESS_UNITS = {
 }
 """Unit of each process, from that of the channel."""
 
-STEPS = 8
+DIFFERENCES_PER_TIME = 8
 """Differences in each averaging time; more of them add no information."""
 
 NODES = 33
 """Number of correlation times that make up flicker with a cut-off."""
 
-FAR = 12
+UNCORRELATED_TIMES = 12
 """Distance of uncorrelated differences, in averaging times."""
 
 
@@ -68,10 +68,12 @@ def difference_covariances(
     terms: tuple[str, ...], x: Array, tau: float, finest: float, lags: int
 ) -> Array:
     """Covariance (1) at lags of an eighth of the averaging time, (lags,)."""
-    steps = np.arange(-2 * STEPS, lags + 2 * STEPS)
-    s = np.abs(steps) * tau / STEPS
+    steps = np.arange(-2 * DIFFERENCES_PER_TIME, lags + 2 * DIFFERENCES_PER_TIME)
+    s = np.abs(steps) * tau / DIFFERENCES_PER_TIME
     g = generalised_covariance(terms, x, s, finest)
-    at = [g[i * STEPS : i * STEPS + lags] for i in range(5)]
+    at = [
+        g[i * DIFFERENCES_PER_TIME : i * DIFFERENCES_PER_TIME + lags] for i in range(5)
+    ]
     found: Array = at[0] - 4 * at[1] + 6 * at[2] - 4 * at[3] + at[4]
     return found / (2 * tau * tau)
 
@@ -124,7 +126,7 @@ def degrees_of_freedom(covariance: Array, tau: float, length: float) -> float:
     tau, length : averaging time, and of the recording, s
 
     """
-    count = max(1.0, (length - 2 * tau) / tau * STEPS + 1)
+    count = max(1.0, (length - 2 * tau) / tau * DIFFERENCES_PER_TIME + 1)
     lags = np.arange(1, min(len(covariance), int(np.ceil(count))))
     other = 2 * float(np.sum((count - lags) * covariance[lags] ** 2))
     first = float(covariance[0]) ** 2

@@ -35,10 +35,10 @@ from fieldcal.noise.prediction import SizeDraw
 CHANCES = (0.05, 0.32)
 """Probabilities to be beyond the limit for which a time is stated."""
 
-LONGEST = 20 * 365.25 * 86400.0
+MAX_INTERVAL_S = 20 * 365.25 * 86400.0
 """Longest time that is stated, s."""
 
-STEPS = 3
+MIN_HISTORY_STEPS = 3
 """Fewest steps of the history from which its walk is estimated."""
 
 
@@ -66,7 +66,7 @@ class Recalibration:
     ----------
     limit : in the channel's unit
     seconds : time until it is beyond the limit with each probability of `CHANCES`; inf
-        if longer than `LONGEST`
+        if longer than `MAX_INTERVAL_S`
     from_history : whether it follows from the device's own calibrations
     by_unseen_walk : whether it follows from a walk that the recording would not show
     by_ramp : whether half of it or more is by the ramp of the recording, continued
@@ -100,8 +100,8 @@ def recalibration_time(
     unseen : the largest K that the recording would not show; 0 where it shows one
 
     """
-    seconds = np.geomspace(60.0, LONGEST, 120)
-    known = walk_from_history(steps) if len(steps) >= STEPS else None
+    seconds = np.geomspace(60.0, MAX_INTERVAL_S, 120)
+    known = walk_from_history(steps) if len(steps) >= MIN_HISTORY_STEPS else None
     chance = np.zeros(len(seconds))
     for one in drawn:
         v = variance + _structure(one, seconds, known, unseen)

@@ -15,7 +15,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.noise.disturbed import bridge_disturbances
 from fieldcal.noise.levels import CosineLevels, ReducedStretch
 
-GAP = 1.0
+MIN_GAP_S = 1.0
 """Time without samples that begins a new stretch, s."""
 
 ROWS = 1 << 17
@@ -65,7 +65,7 @@ class Reducer:
         """Take samples, in order of time."""
         if not len(block):
             return
-        edges = np.flatnonzero(np.diff(block.t, prepend=self._last) > GAP)
+        edges = np.flatnonzero(np.diff(block.t, prepend=self._last) > MIN_GAP_S)
         first = 0
         for edge in [*edges.tolist(), len(block)]:
             if edge > first:

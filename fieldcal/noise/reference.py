@@ -31,10 +31,10 @@ from fieldcal.noise.likelihood import (
 )
 from fieldcal.noise.spectrum import CosineSpectrum
 
-APART = 1e-3
+LOG_STEP = 1e-3
 """Step of the logarithms for the numerical slope of (1)."""
 
-SHORTEST = 2.0**-12
+MIN_STEP_SHARE = 2.0**-12
 """Least part of a step that is tried."""
 
 
@@ -102,7 +102,7 @@ def _maximise(density: SizeDensity, x: Array) -> Array:
     best = float(density.log_density(x[None])[0])
     for _ in range(MOST_STEPS):
         step, part = _step(density, x), 1.0
-        while part >= SHORTEST:
+        while part >= MIN_STEP_SHARE:
             higher = float(density.log_density((x + part * step)[None])[0])
             if higher > best:
                 break
@@ -117,9 +117,9 @@ def _maximise(density: SizeDensity, x: Array) -> Array:
 
 def _step(density: SizeDensity, x: Array) -> Array:
     """J^-1 times the slope of (1), (p,)."""
-    aside = APART * np.eye(len(x))
+    aside = LOG_STEP * np.eye(len(x))
     slope = (density.log_density(x + aside) - density.log_density(x - aside)) / (
-        2 * APART
+        2 * LOG_STEP
     )
     step = np.linalg.pinv(density.information(x[None])[0], hermitian=True) @ slope
     out: Array = step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))

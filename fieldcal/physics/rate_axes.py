@@ -33,7 +33,7 @@ CLOSES = np.deg2rad(8.0)
 """What a turn that closes misses by at most, rad: biases of half a m/s^2 and scale
 factors off by a few percent leave less."""
 
-OPENS, ALIKE = 3.0, np.deg2rad(0.5)
+MIN_CLOSURE_RATIO, SAME_CLOSURE_RAD = 3.0, np.deg2rad(0.5)
 """How much more others miss by, and what makes no difference, rad."""
 
 
@@ -75,7 +75,9 @@ def axes_by_turns(turns: Sequence[ObservedTurn]) -> Array | None:
     missed = np.quantile(each, FOLLOWED, axis=0, method="higher")
     if missed.min() > CLOSES or missed[0] < CLOSES:
         return None
-    near = np.flatnonzero(missed <= OPENS * max(missed.min(), ALIKE))
+    near = np.flatnonzero(
+        missed <= MIN_CLOSURE_RATIO * max(missed.min(), SAME_CLOSURE_RAD)
+    )
     if len(near) > 1:
         # about two axes the third goes by itself, and devices are right-handed
         near = np.array([i for i in near if np.linalg.det(every[i]) > 0])

@@ -16,7 +16,7 @@ Rows = NDArray[np.intp]
 GRID_SAMPLES = 20_000
 """Samples that show the grid that values lie on."""
 
-PARTS, SURE = 12, 9
+MAX_GRID_PARTS, MIN_GRID_GAPS = 12, 9
 """Steps in the least gap, up to which they are sought, and gaps that say so for
 certain: what a device counts and a program writes in decimals has no two neighbours.
 Any gap is within 5 % of a whole number by chance once in ten times."""
@@ -155,7 +155,7 @@ def _step_between(shown: Array) -> float:
     gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
     if len(gaps) < 2:
         return 0.0
-    parts = range(1, 1 + (PARTS if len(gaps) >= SURE else 1))
+    parts = range(1, 1 + (MAX_GRID_PARTS if len(gaps) >= MIN_GRID_GAPS else 1))
     steps = (_grid(gaps, float(gaps.min()) / part) for part in parts)
     return next((step for step in steps if step), 0.0)
 

@@ -3,7 +3,7 @@
 The parameters of a calibration (bias and scale factor of each sensor) are projected out
 of the columns of every effect. An effect with no remaining column is *hidden*: the
 calibration absorbs it. Two effects are *aliases* if the remaining columns of one lie in
-the span of the other: cos of the largest principal angle above `ALIKE`.
+the span of the other: cos of the largest principal angle above `ALIKE_COSINE`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Motion, Sensor
 from fieldcal.physics.experience import Experience
 
-ALIKE = 0.995
+ALIKE_COSINE = 0.995
 """Cosine of an angle at which noise of a few percent hides the difference."""
 
 NOTHING = 1e-6
@@ -119,4 +119,4 @@ def _contained(a: Array, b: Array) -> bool:
     """Whether the span of a lies in the span of b."""
     if a.shape[1] > b.shape[1]:
         return False
-    return float(np.linalg.svd(a.T @ b, compute_uv=False)[-1]) > ALIKE
+    return float(np.linalg.svd(a.T @ b, compute_uv=False)[-1]) > ALIKE_COSINE

@@ -48,10 +48,10 @@ from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State
 
-LEAST = 1e-3
+MIN_PROBABILITY = 1e-3
 """Probability below which an explanation is ignored."""
 
-STEP = 1e-4
+DERIVATIVE_STEP_RAD = 1e-4
 """Step of numerical derivatives by an angle, rad."""
 
 COMMON = {"base_tilt": 30.0, "gyro_scale": 1.0, "gyro_cross_coupling": 1.0}
@@ -167,7 +167,7 @@ class ExpectedGain:
         self, likely: Iterable[tuple[Set, float]]
     ) -> list[EliminatedExplanation]:
         """Sets of the search, and the best one with each cause that is not shown."""
-        out = [self._with_common_causes(s, p) for s, p in likely if p > LEAST]
+        out = [self._with_common_causes(s, p) for s, p in likely if p > MIN_PROBABILITY]
         best = max(out, key=lambda pair: pair[1])
         known = set().union(*(one.names for one, _ in out))
         for cause in self.dictionary.causes:
@@ -178,7 +178,7 @@ class ExpectedGain:
         return [
             replace(one, chance=float(p))
             for (one, _), p in zip(out, share, strict=True)
-            if p > LEAST
+            if p > MIN_PROBABILITY
         ]
 
     def _with_common_causes(
@@ -320,8 +320,11 @@ class ExpectedGain:
             x = state.experienced(rows_at_session_end(rows.x, alpha + a, beta + b))
             return state.output(x, since)
 
-        moved = [output(a, b) - output(-a, -b) for a, b in ((STEP, 0.0), (0.0, STEP))]
-        t = np.stack(moved, axis=2) / (2 * STEP)
+        moved = [
+            output(a, b) - output(-a, -b)
+            for a, b in ((DERIVATIVE_STEP_RAD, 0.0), (0.0, DERIVATIVE_STEP_RAD))
+        ]
+        t = np.stack(moved, axis=2) / (2 * DERIVATIVE_STEP_RAD)
         out: Array = np.diag(own) + self.angles**2 * t @ np.swapaxes(t, 1, 2)
         return out
 

@@ -11,7 +11,7 @@ from fieldcal.core.positions import Position
 from fieldcal.planning.steps import Plan, hold, note
 from fieldcal.windows import Average
 
-TRIES = 5
+MAX_TRIES = 5
 """Largest number of windows started in a position."""
 
 
@@ -45,13 +45,13 @@ def hold_until_still(
     index: int, position: Position, seconds: float, sigma: float | None
 ) -> Plan[Average]:
     """Hold one position until a window was not disturbed."""
-    for _ in range(TRIES):
+    for _ in range(MAX_TRIES):
         try:
             return (yield from hold(index, position, seconds, sigma))
         except Moved as moved:
             yield from note(f"{moved}; hold still, the window starts again")
     raise CalibrationFailed(
-        f"{position.name}: no window of {seconds:g} s without a disturbance in {TRIES}"
-        " tries; fix the device better, shelter it from the wind, then go on with"
-        " --resume"
+        f"{position.name}: no window of {seconds:g} s without a disturbance in"
+        f" {MAX_TRIES} tries; fix the device better, shelter it from the wind, then go"
+        " on with --resume"
     )

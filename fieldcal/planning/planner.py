@@ -32,7 +32,7 @@ from fieldcal.model.causes.planned import design_matrix, parameters
 STARTS = 12
 """Number of random sets from which the exchange starts; fewer give the same result."""
 
-STEPS = 7
+ANGLES_PER_JOINT = 7
 """Number of angles between the limits of each joint."""
 
 SINGULAR = 1e-9
@@ -95,7 +95,7 @@ class Ladder:
 
     def candidates(self) -> list[Position]:
         """A grid of positions within the limits, home among them."""
-        steps = np.linspace(-1, 1, STEPS)
+        steps = np.linspace(-1, 1, ANGLES_PER_JOINT)
         pairs = product(np.rad2deg(self.alpha) * steps, np.rad2deg(self.beta) * steps)
         return [Position.deg(round(a, 3) + 0.0, round(b, 3) + 0.0) for a, b in pairs]
 

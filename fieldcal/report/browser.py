@@ -38,7 +38,7 @@ OPTIONS = (
 TIMEOUT_S = 60.0
 """Longest wait for an answer, s of the host's clock."""
 
-WIDTH = 1200
+PAGE_WIDTH_PX = 1200
 """Width of a picture, CSS pixels."""
 
 _FREE = 10
@@ -104,7 +104,7 @@ class Browser:
         made = self.call("Page.printToPDF", printBackground=True, **size)
         return base64.b64decode(made["data"])
 
-    def png(self, width: int = WIDTH) -> bytes:
+    def png(self, width: int = PAGE_WIDTH_PX) -> bytes:
         """The whole page as a picture."""
         self.resize(width, 900)
         height = self.value("document.documentElement.scrollHeight")

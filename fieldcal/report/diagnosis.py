@@ -46,7 +46,7 @@ from fieldcal.report.loose import (
     table_at,
 )
 
-MOST = 10
+MAX_SHOWN_ROWS = 10
 """Rows of the mismatch that are shown; the rest can be opened."""
 
 TONES: dict[str, Tone] = {
@@ -139,7 +139,9 @@ def _mismatch(rows: Sequence[Json]) -> list[ReportBlock]:
         ">rms",
         ">significance",
     )
-    return foldable_table("Where recording and simulation part", columns, cells, MOST)
+    return foldable_table(
+        "Where recording and simulation part", columns, cells, MAX_SHOWN_ROWS
+    )
 
 
 def _rms(names: Sequence[str], rms: float) -> str:

@@ -19,7 +19,7 @@ from fieldcal.session.folder import RESULT, Session
 DIAGNOSIS = "diagnosis.json"
 AGAINST = "against.json"
 
-FAR = 1e6
+MAX_SHOWN_TIME = 1e6
 """Device times above this are shown less their start, s: they have too many digits."""
 
 
@@ -70,7 +70,7 @@ class ReportMaterial:
     def epoch(self) -> float:
         """Offset that charts subtract from device times, s; 0 for small times."""
         start = float(self.block.t[0])
-        return float(np.floor(start)) if abs(start) > FAR else 0.0
+        return float(np.floor(start)) if abs(start) > MAX_SHOWN_TIME else 0.0
 
     @property
     def clock(self) -> str:

@@ -17,10 +17,10 @@ from fieldcal.report.blocks import ReportBlock as Part
 from fieldcal.report.charts import SENSORS, Axis, Chart, Series
 from fieldcal.report.gather import ReportMaterial
 from fieldcal.session.noise_file import read_noise
-from fieldcal.windows.allan import SHORTEST, AllanDeviation, allan_deviation
+from fieldcal.windows.allan import MIN_RECORDING_S, AllanDeviation, allan_deviation
 from fieldcal.windows.stretches import still_stretches
 
-MOST = 1_000_000
+MAX_SAMPLES = 1_000_000
 """Largest number of samples that is evaluated; more take seconds and add little."""
 
 
@@ -72,15 +72,16 @@ def _of_recording(material: ReportMaterial) -> Section:
     """Allan deviation of the session's longest stretch, or the reason for none."""
     span = _longest(material)
     parts: tuple[Part, ...]
-    if span[1] - span[0] < SHORTEST:
+    if span[1] - span[0] < MIN_RECORDING_S:
         parts = (
             Paragraph(
                 f"The longest stretch at rest lasts {span[1] - span[0]:.0f} s. Record"
-                f" {SHORTEST:.0f} s or more at rest to see how far averaging helps."
+                f" {MIN_RECORDING_S:.0f} s or more at rest to see how far averaging"
+                " helps."
             ),
         )
         return Section("noise", "Noise", parts)
-    block = material.block.between(*span)[:MOST]
+    block = material.block.between(*span)[:MAX_SAMPLES]
     try:
         found = allan_deviation(block)
         levels = _table(found)
@@ -98,7 +99,7 @@ def _longest(material: ReportMaterial) -> tuple[float, float]:
     spans = [(a.start, a.end) for a in still.averages] if still is not None else []
     best = max(spans, key=_length, default=(0.0, 0.0))
     whole = float(material.block.t[-1] - material.block.t[0])
-    if _length(best) < SHORTEST <= whole:
+    if _length(best) < MIN_RECORDING_S <= whole:
         return max([best, *still_stretches(material.block)], key=_length)
     return best
 

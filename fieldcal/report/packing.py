@@ -42,7 +42,7 @@ _VALUE = (2 + 8 / PIECE) * _TEXT
 _TIME = 4 * _TEXT
 """Bytes of base64 for one value and one time."""
 
-LONGEST = 4000.0
+MAX_STRETCH_S = 4000.0
 """Longest stretch that 32 bit of microseconds can count, s."""
 
 
@@ -69,7 +69,7 @@ def pack(
     t, c = columns.t, columns.values.shape[1]
     span = float(t[-1] - t[0])
     sample = _TIME + c * _VALUE
-    if len(t) * sample <= BASE_BYTES and span < LONGEST:
+    if len(t) * sample <= BASE_BYTES and span < MAX_STRETCH_S:
         return {"base": _samples(columns), "details": []}
     bins = int(BASE_BYTES / (2 * c * _VALUE))
     wanted = _select_stretches(columns, closely, DETAIL_BYTES / sample)
@@ -91,7 +91,7 @@ def _select_stretches(
             left -= new
     edges = np.flatnonzero(np.diff(taken.astype(int), prepend=0))
     # a pause may be longer than times from a start can tell
-    paused = np.flatnonzero(np.diff(columns.t) > LONGEST / 2) + 1
+    paused = np.flatnonzero(np.diff(columns.t) > MAX_STRETCH_S / 2) + 1
     inside = paused[taken[paused - 1] & taken[paused]]
     pairs = np.sort(np.concatenate([edges, inside, inside])).reshape(-1, 2)
     return [

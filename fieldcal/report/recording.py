@@ -15,7 +15,7 @@ from fieldcal.report.gather import ReportMaterial
 from fieldcal.report.loose import Json, number_or_nan, objects_at
 from fieldcal.report.packing import ChannelTable, pack, stretches_around
 
-CLOSE = 3.0
+EDGE_STRETCH_S = 3.0
 """Stretch about each edge of a window that is packed sample by sample, s."""
 
 BRIEF = 5.0
@@ -88,7 +88,7 @@ def _chart(material: ReportMaterial) -> RecordingChart:
         material.clock,
         pack(
             ChannelTable(block.t - material.epoch, values),
-            stretches_around(edges, CLOSE),
+            stretches_around(edges, EDGE_STRETCH_S),
         ),
         spans,
         _means(material, used, values.shape[1]),

@@ -24,20 +24,20 @@ from fieldcal.windows import StillnessLimits
 from fieldcal.windows.cells import CELL, CellAccumulator, CellTable
 from fieldcal.windows.verdict import judge_window
 
-SPAN = 10
+SPREAD_CELLS = 10
 """Cells whose spread is looked at: 1 s."""
 
 POINTS = 4000
 """Most points of the line; the greatest of each group is kept."""
 
-NEAR = 0.8
+CLOSE_FRACTION = 0.8
 """Fraction of the limit above which a window is marked as close to it."""
 
 
 def stillness_section(material: ReportMaterial) -> Section | None:
     """Motion over time, and how near each window came to being rejected."""
     cells = _cells(material.block)
-    if len(cells) < 2 * SPAN:
+    if len(cells) < 2 * SPREAD_CELLS:
         return None
     t, r = motion_by_second(cells)
     chart = Chart(
@@ -85,11 +85,11 @@ def _found_rests(
 def motion_by_second(cells: CellTable) -> tuple[Array, Array]:
     """Middle of each second, s, and r of it, (m,) each."""
     means = cells.steady_means
-    view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
+    view = np.lib.stride_tricks.sliding_window_view(means, SPREAD_CELLS, axis=0)
     spread = view.std(axis=-1)
     quiet = np.quantile(spread, 0.1, axis=0)
     ratio = spread / np.where(quiet > 0, quiet, np.inf)
-    return cells.times[: len(ratio)] + SPAN * CELL / 2, ratio.max(axis=1)
+    return cells.times[: len(ratio)] + SPREAD_CELLS * CELL / 2, ratio.max(axis=1)
 
 
 def _thinned(t: Array, r: Array) -> tuple[Array, Array]:
@@ -114,7 +114,9 @@ def _windows(material: ReportMaterial, still: UsableWindows) -> blocks.Table:
             rate = table_rate(material.block, span, about, row)
             window, _ = without_table_rotation(window, rate)
         worst = judge_window(_cells(window), StillnessLimits()).worst
-        tone: Tone = "bad" if worst.ratio > 1 else "warn" if worst.ratio > NEAR else ""
+        tone: Tone = (
+            "bad" if worst.ratio > 1 else "warn" if worst.ratio > CLOSE_FRACTION else ""
+        )
         share = Cell(f"{100 * worst.ratio:.0f} %", tone, min(1.0, worst.ratio))
         what = f"{worst.kind} on {CHANNELS[worst.channel]}"
         at = f"{worst.at - average.start:.1f}"

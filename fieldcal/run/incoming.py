@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.core.samples import Block, split_by_time
 from fieldcal.drivers.driver import Driver
-from fieldcal.run.interruptions import GAP
+from fieldcal.run.interruptions import MAX_GAP_S
 from fieldcal.run.link_marks import LinkMarks, MarkedRecorder
 from fieldcal.run.wait_reason import WaitReason, WaitState
 
@@ -33,7 +33,7 @@ class IncomingSamples:
     Attributes
     ----------
     pieces : an iterator over the samples, `PIECE_S` at a time
-    breaks : number of gaps that are longer than `GAP`
+    breaks : number of gaps that are longer than `MAX_GAP_S`
     silence : half seconds since the last sample
 
     """
@@ -76,7 +76,7 @@ class IncomingSamples:
         for raw in self._driver.blocks():
             self.silence, self._health = 0, replace(self._driver.health)
             block = self._recorder.append(raw)
-            self.breaks += bool(block.t[0] - self._until_s > GAP)
+            self.breaks += bool(block.t[0] - self._until_s > MAX_GAP_S)
             self._until_s = float(block.t[-1])
             self._link.take(block)
             self._on_block(block)

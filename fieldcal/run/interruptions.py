@@ -67,7 +67,7 @@ def restart_notice(moved: Moved, times: int) -> str:
     )
 
 
-GAP = 0.5
+MAX_GAP_S = 0.5
 """Longest time without samples that a window may have, s."""
 
 MOST_LOSS_RESTARTS = 2
@@ -108,7 +108,7 @@ class WindowWatch:
 
         """
         now, health = float(block.t[0]), self._driver.health
-        if now - self._last > GAP:
+        if now - self._last > MAX_GAP_S:
             raise _gap_error(self._last, now)
         if health.restarts != self._restarts:
             raise _restart_error(now)

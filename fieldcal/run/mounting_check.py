@@ -17,7 +17,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.frames import mounting_matrix
 from fieldcal.core.samples import Array
-from fieldcal.run.position_check import FIRST
+from fieldcal.run.position_check import FIRST_TOLERANCE_RAD
 
 
 def fitting_mounting(
@@ -38,7 +38,7 @@ def fitting_mounting(
     length = float(np.linalg.norm(device) * np.linalg.norm(wanted))
     near: list[tuple[int, tuple[str, ...]]] = []
     for axes, matrix in _mountings():
-        if matrix @ device @ wanted >= np.cos(FIRST) * length:
+        if matrix @ device @ wanted >= np.cos(FIRST_TOLERANCE_RAD) * length:
             changed = sum(a != b for a, b in zip(axes, declared, strict=True))
             near.append((changed, axes))
     return min(near)[1] if near else None

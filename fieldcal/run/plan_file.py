@@ -28,7 +28,7 @@ from fieldcal.session.schemas import make_validator, schema_fault
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
 """Averaging time, longest wait for a device that warms up, longest turn, s."""
 
-APART = math.radians(0.5)
+MIN_ANGLE_RAD = math.radians(0.5)
 """Least angle between the positions of a plan."""
 
 
@@ -177,7 +177,7 @@ def _check_positions(about: Description, name: str) -> None:
             " plan needs two or more, each with alpha_deg and beta_deg"
         )
     f = specific_forces(positions, 1.0)
-    if np.linalg.norm(f - f[0], axis=1).max() < APART:
+    if np.linalg.norm(f - f[0], axis=1).max() < MIN_ANGLE_RAD:
         raise PlanError(
             f"{name}: all {len(positions)} positions are the same"
             f" ({positions[0].name}): no scale factor can be determined; turn the"

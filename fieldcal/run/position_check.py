@@ -24,10 +24,10 @@ from fieldcal.core.frames import angles_of_force_direction, in_axes_turned_about
 from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array
 
-FIRST = np.deg2rad(8.0)
+FIRST_TOLERANCE_RAD = np.deg2rad(8.0)
 """Tolerance for the first position, rad: base tilt and bias of a raw device."""
 
-NEAR, TILT = np.deg2rad(1.0), np.deg2rad(3.5)
+JOINT_TOLERANCE_RAD, TILT_TOLERANCE_RAD = np.deg2rad(1.0), np.deg2rad(3.5)
 """Tolerance for later positions, rad: of the joints, of the base for a unit turn."""
 
 NORM = 0.15
@@ -96,10 +96,14 @@ def check_position(
     if not wanted.oriented:
         return PositionCheck(True, *seen)
     chord = _relative_force_change(wanted, held.position, gravity) if held else 0.0
-    limit = NEAR + TILT * chord if held else FIRST
+    limit = (
+        JOINT_TOLERANCE_RAD + TILT_TOLERANCE_RAD * chord
+        if held
+        else FIRST_TOLERANCE_RAD
+    )
     miss = _angle_off(wanted, f, gravity, held)
     slip, slip_miss = _nearest_slip(wanted, f, gravity, held, others or {})
-    slipped = slip_miss < min(miss / 2, limit) and miss > NEAR
+    slipped = slip_miss < min(miss / 2, limit) and miss > JOINT_TOLERANCE_RAD
     within = float(np.rad2deg(limit))
     if miss <= limit and not slipped:
         return PositionCheck(True, *seen, limit_deg=within)

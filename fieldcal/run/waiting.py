@@ -13,10 +13,10 @@ from fieldcal.core.positions import Position, specific_forces
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.planning.steps import Hold
 from fieldcal.run.gyro_unit import GyroUnitWatch
-from fieldcal.run.interruptions import GAP
+from fieldcal.run.interruptions import MAX_GAP_S
 from fieldcal.run.mounting_check import wrong_mounting_message
 from fieldcal.run.position_check import (
-    NEAR,
+    JOINT_TOLERANCE_RAD,
     NORM,
     AcceptedPosition,
     PositionCheck,
@@ -116,10 +116,10 @@ class PositionWait:
         `host` is the time by the host's clock, s.
         """
         if self._last_host < host:
-            self.waited_host += min(GAP, host - self._last_host)
+            self.waited_host += min(MAX_GAP_S, host - self._last_host)
         self._last_host = host
         away = float(block.t[0]) - self._last
-        if away > GAP:
+        if away > MAX_GAP_S:
             self._start()
             self._began = None if self._began is None else self._began + away
         self._last = float(block.t[-1])
@@ -231,7 +231,7 @@ class PositionWait:
         if place is None or self.f is None:
             return True
         away = float(np.linalg.norm(self.f - place))
-        return bool(away > NEAR * self._about.gravity)
+        return bool(away > JOINT_TOLERANCE_RAD * self._about.gravity)
 
 
 def _other_positions(hold: Hold, about: Description) -> dict[str, Position]:

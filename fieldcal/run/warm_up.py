@@ -19,10 +19,10 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block
 
-SPAN = 60
+SLOPE_SPAN_S = 60
 """Seconds over which the slope is taken."""
 
-FEWEST = 5
+MIN_SLOPE_S = 5
 """Least seconds for a slope."""
 
 
@@ -38,7 +38,7 @@ class WarmUpWatch:
 
     def __init__(self, limit: float, wait: float) -> None:
         self._limit, self._wait = limit, wait
-        self._seconds: deque[tuple[float, float]] = deque(maxlen=SPAN)
+        self._seconds: deque[tuple[float, float]] = deque(maxlen=SLOPE_SPAN_S)
         self._second, self._sum, self._n = -np.inf, 0.0, 0
         self._step = np.inf
         self._last = np.nan
@@ -76,7 +76,7 @@ class WarmUpWatch:
     @property
     def rate(self) -> tuple[float, float]:
         """Change in K/min and its standard uncertainty, (1), (2); nan if unknown."""
-        if len(self._seconds) < FEWEST:
+        if len(self._seconds) < MIN_SLOPE_S:
             return np.nan, np.nan
         t, temperature = np.array(self._seconds).T
         about, s = t - t.mean(), float(((t - t.mean()) ** 2).sum())
@@ -104,4 +104,4 @@ class WarmUpWatch:
         """Whether a window must wait: the temperature changes, or is not known yet."""
         if self.waived or self._until is None or self._last >= self._until:
             return False
-        return len(self._seconds) < FEWEST or bool(self.notice)
+        return len(self._seconds) < MIN_SLOPE_S or bool(self.notice)

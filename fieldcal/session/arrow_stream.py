@@ -21,7 +21,7 @@ MARKER = b"\xff\xff\xff\xff"
 BATCH_KEYS = {"crc32", "number", "row"}
 """Metadata of each batch; a stream of another program has none of these."""
 
-END = MARKER + b"\0\0\0\0"
+CLOSING_BYTES = MARKER + b"\0\0\0\0"
 """Last bytes of a stream that was closed."""
 
 
@@ -156,7 +156,7 @@ class _Decoder:
                 return 0
         with pa.BufferOutputStream() as sink, pa.ipc.new_stream(sink, self._usual):
             pass
-        head = sink.getvalue().to_pybytes()[: -len(END)]
+        head = sink.getvalue().to_pybytes()[: -len(CLOSING_BYTES)]
         first = next(self._candidates(8), None)
         if first is None:
             return 0
@@ -167,8 +167,8 @@ class _Decoder:
     def _read_all(self, at: int) -> None:
         size = len(self._raw)
         while at < size:
-            if self._raw[at : at + len(END)] == END:
-                at += len(END)
+            if self._raw[at : at + len(CLOSING_BYTES)] == CLOSING_BYTES:
+                at += len(CLOSING_BYTES)
                 if at < size:
                     self._faults_found.append(
                         f"{size - at} bytes behind its end are left out"

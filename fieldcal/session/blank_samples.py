@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldcal.core.samples import Block
 
-FEWEST, MOST = 2, 0.5
+MIN_BLANK_ROWS, MAX_BLANK_SHARE = 2, 0.5
 """Least number of rows of zeros, and the fraction of the samples from which on they are
 kept, since the device puts out nothing else. A single row may be the start of a counter
 or a test, and does no harm."""
@@ -26,6 +26,6 @@ def remove_blank_samples(block: Block) -> tuple[Block, int]:
     some = np.flatnonzero(block.acc[:, 0] == 0)
     turns = np.nan_to_num(block.gyr[some])  # nan without gyroscopes
     blank = some[(block.acc[some] == 0).all(axis=1) & (turns == 0).all(axis=1)]
-    if not FEWEST <= len(blank) < MOST * len(block):
+    if not MIN_BLANK_ROWS <= len(blank) < MAX_BLANK_SHARE * len(block):
         return block, 0
     return block[np.delete(np.arange(len(block)), blank)], len(blank)

@@ -160,7 +160,8 @@ class Description:
         """Standard deviation of each position's means, (p, 6) SI; nan where unknown."""
         tables = self.raw.get("position", ())
         given = [tables[i].get("sigma", ()) for i in self.position_numbers]
-        rows = [[*row, *[np.nan] * (6 - len(row))] for row in given]
+        known = [[np.nan if one == "unknown" else one for one in row] for row in given]
+        rows = [[*row, *[np.nan] * (6 - len(row))] for row in known]
         return np.array(rows, dtype=float).reshape(-1, 6)
 
     def in_time_order(self) -> Description:

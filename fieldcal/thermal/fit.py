@@ -22,7 +22,7 @@ from fieldcal.thermal.curves import TERMS, ThermalCurve, ThermalModel
 from fieldcal.thermal.group_fit import SHARES, GroupData, fit_group, held_out_residual
 from fieldcal.thermal.points import ThermalPoint
 
-FEWEST, NARROWEST_K = 3, 10.0
+MIN_TEMPERATURES, MIN_RANGE_K = 3, 10.0
 """Least number of temperatures, and least range; ArduPilot needs the same range."""
 
 DISTINCT_SHARE = 0.1
@@ -104,11 +104,11 @@ def _check_temperatures(warm: Array) -> None:
     for t in np.sort(warm):
         if t - last >= DISTINCT_SHARE * wide:
             count, last = count + 1, float(t)
-    if count < FEWEST or wide < NARROWEST_K:
+    if count < MIN_TEMPERATURES or wide < MIN_RANGE_K:
         listed = ", ".join(f"{t:.1f}" for t in warm)
         raise InputError(
-            f"the sessions were taken at {listed} °C: at least {FEWEST} temperatures"
-            f" over {NARROWEST_K:.0f} K are needed; record at others"
+            f"the sessions were taken at {listed} °C: at least {MIN_TEMPERATURES}"
+            f" temperatures over {MIN_RANGE_K:.0f} K are needed; record at others"
         )
 
 

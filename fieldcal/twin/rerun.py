@@ -179,7 +179,7 @@ def _replay(explanation: Explanation, case: _ReplayCase) -> ReplayFigures:
     windows = schedule.replay_windows(
         explanation, case.state, case.fitted, level, turns
     )
-    t = schedule.replay_instants(source.block.t, rows.span, schedule.ENOUGH, turns)
+    t = schedule.replay_instants(source.block.t, rows.span, schedule.ROW_SAMPLES, turns)
     plain = [e for e in device.effects if e.id not in LINES]
     blocks = [
         simulate(

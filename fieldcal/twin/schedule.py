@@ -22,7 +22,7 @@ from fieldcal.physics.experience import Experience
 from fieldcal.sim_device.replay import HeldWindow
 from fieldcal.twin.ways import manoeuvre_of_turn
 
-ENOUGH = 24
+ROW_SAMPLES = 24
 """Samples of a row that are simulated for its mean, without oscillations."""
 
 TURN_S = 4.0

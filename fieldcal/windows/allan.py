@@ -22,10 +22,10 @@ from fieldcal.windows.cells import resolution
 from fieldcal.windows.noise import STEP_SAMPLES, short_lag_noise, smallest_steps
 from fieldcal.windows.rounding import variance_of_mean
 
-SHORTEST = 60.0
+MIN_RECORDING_S = 60.0
 """Shortest recording that is evaluated, s."""
 
-GAP = 1.0
+MAX_GAP_S = 1.0
 """Longest gap that is tolerated, s."""
 
 AVERAGES = 4
@@ -138,14 +138,14 @@ def _interpolated(x: Array) -> Array:
 
 def _check_recording(block: Block) -> None:
     seconds = float(block.t[-1] - block.t[0]) if len(block) else 0.0
-    if seconds < SHORTEST:
+    if seconds < MIN_RECORDING_S:
         raise InputError(
             f"a recording of {seconds:.0f} s is too short for an Allan deviation: "
-            f"record {SHORTEST:.0f} s or more at rest"
+            f"record {MIN_RECORDING_S:.0f} s or more at rest"
         )
     steps = np.diff(block.t)
     worst = int(np.argmax(steps))
-    if steps[worst] > GAP:
+    if steps[worst] > MAX_GAP_S:
         raise InputError(
             f"no samples for {steps[worst]:.1f} s from {block.t[worst]:.2f} s on: take "
             "the part of the recording before or after"

@@ -16,7 +16,7 @@ from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
 from fieldcal.core.sentences import join_words
 from fieldcal.windows.cells import CellRows, SamplesBetween
 
-OFTEN = 0.5
+MIN_CHANGING_SHARE = 0.5
 """Part of samples that differ from the previous one if noise exceeds the step."""
 
 _PART = 1 << 12
@@ -107,7 +107,7 @@ def _dead_axes(triad: Array) -> list[int]:
     still = ~(shares > 0)
     if still.all():
         return [0, 1, 2]
-    dead = np.isnan(shares) | (still & (still | (shares > OFTEN)).all())
+    dead = np.isnan(shares) | (still & (still | (shares > MIN_CHANGING_SHARE)).all())
     return [int(axis) for axis in np.flatnonzero(dead)]
 
 

@@ -38,7 +38,7 @@ from fieldcal.windows import rounding
 from fieldcal.windows.sums import smallest_changes
 
 KEEP = 0.9
-KEPT = 0.62302
+CENTRAL_SECOND_MOMENT = 0.62302
 """Second moment of a unit normal inside its central nine tenths."""
 
 MOST_DIFFERENCES = 200_000
@@ -163,7 +163,7 @@ def _level(pieces: Sequence[Array], m: int) -> tuple[Array, Array]:
     for c in np.flatnonzero(count >= 4):
         column = squares[np.isfinite(squares[:, c]), c]
         kept = int(np.ceil(KEEP * len(column)))
-        level[c] = np.partition(column, kept - 1)[:kept].mean() / KEPT
+        level[c] = np.partition(column, kept - 1)[:kept].mean() / CENTRAL_SECOND_MOMENT
     return level, np.sqrt(6.0 / np.maximum(count, 1))
 
 

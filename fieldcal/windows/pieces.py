@@ -20,10 +20,10 @@ from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
 from fieldcal.windows.window import LearnedNoise, Window
 
-SHORTEST = 3.0
+MIN_PIECE_S = 3.0
 """Shortest piece that can be tested for rest, s."""
 
-MARGIN = 0.5
+DISCARDED_BEFORE_S = 0.5
 """Least time before a disturbance that is discarded with it, s."""
 
 AGREES = 4.0
@@ -113,19 +113,19 @@ class PiecedWindow:
         self.dropped = 0.0
         while piece.seconds > 0:
             piece.truncate(end)
-            again = piece.disturbance if piece.seconds >= SHORTEST else None
+            again = piece.disturbance if piece.seconds >= MIN_PIECE_S else None
             if again is None:
                 break
-            end = min(_undisturbed_until(again), end - MARGIN)
-        learned = piece.noise if piece.seconds >= SHORTEST else self._noise
-        if piece.seconds >= SHORTEST:
+            end = min(_undisturbed_until(again), end - DISCARDED_BEFORE_S)
+        learned = piece.noise if piece.seconds >= MIN_PIECE_S else self._noise
+        if piece.seconds >= MIN_PIECE_S:
             self._join(piece)
         self._now = Window(self._limits, learned, self._grain)
         return self._kept.seconds if self._kept else 0.0
 
     def is_full(self, seconds: float) -> bool:
         """Whether there are `seconds` s, and the last piece is long enough to test."""
-        short = self._kept is not None and self._now.elapsed < SHORTEST
+        short = self._kept is not None and self._now.elapsed < MIN_PIECE_S
         return self.elapsed >= seconds and not short
 
     def average(self) -> Average | None:
@@ -185,4 +185,4 @@ def _gap_between(before: Window, after: Window) -> tuple[float, float]:
 
 def _undisturbed_until(moved: Moved) -> float:
     """Instant up to which a window is unaffected by a disturbance, s."""
-    return moved.at - max(MARGIN, moved.seconds)
+    return moved.at - max(DISCARDED_BEFORE_S, moved.seconds)

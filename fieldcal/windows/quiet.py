@@ -32,7 +32,7 @@ KNEE = 0.05
 _MORE = 2.0
 """Largest factor by which noise may grow from one window to the next."""
 
-ENOUGH = 16
+LENGTH_RATIO = 16
 """Multiple of a duration that a window must last to measure the noise at it."""
 
 
@@ -75,7 +75,7 @@ def estimate_quiet_noise(
     averaged = running_means(means, levels)
     measured: list[Array] = []
     for k, u in enumerate(averaged):
-        if k and len(u) < ENOUGH * 2**k:
+        if k and len(u) < LENGTH_RATIO * 2**k:
             break
         steps = np.abs(u[2**k :] - u[: -(2**k)])
         measured.append(MAD_TO_SIGMA * np.median(steps, axis=0) / np.sqrt(2))  # (1)

@@ -18,7 +18,7 @@ import numpy as np
 from fieldcal.core.samples import Array, runs_of_true
 from fieldcal.windows.cells import CELL, CellRows, CellTable, fill_with_previous
 
-SPAN = 10
+SPREAD_CELLS = 10
 """Cells whose spread tells rest from motion: 1 s."""
 
 _LEAST, _MOST = 4.0, 64.0
@@ -99,17 +99,17 @@ def _spans(rows: CellRows, usual: _TypicalCells) -> Iterator[SpanSpreads]:
     passes through all of its positions. The spread over a pause is infinite.
     """
     before: Array = np.zeros((1, 6))
-    for first in range(0, len(rows) - SPAN + 1, _PART):
-        part = rows[first : first + _PART + SPAN - 1]
+    for first in range(0, len(rows) - SPREAD_CELLS + 1, _PART):
+        part = rows[first : first + _PART + SPREAD_CELLS - 1]
         cells = cell_table(part, np.zeros(6))
         means = fill_with_previous(
             np.where(cells.counts < usual.counts / 2, np.nan, cells.means), before
         )
         before = means[_PART - 1 : _PART]
-        view = np.lib.stride_tricks.sliding_window_view(means, SPAN, axis=0)
+        view = np.lib.stride_tricks.sliding_window_view(means, SPREAD_CELLS, axis=0)
         spread = view.std(axis=-1)
         paused = np.concatenate([[0], np.cumsum(np.diff(cells.times) > usual.pause)])
-        spread[paused[SPAN - 1 :] > paused[: len(spread)]] = np.inf
+        spread[paused[SPREAD_CELLS - 1 :] > paused[: len(spread)]] = np.inf
         yield first, spread, view.mean(axis=-1)
 
 
@@ -123,7 +123,9 @@ def _typical_cells(rows: CellRows) -> _TypicalCells:
         finest = np.minimum(finest, part[:, 27:33].min(axis=0))
         counts.append(part[-first % every :: every, 1:7].copy())
         steps.append(np.diff(part[:, 0])[-first % every :: every])
-    pause = PAUSES * max(float(np.median(np.concatenate(steps))), SPAN * CELL / PAUSES)
+    pause = PAUSES * max(
+        float(np.median(np.concatenate(steps))), SPREAD_CELLS * CELL / PAUSES
+    )
     flips = _FLIPS * np.where(np.isfinite(finest), finest, 0.0)
     return _TypicalCells(np.median(np.concatenate(counts), axis=0), pause, flips)
 

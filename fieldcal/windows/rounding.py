@@ -47,7 +47,7 @@ WAVES = 5
 UNSURE = 3.6
 """Replaces the 4 of (3), to allow for the error of p (1 - p) in one window."""
 
-FINE = 0.6
+FINE_NOISE_STEPS = 0.6
 """Noise of samples, in steps, below which single steps show."""
 
 
@@ -127,4 +127,4 @@ def largest_deviation(step: Array, changed: Array) -> Array:
 
 def visible_steps(step: Array, sampled: Array) -> Array:
     """Steps that the noise of the samples does not hide, (c,); 0 elsewhere."""
-    return np.where(np.nan_to_num(sampled) < FINE * step, step, 0.0)
+    return np.where(np.nan_to_num(sampled) < FINE_NOISE_STEPS * step, step, 0.0)

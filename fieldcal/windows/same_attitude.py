@@ -51,8 +51,8 @@ from fieldcal.windows.cells import (
     fill_with_previous,
 )
 from fieldcal.windows.dead_axis import LiveAxisRows
-from fieldcal.windows.quiet import ENOUGH, LEVELS, estimate_quiet_noise
-from fieldcal.windows.rests import PAUSES, SPAN, cell_index, cell_table
+from fieldcal.windows.quiet import LENGTH_RATIO, LEVELS, estimate_quiet_noise
+from fieldcal.windows.rests import PAUSES, SPREAD_CELLS, cell_index, cell_table
 
 TYPICAL_ROTATION = 5e-3
 """Typical lasting rotation by a bump, rad about each axis: some tenths of a degree, as
@@ -193,7 +193,7 @@ def _has_pause(t: Array) -> bool:
     step = np.diff(t)
     if not len(step):
         return True
-    return bool(step.max() > max(SPAN * CELL, PAUSES * float(np.median(step))))
+    return bool(step.max() > max(SPREAD_CELLS * CELL, PAUSES * float(np.median(step))))
 
 
 def probability_unmoved(
@@ -254,7 +254,9 @@ def _compare_means(
     )
     fewest = min(len(left), len(right))
     both = np.vstack([left[::-1], right])
-    longer = EXTRA_LEVELS * (len(both) > ENOUGH * 2 ** (LEVELS + EXTRA_LEVELS - 1))
+    longer = EXTRA_LEVELS * (
+        len(both) > LENGTH_RATIO * 2 ** (LEVELS + EXTRA_LEVELS - 1)
+    )
     allan = estimate_quiet_noise(both, levels=LEVELS + longer).allan
     found = []
     for k, a in enumerate(allan[: fewest.bit_length()]):

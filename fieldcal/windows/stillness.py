@@ -27,19 +27,19 @@ from fieldcal.windows.cells import CELL, CellAccumulator, resolution
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.rounding import visible_steps
 
-SPAN = 8
+CELLS_TOGETHER = 8
 """Cells that are evaluated together: 0.8 s."""
 
 MEMORY = 200
 """Cells the noise is remembered for: 20 s."""
 
-SPREAD, SLOPE = 3.5, 6.0
+SPREAD_RATIO, SLOPE_RATIO = 3.5, 6.0
 """Multiples of the noise within which (2) and (3) are rest."""
 
 RATE = 0.006
 """Change of a gyroscope's bias from one rest to the next, rad/s: more is a turn."""
 
-EVEN = 30
+BIAS_CELLS = 30
 """Cells after which a constant rate is a bias and not a turn by hand: 3 s."""
 
 _SMALLEST = 1.6
@@ -48,8 +48,8 @@ _SMALLEST = 1.6
 _UNKNOWN = 0.2
 """Part of the limits that a device never seen at rest must stay within."""
 
-_TIME = np.arange(SPAN) - (SPAN - 1) / 2
-_SLOPE = SPAN * _TIME / (_TIME @ _TIME)
+_TIME = np.arange(CELLS_TOGETHER) - (CELLS_TOGETHER - 1) / 2
+_SLOPE = CELLS_TOGETHER * _TIME / (_TIME @ _TIME)
 """Slope times duration of SPAN values, as their weighted sum."""
 
 
@@ -72,7 +72,7 @@ class Stillness:
     def __init__(self, sways: bool = False) -> None:
         self._limits, self._sways = StillnessLimits(), sways
         self._cells = CellAccumulator()
-        self._recent: deque[tuple[Array, Array]] = deque(maxlen=SPAN)
+        self._recent: deque[tuple[Array, Array]] = deque(maxlen=CELLS_TOGETHER)
         self._finest = np.full(6, np.inf)
         self._noises: deque[Array] = deque(maxlen=MEMORY)
         self._rest: Array | None = None
@@ -98,7 +98,7 @@ class Stillness:
         ):
             self._recent.append((np.nan_to_num(mean), np.nan_to_num(short)))
             self._finest = np.minimum(self._finest, finest)
-            if len(self._recent) == SPAN:
+            if len(self._recent) == CELLS_TOGETHER:
                 self._judge(float(time))
 
     def _judge(self, time: float) -> None:
@@ -114,8 +114,8 @@ class Stillness:
         if self.meter > 1:
             self.since = None
         elif self.since is None:
-            self.since = time - (SPAN - 1) * CELL
-        if self.since is not None and time - self.since > 2 * SPAN * CELL:
+            self.since = time - (CELLS_TOGETHER - 1) * CELL
+        if self.since is not None and time - self.since > 2 * CELLS_TOGETHER * CELL:
             self._rest = y[:, 3:].mean(axis=0)
 
     def _noise(self, sampled: Array) -> Array:
@@ -128,13 +128,13 @@ class Stillness:
     def _motion_ratio(self, y: Array, noise: Array) -> float:
         """Ratio of (2) and (3) to the bounds by noise, within the absolute limits."""
         slope = _SLOPE @ y
-        about = y - y.mean(axis=0) - np.outer(_TIME, slope) / SPAN
-        spread = np.sqrt((about**2).sum(axis=0) / (SPAN - 2))
+        about = y - y.mean(axis=0) - np.outer(_TIME, slope) / CELLS_TOGETHER
+        spread = np.sqrt((about**2).sum(axis=0) / (CELLS_TOGETHER - 2))
         known = 1.0 if self._rest is not None else _UNKNOWN
         bound = known * self._limits.noise
         ratio = np.maximum(
-            spread / _zero_as_inf(np.minimum(SPREAD * noise, bound)),
-            np.abs(slope) / _zero_as_inf(np.minimum(SLOPE * noise, bound)),
+            spread / _zero_as_inf(np.minimum(SPREAD_RATIO * noise, bound)),
+            np.abs(slope) / _zero_as_inf(np.minimum(SLOPE_RATIO * noise, bound)),
         )
         return float(ratio.max())
 
@@ -146,10 +146,10 @@ class Stillness:
         """Ratio of (4) to the allowed change of a bias; a lasting even rate is one."""
         if self._rest is None:
             return 0.0
-        off = np.abs(rates.mean(axis=0) - self._rest) / (RATE + SPREAD * noise)
-        even = np.abs(np.diff(rates, axis=0)).max(axis=0) <= 3 * SLOPE * noise
+        off = np.abs(rates.mean(axis=0) - self._rest) / (RATE + SPREAD_RATIO * noise)
+        even = np.abs(np.diff(rates, axis=0)).max(axis=0) <= 3 * SLOPE_RATIO * noise
         self._even = self._even + 1 if off.max() > 1 and even.all() else 0
-        return float(off.max()) if self._even < EVEN else 0.0
+        return float(off.max()) if self._even < BIAS_CELLS else 0.0
 
 
 def _zero_as_inf(allowed: Array) -> Array:

@@ -17,13 +17,13 @@ from fieldcal.windows.rests import cell_index
 BEYOND = 1.0
 """Time beyond a stretch that is evaluated, s."""
 
-PAUSE = 1.0
+MIN_PAUSE_S = 1.0
 """Time without a cell that is a pause, s."""
 
 TURNS = 0.02
 """Difference of a rate that is a rotation, rad/s."""
 
-APART = 4.0
+DEPARTURE_SPREADS = 4.0
 """Spreads of a stretch's own means that are a departure."""
 
 
@@ -58,7 +58,7 @@ def _end_reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> s
     """Reason of one end of a stretch; `beyond` are the cells outside, nearest first."""
     edge = inside.times[-1 if side > 0 else 0]
     steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - CELL
-    paused = np.flatnonzero(steps > PAUSE)
+    paused = np.flatnonzero(steps > MIN_PAUSE_S)
     near = beyond[: paused[0]] if len(paused) else beyond
     if said := _motion_phrase(near, inside, origin):
         return said
@@ -83,7 +83,7 @@ def _motion_phrase(near: Array, inside: CellTable, origin: Array) -> str:
         text = f"{CHANNELS[3 + axis]} reaches {rate[:, axis].max():.2g} {UNITS[3]}"
         return f"it is turned: {text}"
     ratio = np.abs(off) / np.maximum(own, 1e-12)
-    if ratio.max() < APART:
+    if ratio.max() < DEPARTURE_SPREADS:
         return ""
     channel = int(np.argmax(ratio.max(axis=0)))
     size = float(np.abs(off[:, channel]).max())

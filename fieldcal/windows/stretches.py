@@ -20,11 +20,11 @@ from fieldcal.windows.cells import (
 )
 from fieldcal.windows.dead_axis import LiveAxisRows
 from fieldcal.windows.limits import StillnessLimits
-from fieldcal.windows.rests import SPAN, cell_table, find_rest_runs
+from fieldcal.windows.rests import SPREAD_CELLS, cell_table, find_rest_runs
 from fieldcal.windows.spikes import without_spikes
 from fieldcal.windows.verdict import judge_window
 
-FEWEST = 3
+MIN_STRETCHES = 3
 """Number of stretches below which rests may be too short for the usual margin."""
 
 SEAM_S = 2 * CELL
@@ -69,21 +69,23 @@ def still_stretches_of_file(
     min_seconds : as in `still_stretches`
 
     """
-    if len(rows) < 2 * SPAN:
+    if len(rows) < 2 * SPREAD_CELLS:
         return []
     living = LiveAxisRows(rows)
     rows, between = living, living.samples_without_dead_axes(between)
     shortest = max(1.0, min_seconds)
     runs = find_rest_runs(rows, StillnessLimits().noise)
-    middles = [(r.first + SPAN // 2, r.last - 1 + SPAN // 2) for r in runs]
+    middles = [
+        (r.first + SPREAD_CELLS // 2, r.last - 1 + SPREAD_CELLS // 2) for r in runs
+    ]
     goes_on = [i > 0 and runs[i - 1].last == r.first for i, r in enumerate(runs)]
     found = _join_at_seams(
         _passing_parts_of_stretches(rows, origin, between, middles, shortest), goes_on
     )
-    if len(found) >= FEWEST or len(runs) < FEWEST:
+    if len(found) >= MIN_STRETCHES or len(runs) < MIN_STRETCHES:
         return found
     # rests may all be short: use the whole of their spans, less a cell at each end
-    ends = [run.last + SPAN - 2 for run in runs]
+    ends = [run.last + SPREAD_CELLS - 2 for run in runs]
     nexts = [*(run.first for run in runs[1:]), len(rows)]
     whole = [
         (r.first + 1, min(e, n)) for r, e, n in zip(runs, ends, nexts, strict=True)
@@ -91,7 +93,7 @@ def still_stretches_of_file(
     short = _join_at_seams(
         _passing_parts_of_stretches(rows, origin, between, whole, shortest), goes_on
     )
-    return short if len(short) >= FEWEST else found
+    return short if len(short) >= MIN_STRETCHES else found
 
 
 def _passing_parts_of_stretches(
@@ -140,8 +142,8 @@ def explain_no_stretch(rows: CellRows, origin: Array) -> str:
     rows, origin : as in `still_stretches_of_file`
 
     """
-    if len(rows) < 2 * SPAN:
-        return f"it lasts less than {2 * SPAN * CELL:g} s"
+    if len(rows) < 2 * SPREAD_CELLS:
+        return f"it lasts less than {2 * SPREAD_CELLS * CELL:g} s"
     rows = LiveAxisRows(rows)
     runs = find_rest_runs(rows, StillnessLimits().noise)
     if not runs:

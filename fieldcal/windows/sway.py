@@ -36,7 +36,7 @@ LONGEST_STRETCH_S = 40.0
 FEWEST_CELLS = 16
 """Fewest cells that are evaluated."""
 
-ARM, GAUGE, LONGEST = 3.0, 0.02, 30.0
+TYPICAL_ARM_M, SCALE_ERROR, LONGEST_ARM_M = 3.0, 0.02, 30.0
 """Typical arm r, m; typical error of scale factors; and the longest arm, m: at the
 length of a pendulum of the same period the part of gravity does not show."""
 
@@ -47,7 +47,7 @@ LEAST_ROTATION = float(np.deg2rad(0.1))
 """Least rotation that is evaluated, rad: a smaller one changes the mean of gravity by
 less than 1e-5 m/s^2."""
 
-ALIKE, MISSED, TINY = 0.3, 1e-4, 1e-12
+MAX_UNEXPLAINED, MIN_UNEXPLAINED, MIN_POWER = 0.3, 1e-4, 1e-12
 """Largest and least unexplained power of the accelerometers across gravity, as parts of
 the power that gravity has there by the rotation; and the least power, m^2/s^4."""
 
@@ -152,22 +152,26 @@ def _fit_arm(found: SwayWaves) -> SwayWaves | None:
     made = np.cross(found.force, strong.turn_angle(t))
     speeding = strong.turn_angle(t, 2)
     design = np.stack([np.cross(speeding, e) for e in np.eye(3)] + [made], axis=2)
-    design = design.reshape(-1, 4) * np.array([ARM, ARM, ARM, GAUGE])
+    design = design.reshape(-1, 4) * np.array(
+        [TYPICAL_ARM_M, TYPICAL_ARM_M, TYPICAL_ARM_M, SCALE_ERROR]
+    )
     power = float((made**2).sum())
     rest = (strong.linear(t)[:, :3] - made).ravel()
     known, amplitudes = np.zeros(4), 6 * len(strong.hz)
     for _ in range(ROUNDS):
         # the unexplained part is as smooth as the waves: count as many values
         missed = float(((rest - design @ known) ** 2).sum())
-        noise = max(missed, MISSED * power, TINY) / amplitudes
+        noise = max(missed, MIN_UNEXPLAINED * power, MIN_POWER) / amplitudes
         known = np.linalg.solve(
             design.T @ design / noise + np.eye(4), design.T @ rest / noise
         )
     across = (rest - design @ known).reshape(-1, 3)  # a ship heaves as well
     across -= np.outer(across @ found.force, found.force) / (found.force @ found.force)
-    arm = ARM * known[:3]
-    alike = float((across**2).sum()) < ALIKE * power
-    return replace(found, arm=arm) if alike and np.abs(arm).max() < LONGEST else None
+    arm = TYPICAL_ARM_M * known[:3]
+    alike = float((across**2).sum()) < MAX_UNEXPLAINED * power
+    return (
+        replace(found, arm=arm) if alike and np.abs(arm).max() < LONGEST_ARM_M else None
+    )
 
 
 def _significant(found: SwayWaves) -> SwayWaves:

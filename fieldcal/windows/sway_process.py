@@ -21,18 +21,18 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.windows.sway_waves import PERIODS, SwayWaves
 
-ROUNDS, KEPT = 20, 1.0
+MAX_ROUNDS, MIN_WAVE_POWER = 20, 1.0
 """Steps towards the greatest evidence; and the least power of a wave in some output, in
 that output's noise, for it to be kept."""
 
-LINES, FINER = 4, 16
+REFINED_LINES, GRID_PER_CYCLE = 4, 16
 """Lines whose frequencies are refined, and grid points of their search per 1 / T."""
 
 DRIFT = (2e-4, 2e-4, 2e-4, 2e-5, 2e-5, 2e-5)
 """Drift of the biases of a warm device in half a stretch, 1 sigma, m/s^2 and rad/s. A
 larger drift counts as part of a slow wave."""
 
-STEP_S, TINY = 0.25, 1e-15
+PLANNED_STEP_S, MIN_WAVE_SIZE = 0.25, 1e-15
 """Time step of a planned window, s, and the least size of a wave in it."""
 
 WORSE = 1.5
@@ -95,7 +95,7 @@ class _WaveProcess:
         at, count = np.arange(len(self.hz)), len(self.hz)
         power = (2 / self.count * pull[:-1] / self.size) ** 2
         v = (power[at] + power[at + count]).mean(axis=1) / 2
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             both = np.concatenate([at, at + count])
             every, half = np.append(both, 2 * count), len(at)
             wide = np.sqrt(np.tile(v[at], 2))[:, None] * self.size[both]
@@ -110,7 +110,10 @@ class _WaveProcess:
             rest = self.off - self.free[:, every] @ mean
             spare = np.maximum(self.count - 1 - known.sum(axis=0), 1.0)
             noise = np.maximum((rest**2).sum(axis=0) / spare, 1e-30)
-            loud = v[at, None] * self.size[at] ** 2 * self.count / 2 > KEPT * noise
+            loud = (
+                v[at, None] * self.size[at] ** 2 * self.count / 2
+                > MIN_WAVE_POWER * noise
+            )
             if not loud.any():
                 return None
             kept = loud.any(axis=1)
@@ -149,13 +152,13 @@ def needed_seconds(waves: SwayWaves) -> float:
     for seconds in LADDER:
         if seconds * waves.mean_hz < PERIODS:
             continue
-        t = np.arange(0.0, seconds, STEP_S) - seconds / 2
-        noise = waves.noise[seen] * waves.length / STEP_S
+        t = np.arange(0.0, seconds, PLANNED_STEP_S) - seconds / 2
+        noise = waves.noise[seen] * waves.length / PLANNED_STEP_S
         wave = np.multiply.outer(t, 2 * np.pi * waves.hz)
         table = np.hstack([np.cos(wave), np.sin(wave)])
         flat = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
         free = table - flat @ (flat.T @ table)
-        wide = np.sqrt(np.tile(power, (2, 1))) + TINY
+        wide = np.sqrt(np.tile(power, (2, 1))) + MIN_WAVE_SIZE
         _, cov = _posterior(free.T @ free, np.zeros_like(wide), wide, noise)
         off = table.mean(axis=0)
         left = np.einsum("i,cij,j->c", off, cov, off)
@@ -179,9 +182,9 @@ def _line_frequencies(t: Array, y: Array, hz: Array) -> Array:
     noise = np.maximum(np.diff(y, n=2, axis=0).std(axis=0) / np.sqrt(6), 1e-12)
     white = y / noise
     step = float(hz[1] - hz[0]) / 2 if len(hz) > 1 else float(hz[0]) / 2
-    grid = np.arange(hz[0], hz[-1], 2 * step / (FINER / 4))
+    grid = np.arange(hz[0], hz[-1], 2 * step / (GRID_PER_CYCLE / 4))
     found: list[float] = []
-    for _ in range(LINES):
+    for _ in range(REFINED_LINES):
         rest = without_waves(t, white, found)
         power = np.abs(np.exp(-2j * np.pi * np.outer(grid, t)) @ rest) ** 2
         at = float(grid[int(np.argmax(power.sum(axis=1)))])

@@ -28,10 +28,10 @@ THRESHOLD, LONG = 5.8, 600
 """Ratio of departure to spread that noise alone does not reach, in a window of `LONG`
 cells, a minute."""
 
-EARLY = 8.0
+EARLY_WINDOW_S = 8.0
 """The threshold is twice as high in a window this long, s, for lack of data."""
 
-ROUNDED = 1e-6
+MEAN_ROUNDING = 1e-6
 """Relative error of a mean of equal values, of which a jump of one step consists."""
 
 _PRESENT = 10
@@ -117,7 +117,7 @@ def judge_window(
         return WindowVerdict(_noise_departure(cells, scatter, limits), 0.0, before)
     means = cells.steady_means[:m]
     noise = estimate_quiet_noise(means, before)
-    allowed = _threshold(m) * (1 + (EARLY / (CELL * noise.cells)) ** 2)
+    allowed = _threshold(m) * (1 + (EARLY_WINDOW_S / (CELL * noise.cells)) ** 2)
     jumps = (
         cells.rounding
         if visible_steps is None
@@ -126,7 +126,7 @@ def judge_window(
     lines = robust_lines(
         means, cells.resolution / np.maximum(_samples_per_cell(cells), 1.0)
     )
-    least = np.maximum((1 + ROUNDED) * jumps / allowed, _rounding_noise(cells))
+    least = np.maximum((1 + MEAN_ROUNDING) * jumps / allowed, _rounding_noise(cells))
     tests = _disturbance_statistics(
         cells, means, lines, noise, _least_spreads(cells, least)
     )

@@ -11,7 +11,7 @@ import pytest
 from fieldcal.calibration import Calibration
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.evaluation.rounding_mode import (
-    CUT,
+    CUT_CHANCE,
     RoundingMode,
     rounding_mode,
     with_rounding_uncertainty,
@@ -54,7 +54,7 @@ def test_zero_is_twice_as_wide_where_values_are_cut(
 def test_a_device_that_never_passes_zero_tells_nothing() -> None:
     acc = np.trunc((9.8 + 0.1 * swung(1)) / STEP) * STEP
     found = rounding_mode(session(acc), Grain())
-    assert found.cut_probability == pytest.approx(CUT)
+    assert found.cut_probability == pytest.approx(CUT_CHANCE)
     assert (found.cut_sigma > 0.2 * STEP).all() and (found.round_down_sigma > 0).all()
 
 

@@ -31,7 +31,7 @@ ERROR = np.array([0.02, 0.01, 1e-4, 5e-4])
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """As many as these units need, whose errors are as large as their spread."""
-    monkeypatch.setattr("fieldcal.fleet.lot_prior.DRAWS", 300)
+    monkeypatch.setattr("fieldcal.fleet.lot_prior.KEPT_DRAWS", 300)
 
 
 def calibration(x: Array, sigma: Array, together: float = 0.0) -> Calibration:

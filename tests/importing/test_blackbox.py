@@ -22,7 +22,7 @@ def flights(path: Path, repair: bool = False) -> dict[str, Block]:
     found = {}
     for one in recording.streams():
         judge = RowValidator(str(path), recording.place, repair)
-        found[one.name] = concat([judge.good(b) for b in recording.blocks(one.name)])
+        found[one.name] = concat(judge.through(recording.blocks(one.name)))
     return found
 
 

@@ -25,7 +25,7 @@ ACC = ("ax", "ay", "az")
 def read(path: Path, layout: Layout) -> Block:
     recording = TextColumns(path, layout)
     judge = RowValidator(str(path), recording.place, repair=False)
-    return concat(judge.good(block) for block in recording.blocks("0"))
+    return concat(judge.through(recording.blocks("0")))
 
 
 def file(folder: Path, text: str) -> Path:

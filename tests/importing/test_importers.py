@@ -315,12 +315,29 @@ def test_rows_that_are_let_through_always_go_forward(
 ) -> None:
     t = np.array(times)
     block = Block.of(t, np.ones((len(t), 3)), np.ones((len(t), 3)))
+
+    def kept(cut: int) -> list[float]:
+        judge = RowValidator("x", lambda row: f"row {row}", repair=True)
+        parts = (block[i : i + cut] for i in range(0, len(t), cut))
+        times = concat(judge.through(parts)).t
+        assert (np.diff(times) > 0).all() and np.isfinite(times).all()
+        assert len(times) + judge.left_out == len(t)
+        assert bool(judge.mended) == (judge.left_out > 0)
+        found: list[float] = times.tolist()
+        return found
+
+    assert kept(cut) == kept(len(t) + 1)
+
+
+@pytest.mark.parametrize("cut", [40, 25, 20, 10, 1])
+def test_one_time_that_leaps_costs_one_row_wherever_blocks_end(cut: int) -> None:
+    t = np.arange(40.0)
+    t[19] = 1e6
+    block = Block.of(t, np.ones((40, 3)))
     judge = RowValidator("x", lambda row: f"row {row}", repair=True)
-    parts = [judge.good(block[i : i + cut]) for i in range(0, len(t), cut)]
-    kept = concat(parts).t
-    assert (np.diff(kept) > 0).all() and np.isfinite(kept).all()
-    assert len(kept) + judge.left_out == len(t)
-    assert bool(judge.mended) == (judge.left_out > 0)
+    blocks = (block[i : i + cut] for i in range(0, 40, cut))
+    assert len(concat(judge.through(blocks))) == 39
+    assert judge.mended == ["row 19, column t: is later than below, left out"]
 
 
 def test_what_is_in_a_file_is_listed_and_chosen(

@@ -223,3 +223,46 @@ def test_what_names_say_is_none_is_no_gyroscope(tmp_path: Path, beside: str) -> 
     rows = np.hstack([means(5, 6)[:, :3], other, np.full((6, 1), COUNT)])
     out, made = session(tmp_path, rows, f"Ax,Ay,Az,{beside},N", "--sigma", "0.01,0.001")
     assert made.block.acc.shape == (6, 3) and np.isnan(made.block.gyr).all()
+
+
+FAULTS = {
+    "constant": (1, "the gyroscopes are not used: gx never changes"),
+    "empty": (0, "the gyroscopes are not used: gx never changes, or is missing"),
+    "one cell": (2, "position 3 (position 3) has no mean of gy"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_channel_that_says_nothing_leaves_each_uncertainty_with_its_own(
+    fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = means(8, 14)
+    rows[:, 4] += np.tile([3e-3, -3e-3], 7)
+    if fault == "one cell":
+        rows[2, 4] = np.nan
+    else:
+        rows[:, 3] = 0.01 if fault == "constant" else np.nan
+    out, made = session(tmp_path, rows, SIX)
+    sigma, known = made.about.mean_sigma, np.isfinite(rows)
+    known[:, 3] &= fault == "one cell"
+    assert (np.isfinite(sigma) == known).all()
+    for c in (3, 4, 5):
+        shown = rows[known[:, c], c]
+        if len(shown):
+            expected = shown.std(ddof=1)
+            np.testing.assert_allclose(sigma[known[:, c], c], expected, rtol=1e-3)
+    code, sentence = FAULTS[fault]
+    assert (main(["verify", str(out)]), main(["solve", str(out)])) == (0, code)
+    told = capsys.readouterr()
+    assert sentence in " ".join((told.out + told.err).split())
+
+
+def test_a_scatter_of_the_gyroscopes_alone_leaves_gravity_to_tell_the_rest() -> None:
+    rows, count = means(9, 20), np.full(20, 100.0)
+    scatter = np.hstack([np.full((20, 3), np.nan), np.full((20, 3), 2e-3)])
+    found = estimate_mean_uncertainty(rows, scatter, count, G)
+    np.testing.assert_allclose(found.sigma[:, 3:], 2e-4)
+    np.testing.assert_allclose(found.sigma[:, :3], SIGMA, rtol=0.6)
+    assert found.why.endswith(
+        "their scatter, and what remains of |a| = g and of steady rates"
+    )

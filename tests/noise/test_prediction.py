@@ -10,8 +10,8 @@ from fieldcal.core.samples import Array
 from fieldcal.noise import estimate_noise, reduce_recording
 from fieldcal.noise.measured import measured_allan_deviation
 from fieldcal.noise.processes import (
-    FAR,
-    STEPS,
+    DIFFERENCES_PER_TIME,
+    UNCORRELATED_TIMES,
     allan_variance,
     degrees_of_freedom,
     difference_covariances,
@@ -48,7 +48,9 @@ def test_estimates_scatter_as_they_are_said_to(term: str, time: float) -> None:
     """The exact variance of the estimate from a dense covariance."""
     n, m = 240, 16
     x = np.array([0.0, np.log(time)]) if term == "G" else ONE
-    r = difference_covariances((term,), x, float(m), 0.1, FAR * STEPS)
+    r = difference_covariances(
+        (term,), x, float(m), 0.1, UNCORRELATED_TIMES * DIFFERENCES_PER_TIME
+    )
     bends = np.array(
         [
             np.concatenate(

@@ -17,7 +17,7 @@ from fieldcal.planning.steps import Hold
 from fieldcal.run.movers import ManualMover
 from fieldcal.run.operator import terminal
 from fieldcal.run.operator.banner import can_draw, draw_large
-from fieldcal.run.operator.box import FIRST, draw_box, draw_joints
+from fieldcal.run.operator.box import EMPTY_BRAILLE, draw_box, draw_joints
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Phase, Wish
 from fieldcal.run.operator.terminal import ConsoleOperator
@@ -361,7 +361,7 @@ def test_the_box_is_drawn_turned_clockwise(
     angle: float, right_lower: bool, left_lower: bool
 ) -> None:
     lowest = draw_box(angle)[-1]
-    dots = [i for i, letter in enumerate(lowest) if letter != chr(FIRST)]
+    dots = [i for i, letter in enumerate(lowest) if letter != chr(EMPTY_BRAILLE)]
     middle = (len(lowest) - 1) / 2
     assert (np.mean(dots) > middle) == right_lower
     assert (np.mean(dots) < middle) == left_lower

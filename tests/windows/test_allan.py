@@ -271,4 +271,4 @@ def test_without_allantools_it_is_told_what_to_install(
     assert str(told.value) == (
         "Allan deviations need allantools: pip install 'fieldcal[allan]'"
     )
-    assert allan.SHORTEST == 60.0
+    assert allan.MIN_RECORDING_S == 60.0

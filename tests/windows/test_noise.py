@@ -51,7 +51,9 @@ def test_a_tenth_that_is_disturbed_does_not_count() -> None:
 def test_the_tenth_that_is_left_out_is_allowed_for() -> None:
     edge = 1.6448536269514722
     assert noise.KEEP == 0.9
-    assert noise.KEPT == pytest.approx(truncnorm(-edge, edge).var(), abs=1e-5)
+    assert noise.CENTRAL_SECOND_MOMENT == pytest.approx(
+        truncnorm(-edge, edge).var(), abs=1e-5
+    )
 
 
 def test_filtered_outputs_are_not_taken_for_quieter_ones() -> None:
@@ -83,7 +85,9 @@ def slow(pieces: list[Array], m: int) -> tuple[float, float]:
         ]
     squares = np.sort([m * b**2 / 6 for b in bends if np.isfinite(b)])
     kept = squares[: int(np.ceil(0.9 * len(squares)))]
-    return float(np.mean(kept) / noise.KEPT), float(np.sqrt(6 / len(squares)))
+    return float(np.mean(kept) / noise.CENTRAL_SECOND_MOMENT), float(
+        np.sqrt(6 / len(squares))
+    )
 
 
 @pytest.mark.parametrize("missing", [False, True])
@@ -207,7 +211,9 @@ def test_of_many_samples_some_evenly_spread_ones_tell(
     assert len(three) == len(bends) == 100
     squares = np.sort(bends**2 / 6, axis=0)[:90]
     found = measure_noise([x[:900]], 1.0).quick
-    np.testing.assert_allclose(found**2, squares.mean(axis=0) / noise.KEPT)
+    np.testing.assert_allclose(
+        found**2, squares.mean(axis=0) / noise.CENTRAL_SECOND_MOMENT
+    )
 
 
 def test_the_short_lag_noise_is_half_the_square_of_the_changes() -> None:

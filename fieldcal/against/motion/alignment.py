@@ -36,22 +36,22 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, Array, Block, Index
 from fieldcal.model.rows.motion import Alignment
 
-PARTS, NEAR_S = 5, 1.0
+DRIFT_PARTS, MAX_FURTHER_SHIFT_S = 5, 1.0
 """Parts of a recording that give the drift, and their largest further shift, s."""
 
-FEWEST = 3
+MIN_DRIFT_PARTS = 3
 """Fewest parts from which the drift is estimated."""
 
 RARE = 1e-6
 """Probability of the agreement of unrelated motions at some shift, for a match."""
 
-ALIKE = 1.02
+MIN_SCORE_RATIO = 1.02
 """Least ratio of the best shift's score to that of any other shift."""
 
 FAR_S = 2.0
 """Least distance of another shift, s."""
 
-EXACT, TINY = 1e-6, 1e-12
+MIN_UNEXPLAINED_SHARE, MIN_UNEXPLAINED = 1e-6, 1e-12
 """Least unexplained variance of a channel: part of its variance; m^2/s^4, rad^2/s^2."""
 
 
@@ -122,7 +122,7 @@ def _check_only_one(
 ) -> None:
     """Refuse a motion that agrees as well at another shift."""
     away = np.abs(lags - lags[best]) > FAR_S * GRID_HZ
-    if total[best] > ALIKE * total[away].max(initial=0.0):
+    if total[best] > MIN_SCORE_RATIO * total[away].max(initial=0.0):
         return
     other = lags[away][int(np.argmax(total[away]))]
     raise InputError(
@@ -138,7 +138,7 @@ def _delay_and_drift(
     """Delay in the middle of the recording, s, and relative drift of its clock."""
     apart = one.start - two.start
     parts = [p for p in _lags_of_parts(one, two, lag) if p is not None]
-    if len(parts) < FEWEST:
+    if len(parts) < MIN_DRIFT_PARTS:
         return lag / GRID_HZ + apart, 0.0
     at, off = np.array(parts).T
     slope, level = np.polyfit(at - middle, off, 1)
@@ -149,7 +149,7 @@ def _lags_of_parts(
     one: EvenGrid, two: EvenGrid, lag: int
 ) -> list[tuple[float, float] | None]:
     """Middle and shift of each part of the recording, s."""
-    edges = np.linspace(0, len(one), PARTS + 1).astype(int).tolist()
+    edges = np.linspace(0, len(one), DRIFT_PARTS + 1).astype(int).tolist()
     return [
         _lag_of_part(one, two, lag, first, end)
         for first, end in zip(edges[:-1], edges[1:], strict=True)
@@ -160,7 +160,7 @@ def _lag_of_part(
     one: EvenGrid, two: EvenGrid, lag: int, first: int, end: int
 ) -> tuple[float, float] | None:
     """Middle and shift of one part, s; None if it has too little motion or overlap."""
-    near = int(NEAR_S * GRID_HZ)
+    near = int(MAX_FURTHER_SHIFT_S * GRID_HZ)
     begin, stop = max(first - lag, near), min(end - lag, len(two) - near)
     x = one.six[begin + lag : stop + lag]
     if stop - begin < (end - first) / 2 or len(x) < stop - begin or not x.any():
@@ -189,7 +189,9 @@ def _rotation(one: EvenGrid, two: EvenGrid, x: Array, z: Array) -> Array:
         own = (mine - made).var(axis=0)
         if moving.shape[1] == 3:
             own = np.full(3, own.mean())
-        weight = 1 / np.maximum(own, EXACT * mine.var() + TINY)
+        weight = 1 / np.maximum(
+            own, MIN_UNEXPLAINED_SHARE * mine.var() + MIN_UNEXPLAINED
+        )
         b += weight[:, None] * (mine.T @ theirs)
         if triad is ACC and moving.shape[1] == 3:  # where the force points
             mean = np.outer(one.mean[ACC], two.mean[ACC])

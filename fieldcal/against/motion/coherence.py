@@ -20,7 +20,7 @@ PIECE_S, HALF = 10.0, 0.5
 """Length of the pieces whose spectra are compared, s, and share of a channel's power
 from which reference and device count as moving together."""
 
-EXACT, TINY = 1e-6, 1e-12
+MIN_POWER_SHARE, MIN_POWER = 1e-6, 1e-12
 """Least power of an input, as a part of all power, and least power of any channel."""
 
 
@@ -46,10 +46,13 @@ def common_hz(x: Array, z: Array, rate_hz: float) -> float:
              for i in starts]  # fmt: skip
     spectra = np.einsum("pfi,pfj->fij", np.conj(parts), np.array(parts))
     inner, cross = spectra[:, :3, :3], spectra[:, :3, 3:]
-    inner = inner + EXACT * np.eye(3) * np.trace(inner, axis1=1, axis2=2)[:, None, None]
+    inner = (
+        inner
+        + MIN_POWER_SHARE * np.eye(3) * np.trace(inner, axis1=1, axis2=2)[:, None, None]
+    )
     made = np.einsum("fij,fij->fj", cross.conj(), np.linalg.solve(inner, cross)).real
     own = np.einsum("fii->fi", spectra[:, 3:, 3:]).real
-    alone = np.clip(1 - made / np.maximum(own, TINY), 0.0, 1.0)
+    alone = np.clip(1 - made / np.maximum(own, MIN_POWER), 0.0, 1.0)
     many = max(len(parts) * 2 / 3, 5.0)  # pieces overlap by half
     share = 1 - alone * (many - 1) / (many - 4)
     rise = np.cumsum(share[1:].min(axis=1) - HALF)

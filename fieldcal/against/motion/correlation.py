@@ -25,7 +25,7 @@ from fieldcal.core.samples import Array, Index
 OVERLAP = 0.2
 """Least overlap of both recordings, as a part of the shorter one."""
 
-LEAST = 0.05
+MIN_OVERLAP_POWER = 0.05
 """Least power of a channel within the overlap, as a part of that at the best shift."""
 
 WHOLE = 1 - 1e-6
@@ -50,7 +50,7 @@ def lag_scores(one: EvenGrid, two: EvenGrid) -> tuple[Index, Array]:
         x, z = one.six[:, triad], two.six[:, triad]
         z = z[:, z.any(axis=0)]
         own = _cross_correlation(one.has_samples[:, None], z**2, size)[:, 0]
-        own = np.maximum(own, LEAST * own.max())
+        own = np.maximum(own, MIN_OVERLAP_POWER * own.max())
         told.append(_explained(x, _cross_correlation(x, z, size), own))
     total = np.hstack(told)
     total[there < OVERLAP * min(n, m)] = 0.0

@@ -31,13 +31,13 @@ from fieldcal.session.description import Description
 STRETCHES, SHORTEST_S = 24, 5.0
 """Number of stretches of a recording, and shortest stretch, s."""
 
-MOST = 40_000
+MAX_ROWS = 40_000
 """Most rows; of longer recordings more samples are combined in a row."""
 
 SLOWEST_HZ, QUICKEST_HZ = 10.0, 50.0
 """Least and largest number of rows a second."""
 
-MOVES, OFTEN = 1e-3, 8.0
+FAST_POWER_SHARE, ROWS_PER_PERIOD = 1e-3, 8.0
 """Part of a motion's power above its highest frequency, and rows in its period."""
 
 MARGIN_S = 1.0
@@ -46,7 +46,7 @@ MARGIN_S = 1.0
 FEWEST_S = 20.0
 """Shortest common motion that is evaluated, s."""
 
-AGAIN = 3
+MAX_SEARCHES = 3
 """Most searches."""
 
 
@@ -106,7 +106,7 @@ def explain_motion(
     plain = MotionFit(system, nominal, Bands.between(rows.frequency), start.hz)
     fit = _likeliest_fit(plain, dictionary)
     found = fit.search(())
-    for _ in range(AGAIN):
+    for _ in range(MAX_SEARCHES):
         before, members = found.best.keys, found.best.members
         fit.settle(members)
         found = fit.search(members)
@@ -177,7 +177,7 @@ def _motion_rows(block: Block, reference: Reference, start: Alignment) -> Motion
     """Rows of the common motion, at the rate that the motion needs."""
     step = float(np.median(np.diff(block.t)))
     length = float(np.ptp(block.t))
-    per_row = max(int(1 / _row_rate(reference) / step), -(-len(block) // MOST), 1)
+    per_row = max(int(1 / _row_rate(reference) / step), -(-len(block) // MAX_ROWS), 1)
     stretch = max(length / STRETCHES, SHORTEST_S)
     rows = rows_in_motion(block, reference, start, per_row, stretch, MARGIN_S)
     if len(rows) * rows.step < FEWEST_S:
@@ -196,9 +196,9 @@ def _row_rate(reference: Reference) -> float:
     power = np.abs(np.fft.rfft((six - six.mean(axis=0)) * np.hanning(len(t))[:, None],
                                axis=0)) ** 2  # fmt: skip
     slower = np.cumsum(power, axis=0) / np.maximum(power.sum(axis=0), 1e-300)
-    most = int((slower < 1 - MOVES).sum(axis=0).max())
+    most = int((slower < 1 - FAST_POWER_SHARE).sum(axis=0).max())
     hz = most * QUICKEST_HZ * 2 / len(t)
-    return float(np.clip(OFTEN * hz, SLOWEST_HZ, QUICKEST_HZ))
+    return float(np.clip(ROWS_PER_PERIOD * hz, SLOWEST_HZ, QUICKEST_HZ))
 
 
 def _nominal_state(about: Description, places: int) -> State:

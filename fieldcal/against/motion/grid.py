@@ -18,7 +18,7 @@ GRID_HZ = 25.0
 SLOW_S = 8.0
 """Slower changes are removed, s, and biases with them."""
 
-GAP = 4.0
+GAP_STEPS = 4.0
 """Shortest gap, in steps of the grid."""
 
 
@@ -53,7 +53,7 @@ class EvenGrid:
             mean[c] = even.mean()
             out[:, c] = even - uniform_filter1d(even, int(SLOW_S * GRID_HZ))
         after = np.clip(np.searchsorted(block.t, t), 1, len(block.t) - 1)
-        there = block.t[after] - block.t[after - 1] < GAP / GRID_HZ
+        there = block.t[after] - block.t[after - 1] < GAP_STEPS / GRID_HZ
         return cls(float(t[0]), out * there[:, None], mean, there.astype(float))
 
     def __len__(self) -> int:

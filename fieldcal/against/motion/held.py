@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.session.description import Description
 
-APART = np.cos(np.deg2rad(10.0))
+MAX_SAME_FORCE_COSINE = np.cos(np.deg2rad(10.0))
 """Cosine of the least angle between the forces of two different positions."""
 
 
@@ -25,6 +25,6 @@ def holds_positions(block: Block, about: Description) -> bool:
     for start, end in windows:
         force = np.nanmean(block.between(start, end).acc, axis=0)
         up = force / max(float(np.linalg.norm(force)), 1e-12)
-        if all(up @ other < APART for other in seen):
+        if all(up @ other < MAX_SAME_FORCE_COSINE for other in seen):
             seen.append(up)
     return len(seen) >= MIN_WINDOWS

@@ -14,7 +14,7 @@ from fieldcal.importing.headings import headings
 
 T = TypeVar("T")
 
-BOTH = ({"a", "g"}, {"a"})
+NEEDED_SENSORS = ({"a", "g"}, {"a"})
 """What a group has to hold: both sensors, or force alone where nothing has rates."""
 
 
@@ -30,7 +30,7 @@ def imu_groups(tables: Mapping[str, ArrayTable]) -> dict[str, str]:
     if len(folders) < 2 or headings.match_headings(columns_of(tables)):
         return {}
     kinds = {folder: _kinds(arrays_in_group(folder, tables)) for folder in folders}
-    for wanted in BOTH:
+    for wanted in NEEDED_SENSORS:
         if found := [f for f in folders if wanted <= kinds[f]]:
             whole = [f for f in found if not any(o.startswith(f"{f}/") for o in found)]
             return dict(zip(_names(whole), whole, strict=True)) if whole[1:] else {}

@@ -30,7 +30,7 @@ ROWS = 1 << 14
 
 DIMENSIONS = (1, 2)
 
-LARGE, DENSEST = 1 << 28, 50
+MAX_UNPACKED_BYTES, MAX_COMPRESSION = 1 << 28, 50
 """Bytes that an archive may always unpack to, and how many times its size beyond that:
 noise is not to be compressed."""
 
@@ -123,7 +123,7 @@ def _check_size(path: Path) -> None:
         members = archive.infolist()
     packed = sum(m.compress_size for m in members)
     size = sum(m.file_size for m in members)
-    if size > LARGE and size > DENSEST * packed:
+    if size > MAX_UNPACKED_BYTES and size > MAX_COMPRESSION * packed:
         raise InputError(
             f"{path}: unpacks from {packed / 1e6:.1f} MB to {size / 1e9:.1f} GB, as no"
             " recording of a sensor does; save it again with numpy.savez"

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 MARK = b"\xef\xbb\xbf"
 """What some programs write before UTF-8."""
 
-WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
+UTF16_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 """What UTF-16 begins with, where it has a mark."""
 
 HALF = 0.45
@@ -59,7 +59,7 @@ def utf16_encoding(head: bytes) -> str | None:
     >>> utf16_encoding("t,ax".encode("utf-16-be")), utf16_encoding(b"t,ax")
     ('utf-16-be', None)
     """
-    marked = WIDE.get(head[:2])
+    marked = UTF16_MARKS.get(head[:2])
     head = head[2 if marked else 0 : len(head) // 2 * 2]
     for name, zeros, letters in (
         ("utf-16-le", head[1::2], head[::2]),

@@ -17,7 +17,7 @@ MAGIC = b"PK\x03\x04"
 ADDED = ("__MACOSX/", ".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers put into archives."""
 
-AT_ONCE = 1 << 14
+BYTES_AT_ONCE = 1 << 14
 """Bytes unpacked together; of those about a fault nothing is left."""
 
 FAULTS = (zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error, EOFError)
@@ -73,7 +73,7 @@ class ZipMember(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         """Fill a buffer as far as the archive does."""
         try:
-            data = self._file.read1(min(len(buffer), AT_ONCE))
+            data = self._file.read1(min(len(buffer), BYTES_AT_ONCE))
         except FAULTS as error:
             self._cut(
                 f"behind byte {self._many}, unpacked",

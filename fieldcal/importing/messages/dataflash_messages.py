@@ -25,7 +25,7 @@ HEAD, BODY = "ISBH", "ISBD"
 
 AXES = ("x", "y", "z")
 
-PART = 32
+PART_SAMPLES = 32
 """Samples of a part of a batch."""
 
 SIX = {f"{kind}{axis}" for kind in ("Acc", "Gyr") for axis in "XYZ"}
@@ -175,7 +175,7 @@ class DataflashMessages:
 def _fits(kind: np.dtype[Any], message: str, column: str) -> bool:
     """Whether a column of a message holds what its name says."""
     if message == BODY and column in AXES:
-        return kind.shape == (PART,)
+        return kind.shape == (PART_SAMPLES,)
     return kind.kind in ("S" if column == "Name" else "iuf")
 
 

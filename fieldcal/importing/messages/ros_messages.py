@@ -13,7 +13,7 @@ IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 NOT_MEASURED = -1
 """First element of a covariance where nothing was measured."""
 
-MANY = 4096
+MESSAGES_AT_ONCE = 4096
 """Messages made into samples at once."""
 
 

@@ -23,7 +23,7 @@ from fieldcal.core.samples import Array
 
 HEADER = 16
 
-KNOWN = frozenset(b"BFIMPQALDOSRCGE")
+MESSAGE_KINDS = frozenset(b"BFIMPQALDOSRCGE")
 """Kinds of messages."""
 
 SYNC = bytes((8, 0, ord("S"), 0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12))
@@ -208,7 +208,7 @@ class UlogMessages:
                 at, jumps = jump, jumps[1:]
                 jump = jumps[0] if jumps else NEVER
                 continue
-            if kind not in KNOWN or end == at + 3:
+            if kind not in MESSAGE_KINDS or end == at + 3:
                 back = data.find(SYNC, at)
                 if scan:
                     self._damaged(f"byte {base + at}", "is no message of a log")

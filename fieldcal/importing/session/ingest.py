@@ -147,8 +147,8 @@ def _write_session(
         JumpFinder(),
     )
     with SampleWriter(part / "samples.parquet") as written, SpooledRows(part) as rows:
-        for block in _without_clock_steps(clock, recording.blocks(stream)):
-            good = judge.good(block)
+        blocks = _without_clock_steps(clock, recording.blocks(stream))
+        for good in judge.through(blocks):
             if len(good):
                 facts.add(good)
                 cells.add(without_spikes(good))

@@ -12,7 +12,7 @@ from fieldcal.core.samples import Array, Block
 LONG = 5.0
 """Mean periods without a sample that are a gap."""
 
-PAUSE = 1.0
+MIN_PAUSE_S = 1.0
 """Shortest gap that is a pause of the recording, s: in others samples came late."""
 
 
@@ -27,7 +27,7 @@ def mean_period(t: Array) -> float:
     steps = np.diff(t)
     while len(steps):
         period = float(steps.mean())
-        if not (long := steps > max(LONG * period, PAUSE)).any():
+        if not (long := steps > max(LONG * period, MIN_PAUSE_S)).any():
             return period
         steps = steps[~long]
     return float("nan")
@@ -42,7 +42,7 @@ class StreamFacts:
     rows : samples that were taken
     start_s, end_s : first and last time
     gaps, longest_gap_s : times that no sample came for `LONG` mean periods
-    pauses, paused_s : those of them that last `PAUSE`, and the duration of all these
+    pauses, paused_s : those of them that last a second, and the duration of all these
     coldest, warmest : deg C, None where there is no temperature
     left_out : rows that were left out, where that was asked for
     measured : "a" if any accelerometer has a number, and "g" if any gyroscope has
@@ -72,7 +72,7 @@ class StreamFacts:
         for gaps in (np.array([pause]), steps):
             long = gaps[gaps > LONG * self._period]
             self.gaps += len(long)
-            paused = long[long >= PAUSE]
+            paused = long[long >= MIN_PAUSE_S]
             self.pauses += len(paused)
             self.paused_s += float(paused.sum())
             if len(long):

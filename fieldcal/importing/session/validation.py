@@ -9,7 +9,7 @@ found again by their time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Array, Block, concat
-from fieldcal.importing.recording import LARGEST, MOST
+from fieldcal.core.samples import CHANNELS, Block, Index, concat
+from fieldcal.importing.recording import MAX_LISTED_FAULTS, MAX_READING
 
-FEWEST, GROUP = 1 << 13, 1 << 15
+MIN_GROUP_ROWS, MAX_GROUP_ROWS = 1 << 13, 1 << 15
 """Fewest and most rows of a row group."""
 
 Rows = NDArray[np.bool_]
 
 
 class RowValidator:
-    """Validates rows block by block.
+    """Validates rows block by block, whatever the blocks.
+
+    The last row with a time is held back until the next one is known, which tells
+    whether its time leaps ahead.
 
     Parameters
     ----------
@@ -39,7 +42,8 @@ class RowValidator:
 
     def __init__(self, name: str, place: Callable[[int], str], repair: bool) -> None:
         self._name, self._place, self._repair = name, place, repair
-        self._seen, self._last = 0, -np.inf
+        self._seen, self._newest, self._before = 0, -np.inf, -np.inf
+        self._held, self._held_row = concat([]), -1
         self._runs: list[tuple[str, str, int, int]] = []
         self._more = [0, 0]
         self.left_out = 0
@@ -47,14 +51,17 @@ class RowValidator:
     @property
     def mended(self) -> list[str]:
         """Rows left out, a sentence for each run."""
-        says = [self._sentence(*run) for run in self._runs[:MOST]]
-        if len(self._runs) > MOST:
-            places, rows = self._more[0] + 1, self._more[1] + self._runs[MOST][3]
+        says = [self._sentence(*run) for run in self._runs[:MAX_LISTED_FAULTS]]
+        if len(self._runs) > MAX_LISTED_FAULTS:
+            places, rows = (
+                self._more[0] + 1,
+                self._more[1] + self._runs[MAX_LISTED_FAULTS][3],
+            )
             says.append(f"{rows} more rows in {places} more places")
         return [f"{sentence}, left out" for sentence in says]
 
-    def good(self, block: Block) -> Block:
-        """Return the rows that can be used.
+    def through(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """Yield the rows that can be used.
 
         Raises
         ------
@@ -63,25 +70,42 @@ class RowValidator:
             row and column.
 
         """
-        if not len(block):
-            return block
+        for block in blocks:
+            yield self._add(block)
+        if len(self._held):
+            yield self._of_time_order(self._held, np.array([self._held_row]), np.inf)
+
+    def _add(self, block: Block) -> Block:
+        """Rows that can be used, up to the last one with a time."""
         bad = np.zeros(len(block), dtype=bool)
         for column, what, rows in self._faults(block):
-            self._note(column, what, rows & ~bad)
+            self._note(column, what, self._seen + np.flatnonzero(rows & ~bad))
             bad |= rows
-        bad |= self._backwards(block.t, bad)
+        self._leave_out(int(bad.sum()))
+        kept = np.flatnonzero(~bad)
+        if len(kept):
+            numbers = np.append(self._held_row, self._seen + kept)
+            whole = block if len(kept) == len(block) else _rows_of(block, ~bad)
+            if len(self._held):
+                whole = concat([self._held, whole])
+            else:
+                numbers = numbers[1:]
+            self._held, self._held_row = whole[-1:], int(numbers[-1])
+            following = float(whole.t[-1])
+            whole = self._of_time_order(whole[:-1], numbers[:-1], following)
+        else:
+            whole = block[:0]
         self._seen += len(block)
-        left = bad | _without_numbers(block)
-        if not left.any():
-            return block
-        if bad.any() and not self._repair:
+        return whole
+
+    def _leave_out(self, count: int) -> None:
+        """Count bad rows; refuse them where no repair was asked for."""
+        if count and not self._repair:
             raise InputError(
                 f"{self._name}: {self._sentence(*self._runs[0])}; mend the file, or"
                 " leave such rows out with --repair"
             )
-        self.left_out += int(bad.sum())
-        parts = np.split(np.arange(len(block)), np.flatnonzero(np.diff(left)) + 1)
-        return concat(block[r[0] : r[-1] + 1] for r in parts if not left[r[0]])
+        self.left_out += count
 
     def _faults(self, block: Block) -> Iterator[tuple[str, str, Rows]]:
         empty = _all_zero(block)
@@ -97,7 +121,7 @@ class RowValidator:
         if timeless.any():
             yield "t", "is no time", timeless
         for names, triad in ((CHANNELS[:3], block.acc), (CHANNELS[3:], block.gyr)):
-            wild = np.abs(triad) > LARGEST
+            wild = np.abs(triad) > MAX_READING
             if wild.any():
                 infinite = np.isinf(triad)
                 for what, rows in (
@@ -107,45 +131,41 @@ class RowValidator:
                     for i in np.flatnonzero(rows.any(axis=0)):
                         yield names[i], what, rows[:, i]
 
-    def _backwards(self, t: Array, bad: Rows) -> Rows:
-        """Rows that are not later than all good ones before them."""
-        times = t[~bad] if bad.any() else t
-        if not len(times):
-            return np.zeros(len(t), dtype=bool)
-        if times[0] > self._last and (times[1:] > times[:-1]).all():
-            self._last = float(times[-1])
-            return np.zeros(len(t), dtype=bool)
-        rest = np.flatnonzero(~bad)
-        # one time that leaps ahead is wrong itself, not all that come after it
-        ahead = np.zeros(len(times), dtype=bool)
-        before = np.concatenate([[self._last], times[:-1]])[:-1]
-        ahead[:-1] = (times[:-1] > times[1:]) & (times[1:] > before)
-        newest = np.maximum.accumulate(
-            np.concatenate([[self._last], np.where(ahead, -np.inf, times)])
-        )
-        late = ~ahead & (times <= newest[:-1])
-        out = np.zeros(len(t), dtype=bool)
-        for which, what in (
-            (late, "is not later than above"),
-            (ahead, "is later than below"),
-        ):
-            rows = np.zeros(len(t), dtype=bool)
-            rows[rest[which]] = True
-            self._note("t", what, rows)
-            out |= rows
-        self._last = float(newest[-1])
-        return out
+    def _of_time_order(self, block: Block, numbers: Index, following: float) -> Block:
+        """Rows later than all good ones before them, and not ahead of those behind.
 
-    def _note(self, column: str, what: str, rows: Rows) -> None:
-        edges = np.flatnonzero(np.diff(rows.astype(int), prepend=0, append=0))
-        for start, end in edges.reshape(-1, 2).tolist():
-            first, count = self._seen + start, end - start
+        `numbers` (n,) are theirs in the file, `following` is the time of the next row.
+        """
+        t = block.t
+        before, self._before = self._before, float(t[-1]) if len(t) else self._before
+        if len(t) and self._newest < t[0] and (np.diff(t, append=following) > 0).all():
+            self._newest = float(t[-1])
+            return _rows_of(block, ~_without_numbers(block))
+        # one time that leaps ahead is wrong itself, not all that come after it
+        behind = np.append(t, following)[1:]
+        ahead = (t > behind) & (behind > np.append(before, t)[:-1])
+        newest = np.maximum.accumulate(
+            np.append(self._newest, np.where(ahead, -np.inf, t))
+        )
+        late = ~ahead & (t <= newest[:-1])
+        self._newest = float(newest[-1])
+        for i in np.flatnonzero(late | ahead).tolist():
+            what = "is later than below" if ahead[i] else "is not later than above"
+            self._note("t", what, numbers[i : i + 1])
+        self._leave_out(int((late | ahead).sum()))
+        return _rows_of(block, ~(late | ahead | _without_numbers(block)))
+
+    def _note(self, column: str, what: str, rows: Index) -> None:
+        """Note a fault of some rows, by their numbers in the file, ascending."""
+        ends = np.flatnonzero(np.diff(rows) > 1) + 1
+        for run in np.split(rows, ends) if len(rows) else ():
+            first, count = int(run[0]), len(run)
             if self._runs:
                 *same, begin, n = self._runs[-1]
                 if same == [column, what] and begin + n == first:
                     self._runs[-1] = (column, what, begin, n + count)
                     continue
-            if len(self._runs) > MOST:
+            if len(self._runs) > MAX_LISTED_FAULTS:
                 # of a log that is bad all over, only the number of its faults is kept
                 self._more[0] += 1
                 self._more[1] += self._runs.pop()[3]
@@ -156,6 +176,14 @@ class RowValidator:
         if count > 1:
             rows += f" to {self._place(first + count - 1)}"
         return f"{rows}, column {column}: {what}"
+
+
+def _rows_of(block: Block, some: Rows) -> Block:
+    """Some rows of a block."""
+    if some.all():
+        return block
+    edges = np.flatnonzero(np.diff(some, prepend=False, append=False))
+    return concat(block[a:b] for a, b in edges.reshape(-1, 2).tolist())
 
 
 def _all_zero(block: Block) -> Rows:
@@ -209,7 +237,7 @@ class SampleWriter:
         """Take in the block that follows."""
         self._waiting.append(block)
         self._many += len(block)
-        if self._many >= FEWEST:
+        if self._many >= MIN_GROUP_ROWS:
             self._put()
 
     def _put(self) -> None:
@@ -219,10 +247,10 @@ class SampleWriter:
         one = len(self._waiting) == 1
         whole = self._waiting[0] if one else concat(self._waiting)
         self._waiting, self._many = [], 0
-        for first in range(0, len(whole), GROUP):
-            part = whole[first : first + GROUP]
+        for first in range(0, len(whole), MAX_GROUP_ROWS):
+            part = whole[first : first + MAX_GROUP_ROWS]
             self._writer.write_batch(
-                to_record_batch(part, nulls=True), row_group_size=GROUP
+                to_record_batch(part, nulls=True), row_group_size=MAX_GROUP_ROWS
             )
             self._groups.append((float(part.t[0]), float(part.t[-1])))
 

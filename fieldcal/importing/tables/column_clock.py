@@ -29,7 +29,7 @@ from fieldcal.importing.tables.column_times import (
 from fieldcal.importing.times.row_times import FRACTIONS
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.units.time_units import (
-    NEAR,
+    RATE_TOLERANCE,
     TICKED,
     counts_from_long_ago,
     shared_times,
@@ -198,7 +198,7 @@ class ColumnClock:
             )
         if unit != "s":
             self._of.guessed["time"] = f"{unit}: you say {rate:g} Hz"
-        if abs(np.log(makes / rate)) > NEAR:
+        if abs(np.log(makes / rate)) > RATE_TOLERANCE:
             self._of.says.append(
                 f"its times make {makes:.4g} Hz, not {rate:g} Hz as you say: they are"
                 " taken"

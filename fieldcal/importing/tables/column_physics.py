@@ -27,7 +27,7 @@ from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
-    FEWEST,
+    MIN_ROWS,
     fitting_scales,
     gain_scales,
 )
@@ -37,7 +37,7 @@ from fieldcal.importing.words.heading_words import is_counter
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
 
-EACH = "xyz"
+AXES = "xyz"
 
 NOISY = 0.1
 """Part of gravity that its own noise is not."""
@@ -102,7 +102,7 @@ def identify_columns(
     (acc, gyr), why = found
     for kind, three in (("a", acc), ("g", gyr)):
         if three is not None:
-            channels |= {i: kind + axis for i, axis in zip(three, EACH, strict=True)}
+            channels |= {i: kind + axis for i, axis in zip(three, AXES, strict=True)}
     new = {name for i, name in channels.items() if known.get(i) != name}
     if not new:
         return None
@@ -118,7 +118,7 @@ def unnamed_axes(
 
     An axis may rest within one step of its output, if its name says that it is one.
     """
-    if len(table) < FEWEST or table.shape[1] != len(names):
+    if len(table) < MIN_ROWS or table.shape[1] != len(names):
         return []
     without = {*known, *_growing(table)}
     free = [i for i in range(table.shape[1]) if i not in without]
@@ -151,9 +151,9 @@ def _moves(column: Array) -> bool:
 
 def _named(known: Mapping[int, str], kind: str) -> Three | None:
     where = {name: i for i, name in known.items()}
-    if not all(kind + axis in where for axis in EACH):
+    if not all(kind + axis in where for axis in AXES):
         return None
-    x, y, z = (where[kind + axis] for axis in EACH)
+    x, y, z = (where[kind + axis] for axis in AXES)
     return x, y, z
 
 
@@ -164,8 +164,8 @@ def _axis_triples(free: Sequence[int], names: Sequence[str]) -> list[Three]:
         return whole
     beside = zip(free, free[1:], free[2:], strict=False)
     side = [(a, b, c) for a, b, c in beside if c == a + 2]
-    parted = len(free) % len(EACH) == 0 and len(side) == len(free) - len(EACH) + 1
-    return side[:: len(EACH)] if parted else side
+    parted = len(free) % len(AXES) == 0 and len(side) == len(free) - len(AXES) + 1
+    return side[:: len(AXES)] if parted else side
 
 
 def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
@@ -175,7 +175,7 @@ def _by_name(free: Sequence[int], names: Sequence[str]) -> list[Three]:
         if matched := re.fullmatch(r"(.*?)[_ .]?([xyz])(\W.*|)", names[i].lower()):
             stem = f"{matched.group(1)}|{matched.group(3)}"
             stems.setdefault(stem, {})[matched.group(2)] = i
-    return [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(EACH)]
+    return [(s["x"], s["y"], s["z"]) for s in stems.values() if len(s) == len(AXES)]
 
 
 def _force_and_rate_triples(

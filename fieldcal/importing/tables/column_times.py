@@ -12,17 +12,17 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.recording import TIME_UNITS, ReadOptions, RowBatch
-from fieldcal.importing.times.row_times import FRACTIONS, NEAR
+from fieldcal.importing.times.row_times import FRACTIONS, NEAR_STEPS
 from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
-from fieldcal.importing.units.scales import FEWEST, USUAL_COUNTS, rounded_text
+from fieldcal.importing.units.scales import MIN_ROWS, USUAL_COUNTS, rounded_text
 from fieldcal.importing.units.time_units import (
     SharedTimes,
     possible_time_units,
     time_units_of_bursts,
 )
 
-SLOWEST, USUAL, FASTEST = 5.0, 100.0, 8000.0
+MIN_RATE_HZ, USUAL_RATE_HZ, MAX_RATE_HZ = 5.0, 100.0, 8000.0
 """Rates of logs, Hz."""
 
 
@@ -65,7 +65,7 @@ def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
     wholes : numbers of the columns that may hold the seconds
 
     """
-    if len(table) < FEWEST:
+    if len(table) < MIN_ROWS:
         return None
     for i in wholes:
         seconds = table[:, i]
@@ -109,8 +109,8 @@ def is_clock_number(t: Array) -> bool:
     usual = float(np.median(np.diff(t)))
     left_out = float(np.median(np.diff(t)[begins])) - usual
     return bool(inside and usual > 0 and left_out > 20
-                and (60 - ends[0] < NEAR * usual).all()
-                and (ends[1] < NEAR * usual).all())  # fmt: skip
+                and (60 - ends[0] < NEAR_STEPS * usual).all()
+                and (ends[1] < NEAR_STEPS * usual).all())  # fmt: skip
 
 
 def batch_options(
@@ -160,7 +160,7 @@ def rate_hint(wanted: ReadOptions, table: Array) -> str:
     """Rates that the turns imply, for messages: for counts, one for each full scale."""
     turns = rates_by_turns(wanted, table)
     if not turns:
-        return f"{USUAL:.3g}"
+        return f"{USUAL_RATE_HZ:.3g}"
     (unit, rate), *others = turns.items()
     hint = f"{rounded_text(rate)}, which its turns say about, if rates are in {unit}"
     if unit.startswith("counts"):
@@ -173,7 +173,7 @@ def rate_hint(wanted: ReadOptions, table: Array) -> str:
 def is_row_counter(t: Array) -> bool:
     """Whether times (n,) are only row numbers."""
     steps = np.diff(t[np.isfinite(t)])
-    return len(steps) > FEWEST and float((steps == 1).mean()) > LATER
+    return len(steps) > MIN_ROWS and float((steps == 1).mean()) > LATER
 
 
 def keeps_growing(t: Array) -> bool:
@@ -205,8 +205,10 @@ def rates_by_turns(wanted: ReadOptions, table: Array) -> dict[str, float]:
         # each full scale would be another rate
         fits = {str(scale): scale.size for scale in USUAL_COUNTS}
     rates = {unit: 100 * reads / one for unit, one in fits.items()}
-    sane = {u: rate for u, rate in rates.items() if SLOWEST <= rate <= FASTEST}
+    sane = {u: rate for u, rate in rates.items() if MIN_RATE_HZ <= rate <= MAX_RATE_HZ}
     if counts:
         # the full scale that a sensor begins with, first
         return sane
-    return dict(sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL))))
+    return dict(
+        sorted(sane.items(), key=lambda one: abs(np.log(one[1] / USUAL_RATE_HZ)))
+    )

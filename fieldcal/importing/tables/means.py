@@ -33,20 +33,20 @@ from fieldcal.importing.words.heading_words import (
 COUNTS = ("n", "count", "samples", "num", "number", "n_samples")
 """Names of a column that holds how many samples a mean is of."""
 
-COUPLED, PLAIN = 9, 6
+COUPLED_PARAMETERS, PLAIN_PARAMETERS = 9, 6
 """Parameters of (1) with coupling and without."""
 
 REPEATS = 5
 """Times that the scatter is measured and the fit repeated with it."""
 
-OUT = 6.0
+OUTLIER_SIGMAS = 6.0
 """Standard deviations beyond which a mean is none of the same scatter (2e-9)."""
 
 SPARE = 3
 """Degrees of freedom that tell a scatter."""
 
 
-ROUNDED = 1e-9
+ROUNDING_SHARE = 1e-9
 """Part of a mean below which a scatter is no noise of a sensor."""
 
 
@@ -102,19 +102,23 @@ def estimate_mean_uncertainty(
 
     """
     # values that never change have the rounding of a computer for a scatter
-    scatter = np.where(scatter > ROUNDED * np.abs(means), scatter, np.nan)
-    told = np.isfinite(scatter)
-    if count is not None and told.any():
-        return MeanUncertainty(scatter / np.sqrt(np.maximum(count, 1.0))[:, None], "")
+    scatter = np.where(scatter > ROUNDING_SHARE * np.abs(means), scatter, np.nan)
+    told, there = np.isfinite(scatter), np.isfinite(means)
+    if count is not None:
+        scatter = scatter / np.sqrt(np.maximum(count, 1.0))[:, None]
+        if told.any() and told[there].all():
+            return MeanUncertainty(scatter, "")
     shown = np.concatenate(
         [[_sphere_residual(means[:, :3], gravity)] * 3, _from_row_to_row(means[:, 3:])]
     )
     sigma = np.broadcast_to(shown, means.shape)
     why = "what remains of |a| = g and of steady rates"
     if told.any():
-        sigma = np.where(told, np.fmin(sigma, scatter), sigma)
-        why = "their scatter at most, and " + why
-    sigma = np.where(np.isfinite(means), sigma, np.nan)
+        at_most = np.fmin(sigma, scatter) if count is None else scatter
+        sigma = np.where(told, at_most, sigma)
+        limit = "their scatter at most" if count is None else "their scatter"
+        why = f"{limit}, and {why}"
+    sigma = np.where(there, sigma, np.nan)
     size = np.median(sigma[:, 0])
     return MeanUncertainty(
         sigma, f"{size:.2g} m/s^2: {why}" if np.isfinite(size) else ""
@@ -138,16 +142,20 @@ def _stated_uncertainty(said: str, means: Array) -> Array:
 
 def _from_row_to_row(gyr: Array) -> Array:
     """Deviation of outputs at rest (n, 3) from their mean, rad/s."""
-    if len(gyr) <= SPARE:
-        return np.full(3, np.nan)
-    shown: Array = gyr.std(axis=0, ddof=1)
-    return np.where(shown > 0, shown, np.nan)
+    shown = np.full(3, np.nan)
+    for c, column in enumerate(gyr.T):
+        known = column[np.isfinite(column)]
+        if len(known) > SPARE:
+            spread = float(known.std(ddof=1))
+            rounded = ROUNDING_SHARE * float(np.abs(known).max())
+            shown[c] = spread if spread > rounded else np.nan
+    return shown
 
 
 def _sphere_residual(acc: Array, gravity: float) -> float:
     """Residual of (1), m/s^2; nan if there are too few rows."""
     acc = acc[np.isfinite(acc).all(axis=1)]
-    for free in (COUPLED, PLAIN):
+    for free in (COUPLED_PARAMETERS, PLAIN_PARAMETERS):
         if len(acc) < free + SPARE:
             continue
         return _fit(acc[_consistent_rows(acc, free, gravity)], free, gravity)[1]
@@ -180,21 +188,35 @@ def _consistent_rows(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]
         left = np.abs(_misfit(x, acc, gravity))
         size = MAD_TO_SIGMA * few * float(np.median(left))
     all_of_them = np.ones(len(acc), dtype=bool)
-    near = left <= OUT * size
+    near = left <= OUTLIER_SIGMAS * size
     for _ in range(REPEATS):
         if near.sum() < max(2 * free, len(acc) / 2):
             return all_of_them
         # the narrow fit leaves out some that the scatter of those that agree brings
         x, size = _fit(acc[near], free, gravity)
-        near = np.abs(_misfit(x, acc, gravity)) <= OUT * size
+        near = np.abs(_misfit(x, acc, gravity)) <= OUTLIER_SIGMAS * size
     return near
 
 
 def _misfit(free: Array, acc: Array, gravity: float) -> Array:
     matrix = np.diag(1 + free[3:6])
-    matrix[np.triu_indices(3, 1)] = free[6:] if len(free) == COUPLED else 0.0
+    matrix[np.triu_indices(3, 1)] = free[6:] if len(free) == COUPLED_PARAMETERS else 0.0
     left: Array = np.linalg.norm((acc - free[:3]) @ matrix.T, axis=1) - gravity  # (1)
     return left
+
+
+def _list_of(sigma: Array) -> list[float | str]:
+    """Standard uncertainties (6,) as they are written, up to the last known one.
+
+    >>> _list_of(np.array([0.01, 0.02, 0.03, np.nan, 1e-4, np.nan]))
+    [0.01, 0.02, 0.03, 'unknown', 0.0001]
+    """
+    known = np.isfinite(sigma)
+    last = int(np.flatnonzero(known)[-1])
+    return [
+        float(f"{one:.4g}") if there else "unknown"
+        for one, there in zip(sigma[: last + 1], known, strict=False)
+    ]
 
 
 def tables_of_means(
@@ -229,14 +251,14 @@ def tables_of_means(
         raise InputError(
             f"{recording.path}: nothing says how well its {len(block)} means are known:"
             " add --sigma 0.005,0.0005 (of accelerations in m/s^2, of rates in rad/s),"
-            f" or take {PLAIN + SPARE} positions or more, which tell it"
+            f" or take {PLAIN_PARAMETERS + SPARE} positions or more, which tell it"
         )
     half = (float(np.diff(block.t).min()) if len(block) > 1 else 1.0) / 4
     positions = [
         {
             "start_s": round(float(t) - half, 6),
             "end_s": round(float(t) + half, 6),
-            "sigma": [float(f"{one:.4g}") for one in row if np.isfinite(one)],
+            "sigma": _list_of(row),
         }
         for t, row in zip(block.t, found.sigma, strict=True)
     ]

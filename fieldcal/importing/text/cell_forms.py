@@ -16,7 +16,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(rf"[\[({{]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}]")
 _DIGITS = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{2}|[0-9A-Fa-f]{4}|[0-9A-Fa-f]{8})")
 
-FEWEST = 3
+MIN_COUNT_COLUMNS = 3
 """Columns of digits that are counts: the axes of a sensor."""
 
 
@@ -120,7 +120,7 @@ class HexCells(TextForm):
         width = len(rows[-1])
         rows = [row for row in rows if len(row) == width]
         columns = [i for i in range(width) if _are_digits([row[i] for row in rows])]
-        return cls(parted, columns) if len(columns) >= FEWEST else None
+        return cls(parted, columns) if len(columns) >= MIN_COUNT_COLUMNS else None
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""

@@ -18,10 +18,10 @@ NAMES = {"i", "id", "imu", "sensor", "instance", "device", "node", "address", "a
          "unit", "idx", "dev", "mac", "module", "devicename", "设备名称"}  # fmt: skip
 """Names of columns that tell devices apart, without "id" at their end."""
 
-MOST = 16
+MAX_INSTANCES = 16
 """IMUs of one log."""
 
-FEWEST = 20
+MIN_ROWS = 20
 """Rows of each among the first."""
 
 BALANCE = 3.0
@@ -87,9 +87,9 @@ def tells_devices(name: str) -> bool:
 def _in_turn(column: Sequence[str]) -> bool:
     """Whether cells change from row to row between a few, about as many of each."""
     many = Counter(column)
-    if not 1 < len(many) <= MOST or "" in many:
+    if not 1 < len(many) <= MAX_INSTANCES or "" in many:
         return False
     most, least = max(many.values()), min(many.values())
     changes = sum(a != b for a, b in zip(column, column[1:], strict=False))
     turns = changes > TURNS * len(column)
-    return turns and least >= FEWEST and most <= BALANCE * least
+    return turns and least >= MIN_ROWS and most <= BALANCE * least

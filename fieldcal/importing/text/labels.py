@@ -33,10 +33,10 @@ CLOCKS = frozenset((TIME, TICKS))
 
 AXES = ("x", "y", "z")
 
-OFTEN = 0.5
+MIN_LABEL_SHARE = 0.5
 """Share of the commonest label's lines in which others are no column."""
 
-LONGEST = 12
+MAX_UNIT_LETTERS = 12
 """Letters of a unit; what is longer is a sentence."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -126,7 +126,7 @@ def labelled_values(line: str) -> list[Labelled]:
         names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
         read += [(n, v, unit) for n, v in zip(names, values, strict=True)]
         behind = said[2].strip(" \t,;|")
-        if len(behind) > LONGEST:
+        if len(behind) > MAX_UNIT_LETTERS:
             return []
         if parse_unit(behind):
             read = _with_unit(read, behind)
@@ -261,4 +261,4 @@ def repeated_labels(rows: Iterable[Sequence[Labelled]]) -> list[str]:
     """Labels that repeat, in their order."""
     seen = Counter(name for row in rows for name, _ in row)
     usual = max((m for name, m in seen.items() if name not in CLOCKS), default=0)
-    return [name for name, many in seen.items() if many >= OFTEN * usual]
+    return [name for name, many in seen.items() if many >= MIN_LABEL_SHARE * usual]

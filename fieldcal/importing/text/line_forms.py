@@ -18,7 +18,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 END_MARK = ";"
 """At the end of a line, as programs in C end theirs."""
 
-END = "---"
+MESSAGE_SEPARATOR = "---"
 """Line between two messages."""
 
 
@@ -95,7 +95,7 @@ class EchoedMessages(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> Self | None:
         """The form, if its first lines are messages with an end."""
-        if lines.count(END) < 2 or not is_true_of_most(lines, _is_entry):
+        if lines.count(MESSAGE_SEPARATOR) < 2 or not is_true_of_most(lines, _is_entry):
             return None
         messages = _Messages()
         read = [m for line in lines if (m := messages.take(line)) is not None]
@@ -124,7 +124,7 @@ class _Messages:
 
     def take(self, line: str) -> dict[str, str] | None:
         """Take a line in; return the message that it ends, if it does."""
-        if line.strip() == END:
+        if line.strip() == MESSAGE_SEPARATOR:
             ended, self._message, self._within = self._message, {}, []
             return ended
         if entry := _ENTRY.fullmatch(line):
@@ -139,4 +139,4 @@ class _Messages:
 
 
 def _is_entry(line: str) -> bool:
-    return line.strip() == END or _ENTRY.match(line) is not None
+    return line.strip() == MESSAGE_SEPARATOR or _ENTRY.match(line) is not None

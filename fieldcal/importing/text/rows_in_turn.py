@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.times.alignment import AlignedPair
 
-FEWEST = 20
+MIN_ROWS = 20
 """Rows of each sensor that tell."""
 
-BOTH = 0.05
+MAX_SHARED_ROWS = 0.05
 """Share of the rows with values that has both at most: two times may be the same."""
 
 SLOWER = 0.2
@@ -57,7 +57,9 @@ class RowsInTurn:
             return
         acc, gyr = _known(first)
         many = (acc & ~gyr).sum(), (gyr & ~acc).sum()
-        self.told = min(many) >= FEWEST and (acc & gyr).sum() <= BOTH * sum(many)
+        self.told = min(many) >= MIN_ROWS and (
+            acc & gyr
+        ).sum() <= MAX_SHARED_ROWS * sum(many)
         if not self.told:
             alone = acc ^ gyr
             slow = sum(many) > SLOWER * len(first) and _alternate(alone, acc & gyr)
@@ -105,7 +107,7 @@ class RowsInTurn:
 
 def _alternate(alone: NDArray[np.bool_], both: NDArray[np.bool_]) -> bool:
     """Whether rows (n,) of one sensor lie between those of both, few at a time."""
-    if both.sum() < FEWEST or alone.sum() < FEWEST:
+    if both.sum() < MIN_ROWS or alone.sum() < MIN_ROWS:
         return False
     starts = np.count_nonzero(np.diff(alone.astype(int)) == 1)
     return bool(starts > min(alone.sum(), both.sum()) / 2)

@@ -28,13 +28,13 @@ SENSORS = {
 }
 """What the word of a kind holds, by what its lines hold."""
 
-OTHER = re.compile(r"lin|user|free|magn", re.IGNORECASE)
+OTHER_QUANTITY = re.compile(r"lin|user|free|magn", re.IGNORECASE)
 """What it holds if they lack gravity or are of another sensor."""
 
 PLACES = 3
 """Columns at the beginning of which one is the word."""
 
-FEWEST = 2
+MIN_LINES = 2
 """Lines of a kind that is none by chance."""
 
 _WORD = re.compile(r"[^\W\d][^,;\t]*")
@@ -142,7 +142,7 @@ def _kinds(rows: Sequence[Sequence[str]], place: int) -> list[LineKind]:
     words = [row for row in whole if not any(is_number(c, False) for c in row)]
     numbers = [row for row in whole if any(is_number(c, False) for c in row)]
     seen = Counter((row[place], len(row)) for row in numbers)
-    usual = [kind for kind, many in seen.most_common() if many >= FEWEST]
+    usual = [kind for kind, many in seen.most_common() if many >= MIN_LINES]
     found = []
     for word, width in usual:
         # "# Header: IMU" ends with the word; a line without any is said of all kinds
@@ -158,7 +158,7 @@ def _chosen(kinds: Sequence[LineKind]) -> tuple[LineKind | None, LineKind | None
     """Kinds of which the lines are taken: of the forces or of all, and of the rates."""
     if len({kind.word for kind in kinds}) < len("ab"):
         return None, None
-    plain = [kind for kind in kinds if not OTHER.search(kind.word)]
+    plain = [kind for kind in kinds if not OTHER_QUANTITY.search(kind.word)]
     of = {s: [k for k in plain if has.search(k.word)] for s, has in SENSORS.items()}
     if of["imu"] and not of["a"]:
         return of["imu"][0], None

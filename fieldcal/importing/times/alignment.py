@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Block, Index, concat
 
-PATIENCE = 10.0
+MAX_WAIT_S = 10.0
 """Longest time that a sample waits for its partner, s: either sensor may end."""
 
 
@@ -40,7 +40,7 @@ class AlignedPair:
         acc_all, gyr_all = concat(self._acc), concat(self._gyr)
         until = gyr_all.t[-1] if len(gyr_all) else -np.inf
         if len(acc_all):
-            until = max(until, acc_all.t[-1] - PATIENCE)
+            until = max(until, acc_all.t[-1] - MAX_WAIT_S)
         ready = int(np.searchsorted(acc_all.t, until))
         self._acc = [acc_all[ready:]]
         out = self._paired(acc_all[:ready], gyr_all)
@@ -48,7 +48,7 @@ class AlignedPair:
             keep = max(0, int(np.searchsorted(gyr_all.t, out.t[-1])) - 1)
             self._gyr = [gyr_all[keep:]]
         elif len(gyr_all):
-            late = int(np.searchsorted(gyr_all.t, gyr_all.t[-1] - PATIENCE))
+            late = int(np.searchsorted(gyr_all.t, gyr_all.t[-1] - MAX_WAIT_S))
             self._gyr = [gyr_all[late:]]
         return out
 

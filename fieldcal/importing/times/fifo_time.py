@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.times.alignment import nearest_in_time
 
-GAP = 1.5
+GAP_BATCHES = 1.5
 """Times the length of a batch that lie between two, if something is missing."""
 
 
@@ -47,7 +47,7 @@ class FifoTimes:
         """
         before = np.concatenate([[self._last], read[:-1]])
         away = read - before
-        even = (away > 0) & (away < GAP * number * period)
+        even = (away > 0) & (away < GAP_BATCHES * number * period)
         step = np.where(even, away / number, period)  # (1), (2)
         self._last = float(read[-1])
         first = np.cumsum(number) - number

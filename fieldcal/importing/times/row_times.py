@@ -24,7 +24,7 @@ COUNTED = (2.0**16, 2.0**24, 2.0**32)
 PERIODS = (60.0, 3600.0, 86400.0, 604800.0)
 """Where clocks begin again, s: a minute, an hour, a day, a week."""
 
-NEAR = 20.0
+NEAR_STEPS = 20.0
 """Usual steps by which a clock is before its end, and behind its beginning."""
 
 
@@ -155,7 +155,7 @@ class RowTimes:
 
     def _period(self, before: float, began: float, scale: float) -> float:
         """Where a clock began again that went from one time to another; 0 if not."""
-        near = NEAR * self._usual
+        near = NEAR_STEPS * self._usual
         for period in (*(many * scale for many in COUNTED), *PERIODS):
             if 0 <= began < near and 0 < period - before < near:
                 self.says.append(
@@ -167,7 +167,7 @@ class RowTimes:
 
     def _started(self, before: float, began: float) -> float:
         """From the zero of a clock to that of its next start, s; 0 if there is none."""
-        if not 0 <= began < STARTED or before - began < NEAR * self._usual:
+        if not 0 <= began < STARTED or before - began < NEAR_STEPS * self._usual:
             return 0.0
         self._anew.append(before + self._offset)
         first, *others = self._anew

@@ -16,7 +16,7 @@ from fieldcal.importing.units.rate_size import STIRS, TIMES, TurnComparison
 from fieldcal.importing.units.scales import GYR_SCALES, USUAL_COUNTS, Scale, gain_scales
 from fieldcal.importing.units.unit_answers import unit_options
 
-FAST = 0.5
+MAX_REST_RATE = 0.5
 """Rate, rad/s, that nothing at rest shows: 30 deg/s."""
 
 ROUGH = 0.02
@@ -76,9 +76,9 @@ def guess_unit_of_calm_rates(
         return CalmRateUnit(DEG, f"as rad/s, {turns.odd()}")
     fast = float(np.median(np.abs(gyr).max(axis=1)))
     noise = float(np.nanmedian(np.abs(np.diff(gyr, axis=0)), axis=0).max())
-    if RAD in allowed and fast <= FAST and noise <= ROUGH:
+    if RAD in allowed and fast <= MAX_REST_RATE and noise <= ROUGH:
         return CalmRateUnit(RAD, "it is the usual one, and no turn tells")
-    shown = f"{fast:.4g}" if fast > FAST else f"a scatter of {noise:.2g}"
+    shown = f"{fast:.4g}" if fast > MAX_REST_RATE else f"a scatter of {noise:.2g}"
     asks = f"nothing says the unit of its rates, and {shown} rad/s is no rest"
     return CalmRateUnit(None, "", asks, tuple(_answers(gyr, turns, whole)))
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.importing.recording import LARGEST
-from fieldcal.importing.units.scales import FEW, FEWEST
+from fieldcal.importing.recording import MAX_READING
+from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
 
 FEWEST_MEANS, MOST_MEANS = 3, 200
 """Rows of a table of means, one for each position."""
@@ -22,7 +22,7 @@ FEWEST_MEANS, MOST_MEANS = 3, 200
 FEWEST_FACES, FEWEST_ON_SPHERE = 6, 9
 """Rows on a sphere that show its middle: of rows in all directions, and of others."""
 
-APART = np.deg2rad(10.0)
+MIN_ROW_ANGLE_RAD = np.deg2rad(10.0)
 """Angle between successive rows that samples do not have, rad."""
 
 _ALIKE = 0.15
@@ -62,7 +62,7 @@ class GravityReading(NamedTuple):
 
 def _readings(acc: Array) -> Array:
     """Rows (m, 3) that a sensor may have measured."""
-    rows: Array = acc[(np.abs(acc) < LARGEST).all(axis=1)]
+    rows: Array = acc[(np.abs(acc) < MAX_READING).all(axis=1)]
     return rows
 
 
@@ -85,7 +85,7 @@ def are_means(acc: Array) -> bool:
         return False
     up = acc / length[:, None]
     turned = np.arccos(np.clip((up[1:] * up[:-1]).sum(axis=1), -1, 1))
-    return bool(np.median(turned) > APART)
+    return bool(np.median(turned) > MIN_ROW_ANGLE_RAD)
 
 
 def estimate_gravity(acc: Array) -> GravityReading | None:
@@ -93,10 +93,12 @@ def estimate_gravity(acc: Array) -> GravityReading | None:
     acc = _readings(acc)
     if are_means(acc):
         return _gravity_of(acc)
-    if len(acc) < FEW:
+    if len(acc) < MIN_ROWS_ALONE:
         return None
     # of so few, no part is quieter than the others
-    return _gravity_of(_quiet_means(acc) if len(acc) >= FEWEST else acc[:FEW])
+    return _gravity_of(
+        _quiet_means(acc) if len(acc) >= MIN_ROWS else acc[:MIN_ROWS_ALONE]
+    )
 
 
 def _quiet_means(acc: Array) -> Array:
@@ -122,7 +124,7 @@ def gravity_of_length(acc: Array, size: float) -> GravityReading | None:
     Rests in few directions lie on many spheres, but on one of a known radius.
     """
     acc = _readings(acc)
-    if len(acc) < FEWEST:
+    if len(acc) < MIN_ROWS:
         return None
     x = _quiet_means(acc)
     center = x.mean(axis=0)

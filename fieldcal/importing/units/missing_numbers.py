@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import CHANNELS, Array
 
-FAR = 2.0
+NO_VALUE_RATIO = 2.0
 """Times the largest number that a sensor gives otherwise, from which one is no value:
 a sensor that clips clips at once what it never reached in one of its axes alone."""
 
@@ -95,4 +95,8 @@ def _beyond(
         return set()
     others = np.abs([columns[c][~same] for c in some])
     most = np.max(others, initial=0.0, where=np.isfinite(others))
-    return set(first[same & (np.abs(first) > FAR * most)].tolist()) if most else set()
+    return (
+        set(first[same & (np.abs(first) > NO_VALUE_RATIO * most)].tolist())
+        if most
+        else set()
+    )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.units.gravity_size import GravityReading
-from fieldcal.importing.units.scales import FEWEST
+from fieldcal.importing.units.scales import MIN_ROWS
 from fieldcal.importing.units.turn_closure import closing_scale
 
 TURNED = 0.5
@@ -188,7 +188,7 @@ class _Sides(NamedTuple):
         """Both sides; None of too few rows, or where no rate changes."""
         known = np.isfinite(np.column_stack([t, acc, gyr])).all(axis=1)
         t, acc, gyr = t[known], acc[known], gyr[known]
-        if len(t) < FEWEST:
+        if len(t) < MIN_ROWS:
             return None
         steps = np.diff(t)
         steps[(steps > _LAG) | (steps < 0)] = np.nan

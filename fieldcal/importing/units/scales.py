@@ -8,10 +8,10 @@ import numpy as np
 
 from fieldcal.core.gravity import G0
 
-FEW = 8
+MIN_ROWS_ALONE = 8
 """Rows whose length tells a unit, if nothing else."""
 
-FEWEST = 50
+MIN_ROWS = 50
 """Rows that tell anything."""
 
 ACC_OUT = (0.06, 0.15)

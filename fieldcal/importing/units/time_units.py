@@ -13,12 +13,12 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import TIME_UNITS
-from fieldcal.importing.units.scales import FEW, FEWEST
+from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
 
 RATES_HZ = (1.0, 8000.0)
 """What a logger of an IMU writes in a second."""
 
-SHORTEST = 5.0
+MIN_RECORDING_S = 5.0
 """Shortest recording, s, where another unit of time makes it longer."""
 
 TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "d": 1 / 86400}
@@ -46,7 +46,7 @@ def possible_time_units(t: Array) -> list[str]:
     t = t[np.isfinite(t)]
     steps = np.diff(t)
     steps = steps[steps > 0]
-    if len(steps) < FEW:
+    if len(steps) < MIN_ROWS_ALONE:
         return []
     day = [u for u, n in TIME_SIZES.items() if UNIX[0] <= t[-1] / n < UNIX[1]]
     step = float(np.median(steps))
@@ -55,7 +55,7 @@ def possible_time_units(t: Array) -> list[str]:
     if both := [u for u in usual if u in day]:
         return both
     span = float(steps.sum())
-    return [u for u in usual if span / TIME_SIZES[u] >= SHORTEST] or usual
+    return [u for u in usual if span / TIME_SIZES[u] >= MIN_RECORDING_S] or usual
 
 
 def assumed_time_unit(name: str, t: Array) -> tuple[str, str]:
@@ -106,7 +106,7 @@ TICKED_HZ = (4.0, 2000.0)
 ABOUT = float(np.log(3.0))
 """Logarithm by which a rate is out that somebody says, and his device does not keep."""
 
-NEAR = 0.1
+RATE_TOLERANCE = 0.1
 """Part by which a rate that is said and that of the times differ."""
 
 
@@ -118,7 +118,8 @@ def time_unit_of_rate(t: Array, rate_hz: float) -> str:
     """
     step = _step(t)
     near = [u for u, size in TIME_UNITS.items()
-            if step and abs(np.log(rate_hz * step * size)) < NEAR]  # fmt: skip
+            if step
+            and abs(np.log(rate_hz * step * size)) < RATE_TOLERANCE]  # fmt: skip
     return near[0] if near else ""
 
 
@@ -172,7 +173,7 @@ def shared_times(t: Array) -> SharedTimes | None:
     """
     t = t[np.isfinite(t)]
     steps = np.diff(t)
-    if len(steps) < FEWEST:
+    if len(steps) < MIN_ROWS:
         return None
     together = steps < TOGETHER * steps.mean()
     begins = np.flatnonzero(~together)

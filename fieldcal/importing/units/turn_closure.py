@@ -26,10 +26,10 @@ MARGIN_S = 1.0
 NEAR_G = 0.1
 """Part by which |a| at rest is not g."""
 
-CALM = 0.2, 2.0
+CALM_LIMITS = 0.2, 2.0
 """Calmest part of the groups, and how many times its spread a rest has at most."""
 
-LEAST = np.deg2rad(30.0)
+MIN_TURN_RAD = np.deg2rad(30.0)
 """Turn of gravity from rest to rest that counts, rad."""
 
 FEWEST_TURNS = 3
@@ -94,7 +94,7 @@ def _turns(t: Array, up: Array, gyr: Array) -> Iterator[TurnBetweenRests]:
         before, behind = (_direction(up[i:j]) for i, j in ((a, b), (c, d)))
         turned = np.arccos(np.clip(before @ behind, -1, 1))
         steps = np.diff(t[b - 1 : c + 1])
-        if turned < LEAST or t[c] - t[b] > TURN_S or (steps > GROUP_S).any():
+        if turned < MIN_TURN_RAD or t[c] - t[b] > TURN_S or (steps > GROUP_S).any():
             continue
         zero = (gyr[a:b].mean(axis=0) + gyr[c:d].mean(axis=0)) / 2
         angles = (gyr[b : c + 1] - zero) * steps[:, None]
@@ -110,7 +110,7 @@ def _rests(up: Array, group: int, step: float) -> list[tuple[int, int]]:
     groups = up[: len(up) // group * group].reshape(-1, group, 3)
     spread = groups.std(axis=1).max(axis=1)
     length = np.linalg.norm(groups.mean(axis=1), axis=1)
-    share, times = CALM
+    share, times = CALM_LIMITS
     calm = spread <= times * np.quantile(spread, share)
     calm &= np.abs(length - 1) < NEAR_G
     edges = np.flatnonzero(np.diff(np.concatenate([[0], calm.astype(int), [0]])))

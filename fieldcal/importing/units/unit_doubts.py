@@ -16,7 +16,7 @@ from fieldcal.importing.units.scales import ACC_SCALES, GYR_SCALES, Scale, round
 from fieldcal.importing.units.unit_answers import zero_options
 from fieldcal.session.units import UNSCALED
 
-FAR = 0.25
+MAX_LOG_SCALE = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""
 
 NO_GRAVITY = 0.05
@@ -33,7 +33,7 @@ def check_format_units(recording: Recording, block: Block) -> None:
 
     """
     gravity = estimate_gravity(block.acc)
-    if gravity is None or abs(np.log(gravity.size / G0)) < FAR:
+    if gravity is None or abs(np.log(gravity.size / G0)) < MAX_LOG_SCALE:
         return
     turned = estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
     odd = (
@@ -72,7 +72,7 @@ class StatedUnits:
 
     def _of_forces(self, gravity: GravityReading) -> list[str]:
         reads = gravity.size / G0
-        if not self._has_size("a") or abs(np.log(reads)) <= FAR:
+        if not self._has_size("a") or abs(np.log(reads)) <= MAX_LOG_SCALE:
             return []
         if reads < NO_GRAVITY:
             raise InputError(
@@ -101,7 +101,7 @@ class StatedUnits:
         turned = estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if turned is None:
             return self._of_calm(block, gravity)
-        if abs(np.log(turned)) <= FAR:
+        if abs(np.log(turned)) <= MAX_LOG_SCALE:
             return []
         fits = _within(turned / self._said.gyr_scale, GYR_SCALES)
         shows = f"rates are {turned:.4g} times those at which gravity turns"
@@ -148,4 +148,4 @@ class StatedUnits:
 def _within(size: float, scales: tuple[Scale, ...]) -> list[str]:
     """Units without counts in which a quantity may show as `size`."""
     plain = [s for s in scales if s.lsb == 1]
-    return [s.unit for s in plain if abs(np.log(size / s.size)) < FAR]
+    return [s.unit for s in plain if abs(np.log(size / s.size)) < MAX_LOG_SCALE]

@@ -15,7 +15,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
-from fieldcal.importing.recording import LARGEST, ReadOptions, Recording
+from fieldcal.importing.recording import MAX_READING, ReadOptions, Recording
 from fieldcal.importing.units.calm_rates import guess_unit_of_calm_rates
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
@@ -27,9 +27,9 @@ from fieldcal.importing.units.rate_size import compare_turns, estimate_rate_unit
 from fieldcal.importing.units.scales import (
     ACC_OUT,
     ACC_SCALES,
-    FEW,
     GYR_OUT,
     GYR_SCALES,
+    MIN_ROWS_ALONE,
     fitting_scales,
     gain_scales,
     rounded_text,
@@ -114,7 +114,7 @@ def _settle_time_unit(part: Recording) -> str:
 def _beginning(recording: Recording, stream: str) -> Block:
     whole = recording.first_rows(stream, ROWS)
     # such values tell no unit; whoever takes the rows says where they stand
-    acc, gyr = (np.where(np.abs(three) > LARGEST, np.nan, three)
+    acc, gyr = (np.where(np.abs(three) > MAX_READING, np.nan, three)
                 for three in (whole.acc, whole.gyr))  # fmt: skip
     return replace(whole, acc=acc, gyr=gyr)
 
@@ -232,7 +232,7 @@ class _Guess:
 
     def _rates(self, block: Block, gravity: GravityReading | None) -> None:
         gyr = block.gyr[np.isfinite(block.gyr).all(axis=1)]
-        if len(gyr) < FEW:
+        if len(gyr) < MIN_ROWS_ALONE:
             return
         reads = gravity and estimate_rate_unit(block.t, block.acc, block.gyr, gravity)
         if reads is None or gravity is None:

@@ -29,7 +29,7 @@ ARROW = 7.0
 BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Of the dots of a letter, by row and column."""
 
-FIRST = 0x2800
+EMPTY_BRAILLE = 0x2800
 """The letter without dots."""
 
 
@@ -84,7 +84,7 @@ def _line(start: Array, end: Array) -> Array:
 def _letters(dots: Array) -> list[str]:
     middle = np.array([COLUMNS, 2 * ROWS]) - np.array([0.0, -0.5])
     at = np.rint(dots + middle).astype(int)
-    grid = np.full((ROWS, COLUMNS), FIRST)
+    grid = np.full((ROWS, COLUMNS), EMPTY_BRAILLE)
     inside = ((at >= 0) & (at < [2 * COLUMNS, 4 * ROWS])).all(axis=1)
     for x, y in np.unique(at[inside], axis=0):
         grid[y // 4, x // 2] |= BITS[y % 4, x % 2]

@@ -24,13 +24,13 @@ from fieldcal.run.operator.letters import TerminalLetters
 TALL = 32
 """Fewest lines with room for letters three lines tall."""
 
-SMALL = (76, 22)
+SMALL_SCREEN = (76, 22)
 """Columns and lines below which only instruction, reason, time and keys are shown."""
 
-APART = 3
+COLUMNS_BETWEEN = 3
 """Columns between the list and the picture of the box."""
 
-FEWEST = 3
+MIN_LISTED_POSITIONS = 3
 """Fewest positions that are listed, whatever the room."""
 
 
@@ -58,7 +58,7 @@ class Screen:
 
     def layout(self) -> RenderableType:
         """The screen, always as high as the terminal, so that it does not jump."""
-        columns, rows = SMALL
+        columns, rows = SMALL_SCREEN
         if self._console.width < columns or self._console.height < rows:
             return self._with_available_letters(self._small_layout())
         return self._with_available_letters(self._full_layout())
@@ -83,10 +83,13 @@ class Screen:
             below.append(widgets.link_state(view))
         if self._keys():
             below.append(Text(HELP))
-        rows = max(FEWEST, self._console.height - 2 - self._line_count(*above, *below))
+        rows = max(
+            MIN_LISTED_POSITIONS,
+            self._console.height - 2 - self._line_count(*above, *below),
+        )
         listing = self._listing(rows)
-        drawn = self._drawing(listing, rows) if rows > FEWEST else []
-        beside = Table.grid(padding=(0, APART))
+        drawn = self._drawing(listing, rows) if rows > MIN_LISTED_POSITIONS else []
+        beside = Table.grid(padding=(0, COLUMNS_BETWEEN))
         beside.add_row(listing, Text("\n".join(drawn)))
         parts = Layout()
         foot = self._line_count(*below) if below else 0
@@ -156,7 +159,7 @@ class Screen:
             return []
         options = self._console.options
         taken = Measurement.get(self._console, options, listing).maximum
-        room = self._console.width - 4 - taken - APART
+        room = self._console.width - 4 - taken - COLUMNS_BETWEEN
         return draw_joints(hold.position, room, rows)
 
     def _line_count(self, *parts: RenderableType) -> int:

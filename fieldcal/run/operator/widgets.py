@@ -36,7 +36,7 @@ CRYSTAL = 1000.0
 """Uncertainty above which a clock error is not shown, ppm, since any crystal is better.
 It is that large for a while after the computer slept, since samples arrived late."""
 
-NEAR = 1.0
+MIN_TURN_DEG = 1.0
 """Least error of an angle, deg, for which a turn is requested."""
 
 
@@ -79,7 +79,7 @@ def inclinometer(seen: float, wanted: float, limit: float, ok: bool) -> Text:
     cells = ["·"] * (2 * HALF_WIDTH + 1)
     cells[HALF_WIDTH], cells[place] = "|", "o"
     within = f" ± {limit:.1f}°" if np.isfinite(limit) else ""
-    there = ok or abs(off) < NEAR
+    there = ok or abs(off) < MIN_TURN_DEG
     way = "→" if off > 0 else "←"
     order = "close enough" if there else f"turn {off:+.1f}° {way}"
     there_now, asked = round_to_tenth(seen), round_to_tenth(wanted)
@@ -172,7 +172,7 @@ def short_gauges(view: OperatorView) -> list[str]:
         seen = (now.alpha_deg, now.beta_deg)
         for name, there, asked in zip("αβ", seen, wanted[:2], strict=True):
             off = round_to_tenth(asked - there)
-            near = now.ok or abs(off) < NEAR
+            near = now.ok or abs(off) < MIN_TURN_DEG
             order = "ok" if near else f"turn {off:+.1f}°"
             lines.append(
                 f"{name} {round_to_tenth(there):+.1f}° to {asked:+.1f}°  {order}"

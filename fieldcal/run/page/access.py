@@ -19,7 +19,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 COOKIE = "fieldcal_page"
 
-LARGEST = 1000
+MAX_BODY_BYTES = 1000
 """Largest body of a request, bytes."""
 
 HEADERS = {
@@ -86,7 +86,7 @@ class Access:
         kind = headers.get("content-type", "")
         if most is None and not kind.startswith("application/json"):
             return _refusal_response(415, "what is wanted comes as JSON")
-        length, most = headers.get("content-length", ""), most or LARGEST
+        length, most = headers.get("content-length", ""), most or MAX_BODY_BYTES
         if not length.isdecimal() or len(length) > 15 or int(length) > most:
             return _refusal_response(
                 413, f"at most {most} bytes, and how many has to be said"

@@ -135,7 +135,7 @@ def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
     rng, off, plain = np.random.default_rng(1), list[Array](), list[Array]()
     force = specific_forces(SIX_FACES, G)
     came = np.vstack([np.zeros(3), np.clip(np.diff(force, axis=0) / 9.80665, -1, 1)])
-    for _ in range(60):
+    for _ in range(20):
         mean = force + rng.normal(0, 5e-4, 3) * came
         mean += rng.normal(0, 1e-5, force.shape)
         seen = observe(SIX_FACES, mean, sigma=1e-5)

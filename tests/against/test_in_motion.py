@@ -57,7 +57,7 @@ def number(found: Match, name: str, parameter: str) -> tuple[float, float]:
     "kind",
     [
         KINDS.index("cubic"),
-        KINDS.index("increments"),
+        pytest.param(KINDS.index("increments"), marks=pytest.mark.thorough),
         pytest.param(KINDS.index("stamp_error"), marks=pytest.mark.thorough),
         pytest.param(KINDS.index("flexible_mount"), marks=pytest.mark.thorough),
     ],
@@ -128,6 +128,7 @@ def test_time_constants_come_back_within_their_uncertainty() -> None:
     assert len(off) >= 5 and np.abs(off).max() < 4
 
 
+@pytest.mark.thorough
 def test_a_time_constant_is_told_beside_a_delay_and_a_delay_is_none(
     true: Block,
 ) -> None:
@@ -227,7 +228,7 @@ def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> Non
 
 def test_nothing_is_said_of_what_is_alike() -> None:
     table = recorded(DRIVE, {}, 40.0, 25.0)
-    for seed in range(2):
+    for seed in range(1):
         rng = np.random.default_rng(seed)
         real, sim = table.copy(), table.copy()
         real[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])

@@ -102,6 +102,7 @@ ONCE_MISSED = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("label", "seed"),
     [

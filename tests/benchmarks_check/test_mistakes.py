@@ -200,7 +200,7 @@ def test_a_slow_sensor_is_repeated_in_its_own_time() -> None:
 
 def test_packets_out_of_order_lose_no_sample() -> None:
     bench = _ideal("five", acc_noise=1e-3)
-    for seed in range(6):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         plain = recorded(bench, rng)
         s = _made("packets out of order", bench, seed).samples

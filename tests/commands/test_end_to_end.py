@@ -126,11 +126,12 @@ def solved(
     return found
 
 
+@pytest.mark.parametrize("times", [1, pytest.param(3, marks=pytest.mark.thorough)])
 def test_killed_at_any_moment_the_session_holds_all_that_was_in_the_file(
-    tmp_path: Path,
+    tmp_path: Path, times: int
 ) -> None:
     rng = np.random.default_rng(2)
-    for attempt in range(3):
+    for attempt in range(times):
         folder = tmp_path / str(attempt)
         process = subprocess.Popen(
             [*RUN, "five_position", "--headless", TILTED, "--speed", "20"]

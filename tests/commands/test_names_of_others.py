@@ -85,7 +85,12 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    "command", [pytest.param("solve", marks=pytest.mark.thorough), "diagnose", "verify"]
+    "command",
+    [
+        pytest.param("solve", marks=pytest.mark.thorough),
+        pytest.param("diagnose", marks=pytest.mark.thorough),
+        "verify",
+    ],
 )
 def test_names_of_positions(session: Path, said: Said, command: str) -> None:
     both = said(command, str(session))

@@ -55,6 +55,7 @@ def test_a_jump_amid_a_window_is_no_bump_and_has_its_size(
     agrees(said, "bias_step", {**sizes, "at_s": at_s})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_slow_line_does_not_pass_for_a_lever_arm_in_turns(
     seed: int, tmp_path: Path
@@ -64,6 +65,7 @@ def test_a_slow_line_does_not_pass_for_a_lever_arm_in_turns(
     agrees(said, "hum", {"ax": 0.003, "hz": 0.3})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("concealed", "fault", "likewise"),
     [

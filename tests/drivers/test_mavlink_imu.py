@@ -73,7 +73,14 @@ def opened(url: str) -> MavlinkImu:
     return imu
 
 
-@pytest.mark.parametrize("place", ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0", "pty"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "udpin:127.0.0.1:0",
+        pytest.param("tcpin:127.0.0.1:0", marks=pytest.mark.thorough),
+        "pty",
+    ],
+)
 def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
     with autopilot(place, "--speed", "15", "--seed", "3", *CONCEALED) as (where, _):
         for message, within in (("HIGHRES_IMU", 2e-3), ("RAW_IMU", 6e-3)):

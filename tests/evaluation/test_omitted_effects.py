@@ -161,6 +161,7 @@ def test_cross_coupling_that_was_asked_for_is_carried(
     assert any("takes it into account" in w for w in without["warnings"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("unit", ["deg/s"])
 def test_rates_in_another_unit_are_never_solved_as_good(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str

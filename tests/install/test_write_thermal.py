@@ -125,7 +125,9 @@ def folders(place: Path, of: Warming, go: bool = True) -> list[str]:
     return names
 
 
-@pytest.mark.parametrize("kind", PROGRAMS)
+@pytest.mark.parametrize(
+    "kind", ["px4", pytest.param("ardupilot", marks=pytest.mark.thorough)]
+)
 def test_written_read_back_and_undone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:

@@ -134,7 +134,13 @@ def test_a_base_that_points_elsewhere(tmp_path: Path) -> None:
     assert np.abs(pulls(found, sensors)).max() < 4
 
 
-@pytest.mark.parametrize("columns", [("pn", "pe", "pd"), ("vn", "ve", "vd", "pd")])
+@pytest.mark.parametrize(
+    "columns",
+    [
+        ("pn", "pe", "pd"),
+        pytest.param(("vn", "ve", "vd", "pd"), marks=pytest.mark.thorough),
+    ],
+)
 def test_positions_serve_as_well(tmp_path: Path, columns: tuple[str, ...]) -> None:
     found, sensors = solved(tmp_path, columns=columns)
     assert len(found.names) == 9 and np.abs(pulls(found, sensors)).max() < 4

@@ -189,6 +189,7 @@ def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
         bench.engine.run(hold_all(TWO_POSITIONS[:1], 30.0))
 
 
+@pytest.mark.thorough
 def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
     turner = _restless(bench, times=7)
     Engine(turner.driver, turner, ABOUT, bench.recorder).run(
@@ -283,7 +284,7 @@ class Returning(InProcess):
     put_down_at = np.inf
 
 
-@pytest.mark.parametrize("later", [0.5, 12.0])
+@pytest.mark.parametrize("later", [0.5, pytest.param(12.0, marks=pytest.mark.thorough)])
 def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
     tmp_path: Path, later: float
 ) -> None:
@@ -433,7 +434,7 @@ def test_an_operator_may_stop(bench: Bench) -> None:
 def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
     """Every pair of the five, on bases tilted by up to a degree and a half."""
     rng = np.random.default_rng(6)
-    for _ in range(5):
+    for _ in range(2):
         tilt = direction_cosines(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
         f = {i: _force(p, tilt) for i, p in enumerate(FIVE_POSITIONS)}
         for wanted, there in itertools.permutations(range(5), 2):
@@ -508,7 +509,7 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
 def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
-    for seed in range(20):
+    for seed in range(8):
         warm_up = WarmUpWatch(0.5, 600.0)
         for block in _temperatures(seed, step, rate):
             warm_up.add(block)

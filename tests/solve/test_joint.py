@@ -105,11 +105,11 @@ def whitened(found: Sequence[Calibration], error: Array) -> Array:
 
 CASES = [
     (Model(), TWO_POSITIONS, 100),
-    (Model("angle_offset"), FIVE_POSITIONS, 40),
+    pytest.param(Model("angle_offset"), FIVE_POSITIONS, 40, marks=pytest.mark.thorough),
     pytest.param(Model("angle_offset"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     pytest.param(Model("base_tilt"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     (Model("base_tilt"), NINE, 25),
-    (Model(cross=True), SIX_FACES, 50),
+    pytest.param(Model(cross=True), SIX_FACES, 50, marks=pytest.mark.thorough),
 ]
 
 

@@ -315,7 +315,7 @@ def published(i: int) -> Array:
 
 
 @pytest.mark.parametrize(
-    "i", [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 4))]
+    "i", [1, *(pytest.param(i, marks=pytest.mark.thorough) for i in (0, 2, 3, 4))]
 )
 def test_five_units_against_the_published_table(i: int) -> None:
     _, _, found = unit(i)

@@ -62,7 +62,12 @@ def explained(seed: int, way: int | None) -> Explanation:
 
 
 @pytest.mark.parametrize(
-    ("seed", "way"), [(1, 0), pytest.param(2, 4, marks=pytest.mark.thorough), (3, None)]
+    ("seed", "way"),
+    [
+        (1, 0),
+        pytest.param(2, 4, marks=pytest.mark.thorough),
+        pytest.param(3, None, marks=pytest.mark.thorough),
+    ],
 )
 def test_the_turn_that_was_not_followed_is_told_and_no_other(
     seed: int, way: int | None

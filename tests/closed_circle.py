@@ -22,8 +22,6 @@ from fieldcal.sim_device.effects import kind
 KINDS: tuple[type[Effect], ...] = (Chain, Line, Motion, Scatter, Effect)
 """The last is what all are, and here those that are none of the others."""
 
-ONE_IN = 3
-
 ONE_IN_OF_A_KIND = 9
 """Tests of their own find what acts with time, temperature, or in single positions."""
 
@@ -39,10 +37,10 @@ def ordered() -> list[str]:
     return sorted(some, key=lambda id_: (_kind(of[id_]), of[id_].seen_in, id_))
 
 
-def a_third(cases: Sequence[tuple[Any, ...]]) -> list[Any]:
+def one_in(number: int, cases: Sequence[tuple[Any, ...]]) -> list[Any]:
     """Parameters of a test: all cases, of which some are for `--all` alone."""
     return [
-        pytest.param(*case, marks=[pytest.mark.thorough] if i % ONE_IN else [])
+        pytest.param(*case, marks=[pytest.mark.thorough] if i % number else [])
         for i, case in enumerate(cases)
     ]
 

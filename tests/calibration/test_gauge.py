@@ -90,6 +90,7 @@ def test_what_is_solved_is_the_same_in_another_unit(
     assert scaled["gyr_bias"]["unit"] == unit
 
 
+@pytest.mark.thorough
 def test_effects_are_relative_and_the_calibration_is_in_counts(
     folders: dict[str, Path],
 ) -> None:

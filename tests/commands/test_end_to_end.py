@@ -214,6 +214,7 @@ def silenced(device: VirtualMover, folder: Path) -> None:
     device.ask(fault={"silence_s": 1e6})
 
 
+@pytest.mark.thorough
 def test_a_device_that_goes_silent_keeps_what_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -116,6 +116,7 @@ def test_names_in_a_plan_and_on_the_lines_of_a_run(
     assert "left" not in said("plan", "--positions", "5", "--device", EVIL)
 
 
+@pytest.mark.thorough
 def test_serial_numbers_in_the_history(
     session: Path, said: Said, tmp_path: Path
 ) -> None:

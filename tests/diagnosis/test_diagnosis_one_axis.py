@@ -90,6 +90,7 @@ def test_what_the_positions_cannot_tell_apart_is_said(
     assert {concealed, likewise} <= {effect.id, *effect.aliases}
 
 
+@pytest.mark.thorough
 def test_a_force_along_the_axis_alone_is_no_alias(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, coupled(1, 0, 4e-3))
     (effect,) = said.effects

@@ -115,6 +115,7 @@ def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
     agrees(said, "random_walk", dict.fromkeys(("ax", "ay", "az"), 0.002))
 
 
+@pytest.mark.thorough
 def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, vibration)
     assert named(said) == ["vibration_rectification"]

@@ -59,6 +59,15 @@ def test_wrongly_decoded_bytes_are_put_right(
     assert code == 0 and said["verdict"] == "good"
     assert np.abs(off(said, profile)).max() < 4.5
     assert any("bytes were decoded wrongly" in w for w in said["warnings"])
+
+
+@pytest.mark.thorough
+def test_bytes_are_put_right_for_a_method_that_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fault = checked_effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
+    profile = device(fault)
+    said = solved(profile, tmp_path / "s", capsys)[1]
     as_printed = solved(profile, tmp_path / "p", capsys, "--method", "joint")[1]
     assert as_printed["parameters"]["acc_scale"] == said["parameters"]["acc_scale"]
 
@@ -135,6 +144,7 @@ def test_intervals_hold_with_a_course_in_them(
     assert np.mean(np.abs(pulls) < 1.96) > 0.85
 
 
+@pytest.mark.thorough
 def test_nothing_is_said_of_a_device_that_has_nothing_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

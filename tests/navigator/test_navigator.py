@@ -85,7 +85,7 @@ def test_noise_grows_as_that_of_many_runs() -> None:
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("runs", [3, pytest.param(12, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("runs", [2, pytest.param(12, marks=pytest.mark.thorough)])
 def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path, runs: int) -> None:
     every, rng = [], np.random.default_rng(3)
     for seed in range(runs):

@@ -147,6 +147,7 @@ def test_a_wrong_turn_is_said_before_anything_is_averaged(bench: Bench) -> None:
     assert events(bench).count("window") == 2
 
 
+@pytest.mark.thorough
 def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
     bench.turner.slips = [(0, 0), (30, 5)]
     bench.turner.corrects = False
@@ -565,6 +566,7 @@ def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
         yield Block.of(t, np.zeros((50, 3)), temperature=temperature)
 
 
+@pytest.mark.thorough
 def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
     """A slow lean of a tenth of a degree, for longer than the window is."""
     device, turner = bench.turner.driver.device, bench.turner
@@ -643,6 +645,7 @@ def test_a_slow_turn_tells_the_unit_too(
     assert units.unit == unit
 
 
+@pytest.mark.thorough
 def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:
     bench.engine.run(hold_all(FIVE_POSITIONS, 10.0))
     assert not any("gyr_unit" in text for text in bench.turner.told)

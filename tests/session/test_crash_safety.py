@@ -160,7 +160,7 @@ def test_a_doubled_batch_counts_once(
     assert len(found) == BATCHES * ROWS and "twice" in says
 
 
-@pytest.mark.parametrize("times", [4, pytest.param(20, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("times", [2, pytest.param(20, marks=pytest.mark.thorough)])
 def test_a_killed_recording_keeps_every_batch_it_had_written(
     tmp_path: Path, times: int
 ) -> None:

@@ -61,6 +61,7 @@ def explained(seed: int, way: int | None) -> Explanation:
     return explain(prepare_recording(lossy(seed, way), parse_description(tables)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "way"),
     [

@@ -242,7 +242,7 @@ def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
     angles = np.zeros((12, 3))
     angles[7] = 3e-3
     pulls, others = [], []
-    for seed in range(14):
+    for seed in range(7):
         source = recording(angles, seed, QUICKLY)
         found = rows_in_a_hand(source)
         assert found.x.position.tolist() == list(range(12))

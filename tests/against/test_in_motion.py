@@ -254,6 +254,7 @@ def test_a_motion_that_repeats_itself_is_refused() -> None:
         compare_in_motion((block_of(real), ABOUT), block_of(twice), NAMES)
 
 
+@pytest.mark.thorough
 def test_a_recording_beside_itself_is_alike(true: Block) -> None:
     assert compare_in_motion((true, ABOUT), true, NAMES).verdict == "consistent"
 
@@ -306,6 +307,7 @@ def without(block: Block, channels: slice) -> Block:
     return Block.of(block.t, six[:, :3], six[:, 3:])
 
 
+@pytest.mark.thorough
 def test_files_are_compared_by_their_motion(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

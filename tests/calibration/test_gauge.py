@@ -34,7 +34,7 @@ SEEN = {"gyr_bias": (0.011, -0.02, 0.006)}
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """One session in SI, and the same in counts and in volts."""
     device = Profile(effects=(parse("earth_rate:"), parse(COUPLED)))
-    positions, out = places(seconds=8.0, gap=5.0), {}
+    positions, out = places(seconds=15.0), {}
     block = recorded(device, positions)
     for unit, acc, gyr in (("SI", 1.0, 1.0), ("count", ACC, GYR), ("V", 0.2, 3.0)):
         folder = tmp_path_factory.mktemp(unit)
@@ -90,7 +90,6 @@ def test_what_is_solved_is_the_same_in_another_unit(
     assert scaled["gyr_bias"]["unit"] == unit
 
 
-@pytest.mark.thorough
 def test_effects_are_relative_and_the_calibration_is_in_counts(
     folders: dict[str, Path],
 ) -> None:
@@ -108,6 +107,7 @@ def test_effects_are_relative_and_the_calibration_is_in_counts(
     assert (np.array(bias["sigma"]) < 0.01 * ACC).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("solved")
 def test_it_is_applied_exported_and_shown(
     folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]

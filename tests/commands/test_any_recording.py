@@ -351,6 +351,7 @@ def test_one_long_static_recording(
     assert replays["twin"]["chi2_per_dof"] < 0.5 * replays["refitted"]["chi2_per_dof"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("beta", "scale", "found"),
     [
@@ -508,6 +509,7 @@ def test_a_mirrored_device_is_mirrored_and_its_gyroscopes_do_not_turn_back(
     assert found["axes"] == "+y+x+z" and sorted(found) == ["axes", "gyr_axes"]
 
 
+@pytest.mark.thorough
 def test_a_hand_that_trembles_now_and_then_is_no_noisy_sensor(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -164,6 +164,7 @@ def test_what_cannot_be_given_back_is_named() -> None:
         imu.close()
 
 
+@pytest.mark.thorough
 def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
     place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&acc_unit=mm/s^2"
     with autopilot(place, "--speed", "20") as (where, _):

@@ -195,6 +195,7 @@ LADDER = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("missed", [0.2, pytest.param(0.6, marks=pytest.mark.thorough)])
 def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], missed: float

@@ -105,7 +105,9 @@ def test_solve_says_which_fact_it_cannot_use(
         assert "beyond" not in said and "nobody said" not in said
 
 
-@pytest.mark.parametrize("effects", [[], ["nonsense"]])
+@pytest.mark.parametrize(
+    "effects", [pytest.param([], marks=pytest.mark.thorough), ["nonsense"]]
+)
 def test_what_could_not_be_examined_is_no_go(
     effects: list[str],
     block: Block,

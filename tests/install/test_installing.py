@@ -152,6 +152,7 @@ def installed(url: str) -> InstalledCalibration:
         return imu.installed
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "number",
     [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.thorough)],

@@ -99,6 +99,7 @@ def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path, runs: int) -> No
     assert np.abs(every).max() < 4.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     [

@@ -148,6 +148,7 @@ def test_what_follows_the_temperature_is_taken_out() -> None:
             assert channel.temperature is None
 
 
+@pytest.mark.thorough
 def test_a_noisy_thermometer_does_not_make_a_coefficient_smaller() -> None:
     """Its own noise is in what it is divided by, where it shows nothing else."""
     rng = np.random.default_rng(26)

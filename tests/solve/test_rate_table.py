@@ -93,7 +93,7 @@ def pulls(found: Calibration) -> Array:
     [
         (2e-3, "tactical"),
         pytest.param(1e-4, "tactical", marks=pytest.mark.thorough),
-        (1e-5, "navigation"),
+        pytest.param(1e-5, "navigation", marks=pytest.mark.thorough),
     ],
 )
 def test_axes_that_lie_level_count_and_the_earth_is_taken_out(

@@ -25,7 +25,7 @@ from fieldcal.model.posterior.size_average import average_over_sizes
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 
-ODDS, DRAWS = 0.5, 110
+ODDS, DRAWS = 0.5, 220
 """Of a cause, for which the chance of one stands where chances are small."""
 
 KEYS = (

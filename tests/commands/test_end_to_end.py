@@ -66,6 +66,7 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
             np.testing.assert_allclose(one, two, rtol=close, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_level_base_is_enough_for_two_positions(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

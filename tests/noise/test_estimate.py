@@ -95,6 +95,7 @@ def test_a_slow_process_has_its_correlation_time() -> None:
         assert abs(one.value - 1.0) < 3.5 * one.sigma
 
 
+@pytest.mark.thorough
 def test_everything_scales_with_the_unit() -> None:
     values = noise(np.random.default_rng(8), 4000, DT, 6, N=1.0, K=0.2)
     one = estimate_noise([reduce_recording([recording(values, DT)])]).channels["gz"]

@@ -298,6 +298,7 @@ def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
     assert events(bench).count("window") == 2
 
 
+@pytest.mark.thorough
 def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -> None:
     bench.turner.slips, bench.turner.corrects = [(0, 0), (30, 5)], False
     turner = bench.turner
@@ -598,6 +599,7 @@ class InDegrees(InProcess):
         return block and replace(block, gyr=np.rad2deg(block.gyr))
 
 
+@pytest.mark.thorough
 def test_gyroscopes_in_degrees_are_asked_about_before_any_turn(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         made = make(recorder, InDegrees(VirtualDevice(seed=3)))

@@ -267,6 +267,7 @@ def test_what_windows_scatter_by_is_an_rms_of_a_triad() -> None:
     assert window_scatter(mixture, (3, 4, 5)) == pytest.approx(1e-4 * np.sqrt(3))
 
 
+@pytest.mark.thorough
 def test_a_base_known_to_be_nearly_level_helps() -> None:
     rng = np.random.default_rng(11)
     places = (Position.deg(0, 0), Position.deg(45, 5), Position.deg(20, -5))

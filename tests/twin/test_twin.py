@@ -223,6 +223,7 @@ def test_of_a_line_the_replay_leaves_little(
     assert "Of the line it leaves" in said["says"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("concealed", "figure", "part"),
     [

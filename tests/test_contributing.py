@@ -72,7 +72,7 @@ def test_what_is_added_is_new_files_alone() -> None:
 
 def test_the_tests_that_walk_what_there_is_find_what_was_added(tree: Path) -> None:
     chosen = " or ".join(f"({words})" for words in ADDED.values())
-    # two of three effects are left out of the circle without --all
+    # most effects are left out of the circle without --all
     pytest_ = ["-m", "pytest", "-q", "--all", "-p", "no:cacheprovider", "-rA"]
     done = ran(tree, *pytest_, "-k", chosen, *ADDED)
     assert done.returncode == 0, done.stdout

@@ -213,7 +213,7 @@ def test_auto_takes_the_model_of_the_tilt_that_fits() -> None:
 def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() -> None:
     rng = np.random.default_rng(7)
     pulls = []
-    for k in range(40):
+    for k in range(24):
         small = (0.05 * rng.standard_normal(2)).tolist()
         tilt = {"base_deg": small} if k % 2 else {"offset_deg": small}
         u = outputs(FIVE_POSITIONS, **tilt)
@@ -347,7 +347,7 @@ def test_positions_without_angles_among_others_are_used_by_their_length() -> Non
     rng = np.random.default_rng(21)
     places = (*FIVE_POSITIONS, *[Position("somewhere")] * 4)
     found, error, narrower = [], [], []
-    for _ in range(30):
+    for _ in range(18):
         u = np.vstack([outputs(FIVE_POSITIONS), by_hand(rng, 4)])
         u += SIGMA * rng.standard_normal(u.shape)
         found.append(solve(observe(places, u), tilt="none"))

@@ -104,7 +104,7 @@ def whitened(found: Sequence[Calibration], error: Array) -> Array:
 
 
 CASES = [
-    (Model(), TWO_POSITIONS, 100),
+    pytest.param(Model(), TWO_POSITIONS, 100, marks=pytest.mark.thorough),
     pytest.param(Model("angle_offset"), FIVE_POSITIONS, 40, marks=pytest.mark.thorough),
     pytest.param(Model("angle_offset"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     pytest.param(Model("base_tilt"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),

@@ -86,6 +86,7 @@ def test_a_command(tree: Path) -> None:
     assert g == pytest.approx(normal_gravity(50.45, 170.0), abs=1e-5)
 
 
+@pytest.mark.thorough
 def test_a_procedure_and_an_exporter(tree: Path, tmp_path: Path) -> None:
     session, out = tmp_path / "session", tmp_path / "out.ini"
     how = ["--virtual", "--speed", "20", "--seconds", "2", "--headless", "--json"]

@@ -169,6 +169,7 @@ def test_values_sent_on_change_are_never_off_by_more_than_the_bar() -> None:
     assert off == pytest.approx(np.abs(s.gyr - plain.gyr).max() / 1e-3, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_what_a_high_pass_leaves_at_last_is_nothing() -> None:
     """Whatever its constant: its sum over all times is that of nothing."""
     bench = _ideal("two")

@@ -54,6 +54,7 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
         tracemalloc.stop()
 
 
+@pytest.mark.thorough
 def test_three_hours_take_no_more_memory_than_half_of_one(tmp_path: Path) -> None:
     peak(tmp_path, 0.25)
     short, few = peak(tmp_path, 0.5)

@@ -80,6 +80,7 @@ def test_the_autopilot_takes_out_what_the_device_does(kind: str, instance: int) 
     np.testing.assert_allclose(sent(autopilot, hot), sent(autopilot, block), atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_uncertainty_is_that_of_many_sessions_errors() -> None:
     of, rng = drawn(np.random.default_rng(2), "acc_bias"), np.random.default_rng(3)
     covariance, bounds = exact(of), limits.read("tactical")

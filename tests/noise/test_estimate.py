@@ -121,6 +121,7 @@ def test_bumps_are_bridged_and_change_nothing() -> None:
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_what_goes_on_all_the_time_is_no_disturbance() -> None:
     """A pump that beats every 1.5 s leaves no cell that is like it was without."""
     values = noise(np.random.default_rng(25), 6000, 0.01, 6, N=1.0)

@@ -303,6 +303,7 @@ def set_by_hand(
     return really
 
 
+@pytest.mark.thorough
 def test_angles_that_are_loosely_set_are_in_the_uncertainty() -> None:
     rng = np.random.default_rng(12)
     found, error, chi2 = [], [], []

@@ -160,6 +160,7 @@ def test_other_functions_without_physics_change_no_scale_factor() -> None:
         assert warm_scale(d, unknown(d, name, "ax")) is None
 
 
+@pytest.mark.thorough
 def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() -> None:
     """Drawn from the prior, all of what is said of the end is as far off as stated."""
     rng = np.random.default_rng(20)

@@ -58,6 +58,7 @@ def test_a_line_is_found_beside_flicker(hz: float) -> None:
     assert abs(found - hz) < 1e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in (1, 2))]
 )

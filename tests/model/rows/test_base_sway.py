@@ -189,6 +189,7 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
         assert abs(angle) < np.deg2rad(0.004)
 
 
+@pytest.mark.thorough
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:
     pulls = []
     for seed in range(2):

@@ -21,9 +21,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# examples of a property are others in each run: few of them add up
 settings.register_profile(
-    "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "any machine",
+    deadline=None,
+    max_examples=40,
+    suppress_health_check=[HealthCheck.too_slow],
 )
+settings.register_profile("all", settings.get_profile("any machine"), max_examples=100)
 settings.load_profile("any machine")
 
 
@@ -95,6 +100,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="run the tests marked thorough too: the whole catalogue, every seed",
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Take as many examples of each property as usual, if all is wanted."""
+    if config.getoption("--all"):
+        settings.load_profile("all")
 
 
 def pytest_collection_modifyitems(

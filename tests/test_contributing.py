@@ -72,7 +72,7 @@ def test_what_is_added_is_new_files_alone() -> None:
 
 def test_the_tests_that_walk_what_there_is_find_what_was_added(tree: Path) -> None:
     chosen = " or ".join(f"({words})" for words in ADDED.values())
-    # two of three effects are left out of the circle without --all
+    # most effects are left out of the circle without --all
     pytest_ = ["-m", "pytest", "-q", "--all", "-p", "no:cacheprovider", "-rA"]
     done = ran(tree, *pytest_, "-k", chosen, *ADDED)
     assert done.returncode == 0, done.stdout
@@ -86,6 +86,7 @@ def test_a_command(tree: Path) -> None:
     assert g == pytest.approx(normal_gravity(50.45, 170.0), abs=1e-5)
 
 
+@pytest.mark.thorough
 def test_a_procedure_and_an_exporter(tree: Path, tmp_path: Path) -> None:
     session, out = tmp_path / "session", tmp_path / "out.ini"
     how = ["--virtual", "--speed", "20", "--seconds", "2", "--headless", "--json"]

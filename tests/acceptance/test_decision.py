@@ -279,6 +279,7 @@ def _held(position: Position, rng: np.random.Generator, cross: float = 0.0) -> A
     return Average(mean, covariance, 21.0, 3000, 0.0, 30.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.thorough)])
 def test_a_position_not_fitted_is_predicted_within_its_uncertainty(runs: int) -> None:
     rng, position, chances = (

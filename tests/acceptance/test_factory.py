@@ -135,7 +135,7 @@ def test_what_a_turn_leaves_is_in_every_uncertainty() -> None:
     rng, off, plain = np.random.default_rng(1), list[Array](), list[Array]()
     force = specific_forces(SIX_FACES, G)
     came = np.vstack([np.zeros(3), np.clip(np.diff(force, axis=0) / 9.80665, -1, 1)])
-    for _ in range(60):
+    for _ in range(20):
         mean = force + rng.normal(0, 5e-4, 3) * came
         mean += rng.normal(0, 1e-5, force.shape)
         seen = observe(SIX_FACES, mean, sigma=1e-5)
@@ -161,7 +161,7 @@ def test_biases_that_a_warm_up_moves_are_known_as_well_as_stated(shown: bool) ->
     left = FactoryErrors(**PER_K, warming_k=1.25)
     course = x.warming if shown else 1.25 * np.exp(-x.since_start / 300)
     end = 2e-3 * x.t[-1] if shown else 1.25 * np.exp(-x.since_start[-1] / 300)
-    for _ in range(20):
+    for _ in range(10):
         drift = rng.normal(0, np.repeat([5e-4, 1e-5], 3))
         y = np.hstack([x.f, x.w]) + drift * course[:, None]
         y += SD / 20 * rng.standard_normal(y.shape)

@@ -71,7 +71,7 @@ def test_a_bias_or_the_earths_rate_stands_out() -> None:
     for bias, earth in ((1e-3, 0.0), (-1e-4, 0.0), (0.0, EARTH)):
         found = [
             bias_removal_probability(*at_rest(rng, bias, earth=earth), KEEPS, LEAST)[0]
-            for _ in range(20)
+            for _ in range(10)
         ]
         assert np.mean(np.array(found) > DOUBT) <= 0.1
 
@@ -92,7 +92,7 @@ def test_a_bias_that_is_tracked_leaves_nothing() -> None:
     assert bias_removal_probability(windows[:1], block, KEEPS, LEAST) == (0.0, "")
 
 
-@pytest.mark.parametrize("each", [2, 6])
+@pytest.mark.parametrize("each", [pytest.param(2, marks=pytest.mark.thorough), 6])
 def test_what_is_tracked_is_seen_behind_lines_between_samples(each: int) -> None:
     """A program that drew them left less noise than means have; a bias stays one."""
     rng, found = np.random.default_rng(14), []

@@ -94,6 +94,7 @@ def test_a_simulator_that_is_like_the_device_agrees(real: DiagnosedRecording) ->
     assert found.before.chi2_per_dof == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.thorough
 def test_what_is_not_likely_enough_is_no_difference_and_is_told(
     real: DiagnosedRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,6 +142,7 @@ def test_a_perfect_simulator_leaves_out_everything(real: DiagnosedRecording) -> 
     assert any("next to no noise" in warning for warning in found.warnings)
 
 
+@pytest.mark.thorough
 def test_of_what_the_simulator_has_too_little_of_both_numbers_are_told(
     real: DiagnosedRecording,
 ) -> None:

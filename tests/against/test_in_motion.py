@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_circle import a_third
+from closed_circle import one_in
 from driven_like import DRIVE, written
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
@@ -57,7 +57,7 @@ def number(found: Match, name: str, parameter: str) -> tuple[float, float]:
     "kind",
     [
         KINDS.index("cubic"),
-        KINDS.index("increments"),
+        pytest.param(KINDS.index("increments"), marks=pytest.mark.thorough),
         pytest.param(KINDS.index("stamp_error"), marks=pytest.mark.thorough),
         pytest.param(KINDS.index("flexible_mount"), marks=pytest.mark.thorough),
     ],
@@ -128,6 +128,7 @@ def test_time_constants_come_back_within_their_uncertainty() -> None:
     assert len(off) >= 5 and np.abs(off).max() < 4
 
 
+@pytest.mark.thorough
 def test_a_time_constant_is_told_beside_a_delay_and_a_delay_is_none(
     true: Block,
 ) -> None:
@@ -185,6 +186,7 @@ def test_the_butterworth_filter_of_a_simulator_is_one_below_nothing() -> None:
         assert abs(tau + 0.03) < 4 * sigma < 0.006
 
 
+@pytest.mark.thorough
 def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     true: Block,
 ) -> None:
@@ -204,7 +206,7 @@ def test_stamps_of_a_coarse_clock_are_told_from_samples_that_are_uneven(
     assert not {d.id for d in kept.differences} - CALIBRATION
 
 
-@pytest.mark.parametrize("name", a_third([(name,) for name in IN_MOTION]))
+@pytest.mark.parametrize("name", one_in(4, [(name,) for name in IN_MOTION]))
 def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> None:
     angles = ((0, 0), (90, 40), (-60, 0), (30, -70), (0, 80), (-90, -30)) * 2
     windows = [
@@ -227,7 +229,7 @@ def test_what_only_motion_shows_is_named_of_the_virtual_device(name: str) -> Non
 
 def test_nothing_is_said_of_what_is_alike() -> None:
     table = recorded(DRIVE, {}, 40.0, 25.0)
-    for seed in range(2):
+    for seed in range(1):
         rng = np.random.default_rng(seed)
         real, sim = table.copy(), table.copy()
         real[:, 1:] += coloured(rng, len(table), 0.04, NOISE["noise"])
@@ -252,6 +254,7 @@ def test_a_motion_that_repeats_itself_is_refused() -> None:
         compare_in_motion((block_of(real), ABOUT), block_of(twice), NAMES)
 
 
+@pytest.mark.thorough
 def test_a_recording_beside_itself_is_alike(true: Block) -> None:
     assert compare_in_motion((true, ABOUT), true, NAMES).verdict == "consistent"
 
@@ -304,6 +307,7 @@ def without(block: Block, channels: slice) -> Block:
     return Block.of(block.t, six[:, :3], six[:, 3:])
 
 
+@pytest.mark.thorough
 def test_files_are_compared_by_their_motion(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

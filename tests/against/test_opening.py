@@ -77,6 +77,7 @@ def test_other_positions_are_refused(tmp_path: Path, folder: Path) -> None:
         open_simulator_output(path, (session.block, session.about))
 
 
+@pytest.mark.thorough
 def test_the_command_writes_shows_and_ends_with_what_it_found(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

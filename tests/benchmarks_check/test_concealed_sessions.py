@@ -78,6 +78,7 @@ def test_a_pier_without_gyroscopes_is_named() -> None:
     assert judged(session, 1, told, 0.0).right
 
 
+@pytest.mark.thorough
 def test_a_bump_is_judged_by_name_and_by_number() -> None:
     session = kinds()["bump"][0](np.random.default_rng(2))
     told = diagnose(session.record(2), session.about)
@@ -102,6 +103,7 @@ ONCE_MISSED = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("label", "seed"),
     [

@@ -169,6 +169,7 @@ def test_values_sent_on_change_are_never_off_by_more_than_the_bar() -> None:
     assert off == pytest.approx(np.abs(s.gyr - plain.gyr).max() / 1e-3, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_what_a_high_pass_leaves_at_last_is_nothing() -> None:
     """Whatever its constant: its sum over all times is that of nothing."""
     bench = _ideal("two")
@@ -200,7 +201,7 @@ def test_a_slow_sensor_is_repeated_in_its_own_time() -> None:
 
 def test_packets_out_of_order_lose_no_sample() -> None:
     bench = _ideal("five", acc_noise=1e-3)
-    for seed in range(6):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         plain = recorded(bench, rng)
         s = _made("packets out of order", bench, seed).samples

@@ -102,6 +102,7 @@ def test_what_a_device_became_or_took_out_is_no_go(
     assert not found.go and found.caught == caught
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("seed", "mistake"),
     [

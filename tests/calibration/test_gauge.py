@@ -107,6 +107,7 @@ def test_effects_are_relative_and_the_calibration_is_in_counts(
     assert (np.array(bias["sigma"]) < 0.01 * ACC).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("solved")
 def test_it_is_applied_exported_and_shown(
     folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -140,6 +140,7 @@ def test_gyroscopes_alone_are_solved(
     assert (np.abs(pulls) < 4).all() and max(found["sigma"]) < 1e-4
 
 
+@pytest.mark.thorough
 def test_windows_of_a_rate_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -248,6 +249,7 @@ def test_what_settles_shows_whatever_the_orientations(
     assert said["fit"]["after"]["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effect", "parameters"),
     [
@@ -314,6 +316,7 @@ def test_most_walks_are_named_and_are_as_fast_as_they_say(
     assert np.mean(speed) == pytest.approx(8e-5, rel=0.2)
 
 
+@pytest.mark.thorough
 def test_a_recording_of_windows_alone_has_lost_nothing(
     coupled: Block, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -348,6 +351,7 @@ def test_one_long_static_recording(
     assert replays["twin"]["chi2_per_dof"] < 0.5 * replays["refitted"]["chi2_per_dof"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("beta", "scale", "found"),
     [
@@ -415,6 +419,7 @@ def test_what_cannot_be_diagnosed_is_one_sentence(
     assert says in err and err.count("\n") == 1 and not out
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("made", "says", "left"),
     [
@@ -504,6 +509,7 @@ def test_a_mirrored_device_is_mirrored_and_its_gyroscopes_do_not_turn_back(
     assert found["axes"] == "+y+x+z" and sorted(found) == ["axes", "gyr_axes"]
 
 
+@pytest.mark.thorough
 def test_a_hand_that_trembles_now_and_then_is_no_noisy_sensor(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

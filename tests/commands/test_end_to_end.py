@@ -66,6 +66,7 @@ def test_solving_the_recorded_session_gives_the_same_numbers(
             np.testing.assert_allclose(one, two, rtol=close, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_level_base_is_enough_for_two_positions(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -126,11 +127,12 @@ def solved(
     return found
 
 
+@pytest.mark.parametrize("times", [1, pytest.param(3, marks=pytest.mark.thorough)])
 def test_killed_at_any_moment_the_session_holds_all_that_was_in_the_file(
-    tmp_path: Path,
+    tmp_path: Path, times: int
 ) -> None:
     rng = np.random.default_rng(2)
-    for attempt in range(3):
+    for attempt in range(times):
         folder = tmp_path / str(attempt)
         process = subprocess.Popen(
             [*RUN, "five_position", "--headless", TILTED, "--speed", "20"]
@@ -213,6 +215,7 @@ def silenced(device: VirtualMover, folder: Path) -> None:
     device.ask(fault={"silence_s": 1e6})
 
 
+@pytest.mark.thorough
 def test_a_device_that_goes_silent_keeps_what_it_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

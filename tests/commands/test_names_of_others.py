@@ -85,7 +85,12 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    "command", [pytest.param("solve", marks=pytest.mark.thorough), "diagnose", "verify"]
+    "command",
+    [
+        pytest.param("solve", marks=pytest.mark.thorough),
+        pytest.param("diagnose", marks=pytest.mark.thorough),
+        "verify",
+    ],
 )
 def test_names_of_positions(session: Path, said: Said, command: str) -> None:
     both = said(command, str(session))
@@ -111,6 +116,7 @@ def test_names_in_a_plan_and_on_the_lines_of_a_run(
     assert "left" not in said("plan", "--positions", "5", "--device", EVIL)
 
 
+@pytest.mark.thorough
 def test_serial_numbers_in_the_history(
     session: Path, said: Said, tmp_path: Path
 ) -> None:

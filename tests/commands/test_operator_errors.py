@@ -75,7 +75,9 @@ def test_the_right_format_with_other_columns(
 
 
 @pytest.mark.usefixtures("soon_silent")
-@pytest.mark.parametrize("other", [False, True])
+@pytest.mark.parametrize(
+    "other", [pytest.param(False, marks=pytest.mark.thorough), True]
+)
 def test_a_run_that_heard_nothing_is_not_in_the_way_of_the_next(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], other: bool
 ) -> None:

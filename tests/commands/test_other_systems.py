@@ -79,6 +79,7 @@ def test_what_needs_no_terminal_runs_without_posix(session: Path) -> None:
     assert "report.html" in reported and "end of report" in reported
 
 
+@pytest.mark.thorough
 def test_a_run_starts_without_posix_and_plays_a_recording(
     session: Path, tmp_path: Path
 ) -> None:

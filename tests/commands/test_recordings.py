@@ -138,6 +138,7 @@ def test_five_mpu9150_agree_with_the_peer_s_published_table(
         )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "method", "offset"),
     [

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 from bench import five_positions
+from session_folders import places, recorded, write_session
 
 from fieldcal.cli import COMMANDS, main
 from fieldcal.commands import run
+from fieldcal.sim_device.profile import Profile
 
 FIELDCAL = [sys.executable, "-m", "fieldcal"]
 
@@ -51,9 +53,11 @@ def test_a_failure_is_an_object_too(
 
 
 def test_events_have_a_time_and_an_end(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    url = f"replay:{session}/samples.parquet?speed=max"
+    held = places([(0.0, 0.0), (45.0, 5.0)], seconds=6.0, gap=6.0)
+    recording = write_session(tmp_path / "s", recorded(Profile(), held), held)
+    url = f"replay:{recording}?speed=max"
     call = ["run", "two_position", "--device", url, "--headless", "--patience", "0"]
     code = main([*call, "-o", str(tmp_path / "r"), "--no-report"])
     told = capsys.readouterr().err.splitlines()

@@ -54,6 +54,7 @@ def test_radians_are_told_from_degrees(
     assert angle_unit(stated(other, degrees), held, seen) == ""
 
 
+@pytest.mark.thorough
 def test_it_is_named_and_no_go(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

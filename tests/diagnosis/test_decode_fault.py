@@ -41,7 +41,7 @@ def with_six(block: Block, six: NDArray[np.floating]) -> Block:
 @pytest.mark.parametrize("kind", ["bytes_swapped", "low_byte_signed"])
 @pytest.mark.parametrize(
     "bias",
-    [0.02, -0.3, *(pytest.param(b, marks=pytest.mark.thorough) for b in (0.12, 0.57))],
+    [0.02, *(pytest.param(b, marks=pytest.mark.thorough) for b in (-0.3, 0.12, 0.57))],
 )
 def test_each_count_is_what_it_was(kind: str, bias: float) -> None:
     device = replace(TACTICAL, acc_noise=0.01, acc_bias=(bias, -0.1, bias))
@@ -103,7 +103,7 @@ def test_what_shakes_a_device_is_no_wild_value() -> None:
 
 @pytest.mark.parametrize(
     "seed",
-    [0, 1, *(pytest.param(s, marks=pytest.mark.thorough) for s in range(2, 8))],
+    [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in range(1, 8))],
 )
 def test_shaking_that_is_rectified_has_a_long_tail_and_is_no_wild_value(
     seed: int,

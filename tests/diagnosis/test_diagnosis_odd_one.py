@@ -147,6 +147,7 @@ def test_an_angle_that_is_wrong_each_time_is_said(
         assert (np.abs(far) < 4 * np.array(found["sigma"])).all()
 
 
+@pytest.mark.thorough
 def test_of_two_worn_angles_both_are_said_and_the_second_is_in_every_sigma(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -188,6 +189,7 @@ def test_a_step_behind_the_first_position_is_one(tmp_path: Path) -> None:
     agrees(said, "gyro_cross_coupling", {"s12": 0.01, "s23": 0.006})
 
 
+@pytest.mark.thorough
 def test_a_size_that_no_device_has_is_no_cause(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, tooth)
     assert said.verdict == "unexplained" and not named(said)

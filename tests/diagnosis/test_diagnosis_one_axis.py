@@ -55,6 +55,7 @@ def test_a_jump_amid_a_window_is_no_bump_and_has_its_size(
     agrees(said, "bias_step", {**sizes, "at_s": at_s})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_slow_line_does_not_pass_for_a_lever_arm_in_turns(
     seed: int, tmp_path: Path
@@ -64,6 +65,7 @@ def test_a_slow_line_does_not_pass_for_a_lever_arm_in_turns(
     agrees(said, "hum", {"ax": 0.003, "hz": 0.3})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("concealed", "fault", "likewise"),
     [
@@ -88,6 +90,7 @@ def test_what_the_positions_cannot_tell_apart_is_said(
     assert {concealed, likewise} <= {effect.id, *effect.aliases}
 
 
+@pytest.mark.thorough
 def test_a_force_along_the_axis_alone_is_no_alias(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, coupled(1, 0, 4e-3))
     (effect,) = said.effects

@@ -51,6 +51,7 @@ def test_the_league_says_why_each_lost(tilted: Diagnosis) -> None:
     assert tried["base_tilt"].held_out_gain > tried["angle_offset"].held_out_gain > 0
 
 
+@pytest.mark.thorough
 def test_of_a_clean_recording_everything_lost_to_chance(tmp_path: Path) -> None:
     found = found_in(tmp_path)
     assert found.verdict == "consistent" and not found.curves and not found.next

@@ -74,7 +74,9 @@ def flicker(ridden: Ride, out: Array) -> None:
 
 
 @pytest.mark.parametrize(
-    "device", [TACTICAL, NAVIGATION], ids=["tactical", "navigation"]
+    "device",
+    [pytest.param(TACTICAL, marks=pytest.mark.thorough), NAVIGATION],
+    ids=["tactical", "navigation"],
 )
 def test_nothing_left_out(tmp_path: Path, device: Device) -> None:
     assert diagnosed(tmp_path / "s", device).verdict == "consistent"
@@ -113,6 +115,7 @@ def test_a_walk_beyond_the_noise_of_a_second(tmp_path: Path) -> None:
     agrees(said, "random_walk", dict.fromkeys(("ax", "ay", "az"), 0.002))
 
 
+@pytest.mark.thorough
 def test_a_line_that_shakes_three_windows(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", TACTICAL, vibration)
     assert named(said) == ["vibration_rectification"]
@@ -129,6 +132,7 @@ def test_axes_that_go_together_do_not_wander(tmp_path: Path, fault: Fault) -> No
     assert {m.channel for m in said.mismatch} >= {"ax", "ay"}
 
 
+@pytest.mark.thorough
 def test_rates_that_the_turns_show_are_known_to_the_windows(tmp_path: Path) -> None:
     """Gyroscopes that see the Earth see it through their cross-coupling."""
     said = diagnosed(tmp_path / "s", NAVIGATION, coupling)
@@ -145,6 +149,7 @@ def test_a_drift_is_no_noise(tmp_path: Path) -> None:
     agrees(said, "bias_drift", {"ax": 1e-4, "ay": -8e-5})
 
 
+@pytest.mark.thorough
 def test_a_temperature_that_rises_once_leaves_it_open(tmp_path: Path) -> None:
     """Towards an end at an even pace: its rate is as good as itself, or as time."""
     said = diagnosed(tmp_path / "s", TACTICAL, heating)

@@ -153,6 +153,7 @@ def test_whole_milligravities_are_coarse_steps_and_no_bumps(
             assert abs(found["value"] - steps[name]) < 3 * found["sigma"]
 
 
+@pytest.mark.thorough
 def test_an_autopilot_on_the_bench_warms_up(shared: Path, tmp_path: Path) -> None:
     """In a minute nobody tells an exponential of many minutes from a drift: both."""
     pyulog = pytest.importorskip("pyulog", reason="pyulog reads PX4 logs")

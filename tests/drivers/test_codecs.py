@@ -71,7 +71,7 @@ def test_samples_are_what_was_sent(name: str) -> None:
 
 
 @every_format
-@settings(max_examples=15)
+@settings(max_examples=6)
 @example(step=1)
 @given(step=st.integers(1, 200))
 def test_any_pieces_give_the_same(name: str, step: int) -> None:
@@ -83,7 +83,7 @@ def test_any_pieces_give_the_same(name: str, step: int) -> None:
 
 
 @every_format
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(junk=st.lists(st.binary(max_size=60), min_size=16, max_size=16), data=st.data())
 def test_garbage_between_samples_costs_none(
     name: str, junk: list[bytes], data: st.DataObject
@@ -98,7 +98,7 @@ def test_garbage_between_samples_costs_none(
 
 
 @every_format
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(
     damage=st.lists(
         st.tuples(st.sampled_from("flip lose double insert".split()), st.integers(0)),

@@ -156,8 +156,7 @@ def one_a_link() -> list[Any]:
 
     What each format puts into bytes is held against what it was in test_wires_meet.
     """
-    few = ["witmotion", "can", "mavlink", "mavlink on a serial port"]
-    few += ["mavlink over datagrams"]
+    few = ["witmotion", "can", "mavlink"]
     more = (name for name in LINES if name not in few)
     return [*few, *(pytest.param(m, marks=pytest.mark.thorough) for m in more)]
 

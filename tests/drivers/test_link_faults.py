@@ -31,8 +31,7 @@ every_link = pytest.mark.parametrize(
     [
         "serial",
         "can",
-        "mavlink",
-        pytest.param("text", marks=pytest.mark.thorough),
+        *(pytest.param(m, marks=pytest.mark.thorough) for m in ("mavlink", "text")),
     ],
 )
 
@@ -245,8 +244,17 @@ def ended(folder: Path, link: str, fault: str) -> tuple[Path, int, str]:
     return folder / "s", code, said
 
 
+LONG = {("mavlink", "silence_s"), ("mavlink", "hangup_s")}
+"""On the way of another fault of the same link, or of this fault of another link."""
+
+
 @pytest.mark.parametrize(
-    ("link", "fault", "says"), ENDS, ids=[f"{link}-{fault}" for link, fault, _ in ENDS]
+    ("link", "fault", "says"),
+    [
+        pytest.param(*one, marks=[pytest.mark.thorough] if one[:2] in LONG else [])
+        for one in ENDS
+    ],
+    ids=[f"{link}-{fault}" for link, fault, _ in ENDS],
 )
 def test_what_ends_a_run_is_one_sentence(
     several: dict[str, Future[tuple[Path, int, str]]],

@@ -73,7 +73,14 @@ def opened(url: str) -> MavlinkImu:
     return imu
 
 
-@pytest.mark.parametrize("place", ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0", "pty"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "udpin:127.0.0.1:0",
+        pytest.param("tcpin:127.0.0.1:0", marks=pytest.mark.thorough),
+        "pty",
+    ],
+)
 def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
     with autopilot(place, "--speed", "15", "--seed", "3", *CONCEALED) as (where, _):
         for message, within in (("HIGHRES_IMU", 2e-3), ("RAW_IMU", 6e-3)):
@@ -157,6 +164,7 @@ def test_what_cannot_be_given_back_is_named() -> None:
         imu.close()
 
 
+@pytest.mark.thorough
 def test_a_recording_keeps_what_is_installed(tmp_path: Path) -> None:
     place = "tcpin:127.0.0.1:0?INS_ACCOFFS_X=0.5&acc_unit=mm/s^2"
     with autopilot(place, "--speed", "20") as (where, _):

@@ -165,7 +165,7 @@ def arrive(
 @pytest.mark.parametrize("batch", [1, 7])
 def test_arrivals_teach_the_rate_not_their_jitter(batch: int) -> None:
     errors, slopes = [], []
-    for seed in range(4):
+    for seed in range(2):
         sent = 1e9 + np.arange(12_000) / 201.3
         clock = ArrivalTimebase(LinkHealth())
         t = arrive(clock, sent, batch, np.random.default_rng(seed))

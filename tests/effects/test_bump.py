@@ -87,9 +87,9 @@ def bumps_while_shaken(seed: int, push: float) -> list[float]:
 
 
 def test_the_long_tail_of_a_rectified_vibration_is_no_bump() -> None:
-    said = [bumps_while_shaken(seed, push=0.0) for seed in range(60)]
-    assert sum(map(bool, said)) <= 1
-    for seed in range(10):
+    said = [bumps_while_shaken(seed, push=0.0) for seed in range(20)]
+    assert not any(said)
+    for seed in range(4):
         (at,) = bumps_while_shaken(seed, push=60.0)
         assert abs(at - 64.0) < 0.5
 
@@ -181,7 +181,7 @@ def test_a_channel_that_says_nothing_is_not_pushed(value: float) -> None:
     missing=st.sampled_from([0.0, 0.1]),
     silent=st.sampled_from([None, 0.0, 1.0, np.nan]),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_however_short_a_window_is_and_whatever_is_in_it_nothing_breaks(
     seed: int,
     hz: float,

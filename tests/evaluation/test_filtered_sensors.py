@@ -23,6 +23,7 @@ DEVICE = Profile(
 )  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("known_s", "right"),
     [

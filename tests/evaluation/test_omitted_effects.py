@@ -59,6 +59,15 @@ def test_wrongly_decoded_bytes_are_put_right(
     assert code == 0 and said["verdict"] == "good"
     assert np.abs(off(said, profile)).max() < 4.5
     assert any("bytes were decoded wrongly" in w for w in said["warnings"])
+
+
+@pytest.mark.thorough
+def test_bytes_are_put_right_for_a_method_that_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fault = checked_effect("decode_fault", {"channel": "ay", "kind": "low_byte_signed"})
+    profile = device(fault)
+    said = solved(profile, tmp_path / "s", capsys)[1]
     as_printed = solved(profile, tmp_path / "p", capsys, "--method", "joint")[1]
     assert as_printed["parameters"]["acc_scale"] == said["parameters"]["acc_scale"]
 
@@ -135,6 +144,7 @@ def test_intervals_hold_with_a_course_in_them(
     assert np.mean(np.abs(pulls) < 1.96) > 0.85
 
 
+@pytest.mark.thorough
 def test_nothing_is_said_of_a_device_that_has_nothing_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -161,6 +171,7 @@ def test_cross_coupling_that_was_asked_for_is_carried(
     assert any("takes it into account" in w for w in without["warnings"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("unit", ["deg/s"])
 def test_rates_in_another_unit_are_never_solved_as_good(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str
@@ -184,6 +195,7 @@ LADDER = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("missed", [0.2, pytest.param(0.6, marks=pytest.mark.thorough)])
 def test_a_rest_of_the_ladder_that_is_off_is_never_a_good_result_that_is_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], missed: float

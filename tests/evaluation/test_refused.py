@@ -87,7 +87,7 @@ def test_a_device_without_gyroscopes_is_no_copy(
             marks=pytest.mark.thorough,
         ),
         ({"site": {"height_m": 10.0}}, "the site is not stated"),
-        ({"range": {"acceleration": 1e3}}, ""),
+        pytest.param({"range": {"acceleration": 1e3}}, "", marks=pytest.mark.thorough),
     ],
 )
 def test_solve_says_which_fact_it_cannot_use(
@@ -105,7 +105,9 @@ def test_solve_says_which_fact_it_cannot_use(
         assert "beyond" not in said and "nobody said" not in said
 
 
-@pytest.mark.parametrize("effects", [[], ["nonsense"]])
+@pytest.mark.parametrize(
+    "effects", [pytest.param([], marks=pytest.mark.thorough), ["nonsense"]]
+)
 def test_what_could_not_be_examined_is_no_go(
     effects: list[str],
     block: Block,

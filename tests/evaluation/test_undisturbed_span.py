@@ -48,6 +48,7 @@ def test_a_window_goes_on_where_the_force_stays(
     assert undisturbed_span(block, (0.0, 30.0), blind) == calm, "without accelerometers"
 
 
+@pytest.mark.thorough
 def test_a_knock_amid_the_first_window_is_seen_by_both_parts_of_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,7 +43,7 @@ def test_the_spread_is_that_of_units_without_their_errors() -> None:
 def test_what_is_said_of_spread_and_capability_is_what_they_scatter_by() -> None:
     rng = np.random.default_rng(11)
     drawn = []
-    for _ in range(150):
+    for _ in range(75):
         sigma = rng.uniform(0.01, 0.03, 60)
         x = 0.05 + 0.02 * rng.standard_normal(60) + sigma * rng.standard_normal(60)
         drawn.append(

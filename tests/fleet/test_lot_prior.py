@@ -71,7 +71,7 @@ def test_mean_and_spread_are_those_of_the_next_unit() -> None:
     assert np.abs(off).max() < 0.25 and (found.outlier_probability < 0.02).all()
 
 
-@pytest.mark.parametrize("lot", [0.8, -0.8])
+@pytest.mark.parametrize("lot", [0.8, pytest.param(-0.8, marks=pytest.mark.thorough)])
 def test_what_goes_together_in_a_lot_is_told_from_errors_that_do(lot: float) -> None:
     found = estimate_lot_prior("7", drawn(np.random.default_rng(2), 300, lot, -lot / 3))
     made = found.covariance[0, 1] / found.sigma[0] / found.sigma[1]

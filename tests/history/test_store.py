@@ -178,6 +178,7 @@ for i in range(1, 1000):
 """
 
 
+@pytest.mark.thorough
 def test_a_full_disk_leaves_what_was_there_and_nothing_half(tmp_path: Path) -> None:
     here = [str(folder) for folder in Path(__file__).parents[:3:2]]
     call = [sys.executable, "-c", FILLING, str(tmp_path / "h"), *here]

@@ -31,7 +31,7 @@ def assert_same(session: Session, rows: Array) -> None:
 
 
 @settings(
-    max_examples=8,
+    max_examples=4,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
@@ -268,7 +268,7 @@ def test_several_imus_go_into_folders_of_their_own(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("ticks", [1e4, 1e6])
+@pytest.mark.parametrize("ticks", [1e4, pytest.param(1e6, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("said", [True, False])
 def test_ticks_of_a_device_are_told_by_the_rate_or_by_their_name(
     tmp_path: Path, ticks: float, said: bool

@@ -54,6 +54,7 @@ def peak(folder: Path, hours: float) -> tuple[int, int]:
         tracemalloc.stop()
 
 
+@pytest.mark.thorough
 def test_three_hours_take_no_more_memory_than_half_of_one(tmp_path: Path) -> None:
     peak(tmp_path, 0.25)
     short, few = peak(tmp_path, 0.5)
@@ -64,6 +65,7 @@ def test_three_hours_take_no_more_memory_than_half_of_one(tmp_path: Path) -> Non
     assert long < 1.1 * short
 
 
+@pytest.mark.thorough
 def test_stretches_of_a_stream_are_those_of_its_samples(tmp_path: Path) -> None:
     peak(tmp_path, 1.0)
     session = Session.open(tmp_path / "1.0")

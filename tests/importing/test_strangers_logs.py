@@ -307,7 +307,11 @@ def test_a_form_is_read_with_nothing_said(tmp_path: Path, name: str) -> None:
     assert_same(imported(path))
 
 
-@pytest.mark.parametrize("slow", [slice(0, 3), slice(3, 6)], ids=["acc", "gyr"])
+@pytest.mark.parametrize(
+    "slow",
+    [slice(0, 3), pytest.param(slice(3, 6), marks=pytest.mark.thorough)],
+    ids=["acc", "gyr"],
+)
 def test_a_sensor_that_is_slower_than_the_rows_is_read_with_the_other(
     tmp_path: Path, slow: slice, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -167,8 +167,11 @@ def test_written_read_back_and_undone(
 
 
 def test_a_parameter_that_is_not_taken_is_noticed_and_all_is_undone(
-    session: Path, capsys: pytest.CaptureFixture[str]
+    session: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("fieldcal.drivers.mavlink_parameters.ROUNDS", 2)
     there = installed()
     with autopilot(f"drop=INS_ACCOFFS_Y&{old_query(there)}") as url:
         assert main(["write", str(session), "--device", url, "--yes"]) == 3

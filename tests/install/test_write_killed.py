@@ -28,7 +28,9 @@ def test_the_vehicle_has_one_set_whole_and_it_is_said_which(
     assert claimed == kept != "neither"
 
 
-@pytest.mark.parametrize("then", ["undo", "write"])
+@pytest.mark.parametrize(
+    "then", ["undo", pytest.param("write", marks=pytest.mark.thorough)]
+)
 def test_after_a_kill_it_is_given_back_or_finished(
     then: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,6 +80,7 @@ def test_the_autopilot_takes_out_what_the_device_does(kind: str, instance: int) 
     np.testing.assert_allclose(sent(autopilot, hot), sent(autopilot, block), atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_uncertainty_is_that_of_many_sessions_errors() -> None:
     of, rng = drawn(np.random.default_rng(2), "acc_bias"), np.random.default_rng(3)
     covariance, bounds = exact(of), limits.read("tactical")
@@ -125,7 +126,9 @@ def folders(place: Path, of: Warming, go: bool = True) -> list[str]:
     return names
 
 
-@pytest.mark.parametrize("kind", PROGRAMS)
+@pytest.mark.parametrize(
+    "kind", ["px4", pytest.param("ardupilot", marks=pytest.mark.thorough)]
+)
 def test_written_read_back_and_undone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:

@@ -85,7 +85,7 @@ def test_noise_grows_as_that_of_many_runs() -> None:
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("runs", [3, pytest.param(12, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("runs", [2, pytest.param(12, marks=pytest.mark.thorough)])
 def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path, runs: int) -> None:
     every, rng = [], np.random.default_rng(3)
     for seed in range(runs):
@@ -99,6 +99,7 @@ def test_parameters_are_as_uncertain_as_is_said(tmp_path: Path, runs: int) -> No
     assert np.abs(every).max() < 4.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     [
@@ -134,7 +135,13 @@ def test_a_base_that_points_elsewhere(tmp_path: Path) -> None:
     assert np.abs(pulls(found, sensors)).max() < 4
 
 
-@pytest.mark.parametrize("columns", [("pn", "pe", "pd"), ("vn", "ve", "vd", "pd")])
+@pytest.mark.parametrize(
+    "columns",
+    [
+        ("pn", "pe", "pd"),
+        pytest.param(("vn", "ve", "vd", "pd"), marks=pytest.mark.thorough),
+    ],
+)
 def test_positions_serve_as_well(tmp_path: Path, columns: tuple[str, ...]) -> None:
     found, sensors = solved(tmp_path, columns=columns)
     assert len(found.names) == 9 and np.abs(pulls(found, sensors)).max() < 4

@@ -37,7 +37,11 @@ def fits(values: Array, sizes: dict[str, float]) -> tuple[Array, Array]:
 @pytest.mark.statistical
 @pytest.mark.parametrize(
     "sizes",
-    [{"N": 1.0, "K": 1.0}, {"N": 1.0, "B": 1.0}, {"N": 1.0, "Q": 0.3}],
+    [
+        {"N": 1.0, "K": 1.0},
+        pytest.param({"N": 1.0, "B": 1.0}, marks=pytest.mark.thorough),
+        {"N": 1.0, "Q": 0.3},
+    ],
     ids=["walk", "flicker", "quantisation"],
 )
 def test_estimates_are_as_good_as_any_can_be(sizes: dict[str, float]) -> None:
@@ -66,7 +70,7 @@ def test_long_recordings_are_known_as_well_as_their_levels_allow() -> None:
 def test_processes_that_are_there_are_named_and_no_others() -> None:
     rng = np.random.default_rng(6)
     seen = []
-    for _ in range(3):
+    for _ in range(2):
         values = np.hstack(
             [
                 noise(rng, 20_000, DT, 2, N=1.0),
@@ -91,6 +95,7 @@ def test_a_slow_process_has_its_correlation_time() -> None:
         assert abs(one.value - 1.0) < 3.5 * one.sigma
 
 
+@pytest.mark.thorough
 def test_everything_scales_with_the_unit() -> None:
     values = noise(np.random.default_rng(8), 4000, DT, 6, N=1.0, K=0.2)
     one = estimate_noise([reduce_recording([recording(values, DT)])]).channels["gz"]
@@ -116,6 +121,7 @@ def test_bumps_are_bridged_and_change_nothing() -> None:
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_what_goes_on_all_the_time_is_no_disturbance() -> None:
     """A pump that beats every 1.5 s leaves no cell that is like it was without."""
     values = noise(np.random.default_rng(25), 6000, 0.01, 6, N=1.0)
@@ -144,6 +150,7 @@ def test_what_follows_the_temperature_is_taken_out() -> None:
             assert channel.temperature is None
 
 
+@pytest.mark.thorough
 def test_a_noisy_thermometer_does_not_make_a_coefficient_smaller() -> None:
     """Its own noise is in what it is divided by, where it shows nothing else."""
     rng = np.random.default_rng(26)

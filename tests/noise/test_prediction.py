@@ -85,18 +85,17 @@ def halves(values: Array, dt: float) -> tuple[list[bool], list[float]]:
 @pytest.mark.statistical
 def test_bands_hold_what_they_say() -> None:
     rng = np.random.default_rng(17)
-    held: list[bool] = []
-    for _ in range(2):
-        values = np.hstack(
-            [
-                noise(rng, 24_000, 0.1, 2, N=1.0),
-                noise(rng, 24_000, 0.1, 2, N=1.0, K=0.05),
-                noise(rng, 24_000, 0.1, 2, N=1.0, B=0.5),
-            ]
-        )
-        held += halves(values, 0.1)[0]
-    # neighbouring averaging times are not independent: about 30 that are
-    assert 0.5 < np.mean(held) < 0.87
+    values = np.hstack(
+        [
+            noise(rng, 24_000, 0.1, 2, N=1.0),
+            noise(rng, 24_000, 0.1, 2, N=1.0, K=0.05),
+            noise(rng, 24_000, 0.1, 2, N=1.0, B=0.5),
+        ]
+    )
+    held, _ = halves(values, 0.1)
+    # neighbouring averaging times are not independent: about 15 that are, of which
+    # 0.683 +- 0.12 are held
+    assert 0.43 < np.mean(held) < 0.93
 
 
 def test_sizes_are_drawn_from_their_likelihood() -> None:

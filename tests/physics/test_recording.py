@@ -16,7 +16,9 @@ def test_counts_that_are_written_in_decimals_lie_on_those(count: float) -> None:
     assert lsb_of(values) == pytest.approx(1e-3, rel=1e-6)
 
 
-@pytest.mark.parametrize("many", [5, 6, 8, 12, 40])
+@pytest.mark.parametrize(
+    "many", [5, 6, 8, *(pytest.param(n, marks=pytest.mark.thorough) for n in (12, 40))]
+)
 def test_few_values_that_lie_on_no_grid_show_none(many: int) -> None:
     """Four gaps may be multiples of a step by chance, and of a part of it sooner."""
     rng = np.random.default_rng(4)

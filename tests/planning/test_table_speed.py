@@ -55,7 +55,7 @@ def by_rows(session: Session) -> Calibration:
 
 
 @pytest.mark.parametrize(("estimate", "most"), [(by_means, 1.25), (by_rows, 1.6)])
-@pytest.mark.parametrize("spins", [6, 9])
+@pytest.mark.parametrize("spins", [pytest.param(6, marks=pytest.mark.thorough), 9])
 def test_the_estimate_is_as_uncertain_as_planned(
     tmp_path: Path,
     spins: int,

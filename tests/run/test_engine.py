@@ -147,6 +147,7 @@ def test_a_wrong_turn_is_said_before_anything_is_averaged(bench: Bench) -> None:
     assert events(bench).count("window") == 2
 
 
+@pytest.mark.thorough
 def test_a_position_never_reached_is_given_up(bench: Bench) -> None:
     bench.turner.slips = [(0, 0), (30, 5)]
     bench.turner.corrects = False
@@ -189,6 +190,7 @@ def test_who_never_holds_still_is_told_so_in_the_end(bench: Bench) -> None:
         bench.engine.run(hold_all(TWO_POSITIONS[:1], 30.0))
 
 
+@pytest.mark.thorough
 def test_a_person_in_the_wind_is_told_what_to_do_and_may_go_on(bench: Bench) -> None:
     turner = _restless(bench, times=7)
     Engine(turner.driver, turner, ABOUT, bench.recorder).run(
@@ -283,7 +285,7 @@ class Returning(InProcess):
     put_down_at = np.inf
 
 
-@pytest.mark.parametrize("later", [0.5, 12.0])
+@pytest.mark.parametrize("later", [0.5, pytest.param(12.0, marks=pytest.mark.thorough)])
 def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
     tmp_path: Path, later: float
 ) -> None:
@@ -296,6 +298,7 @@ def test_a_vehicle_that_comes_back_at_another_attitude_is_turned_again(
     assert events(bench).count("window") == 2
 
 
+@pytest.mark.thorough
 def test_a_mover_is_told_once_more_where_the_device_stands_wrong(bench: Bench) -> None:
     bench.turner.slips, bench.turner.corrects = [(0, 0), (30, 5)], False
     turner = bench.turner
@@ -433,7 +436,7 @@ def test_an_operator_may_stop(bench: Bench) -> None:
 def test_the_next_position_too_early_is_told_from_the_one_asked_for() -> None:
     """Every pair of the five, on bases tilted by up to a degree and a half."""
     rng = np.random.default_rng(6)
-    for _ in range(5):
+    for _ in range(2):
         tilt = direction_cosines(*np.deg2rad(rng.uniform(-1.5, 1.5, 2)))
         f = {i: _force(p, tilt) for i, p in enumerate(FIVE_POSITIONS)}
         for wanted, there in itertools.permutations(range(5), 2):
@@ -508,7 +511,7 @@ def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("step", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.01, 0.3)])
 def test_a_steady_temperature_is_no_warming_up(step: float, rate: float) -> None:
-    for seed in range(20):
+    for seed in range(8):
         warm_up = WarmUpWatch(0.5, 600.0)
         for block in _temperatures(seed, step, rate):
             warm_up.add(block)
@@ -564,6 +567,7 @@ def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
         yield Block.of(t, np.zeros((50, 3)), temperature=temperature)
 
 
+@pytest.mark.thorough
 def test_leaning_on_the_table_is_noticed(bench: Bench) -> None:
     """A slow lean of a tenth of a degree, for longer than the window is."""
     device, turner = bench.turner.driver.device, bench.turner
@@ -595,6 +599,7 @@ class InDegrees(InProcess):
         return block and replace(block, gyr=np.rad2deg(block.gyr))
 
 
+@pytest.mark.thorough
 def test_gyroscopes_in_degrees_are_asked_about_before_any_turn(tmp_path: Path) -> None:
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:
         made = make(recorder, InDegrees(VirtualDevice(seed=3)))
@@ -642,6 +647,7 @@ def test_a_slow_turn_tells_the_unit_too(
     assert units.unit == unit
 
 
+@pytest.mark.thorough
 def test_gyroscopes_in_rad_are_no_matter(bench: Bench) -> None:
     bench.engine.run(hold_all(FIVE_POSITIONS, 10.0))
     assert not any("gyr_unit" in text for text in bench.turner.told)

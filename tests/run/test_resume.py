@@ -217,6 +217,31 @@ def test_a_session_is_never_begun_twice(tmp_path: Path) -> None:
     assert description.read_description(tmp_path / "s" / "session.toml").positions
 
 
+def test_a_run_that_is_killed_goes_on_and_ends_with_right_numbers(
+    tmp_path: Path,
+) -> None:
+    bench, session = Bench(tmp_path, 11, "40"), tmp_path / "s"
+    try:
+        process = bench.start(session)
+        while process.poll() is None and not (
+            (session / MARKS).exists() and len(windows(session)) == 2
+        ):
+            sleep(0.005)
+        process.kill()
+        process.communicate()
+        before = windows(session)
+        assert 2 <= len(before) < 5 and not (session / "result.json").exists()
+        _, said = bench.start(session).communicate()
+        assert (session / "result.json").exists(), said
+        now = windows(session)
+        assert len(now) == 5 and {n: now[n] for n in before} == before
+        pulls = bench.pulls(session)
+        assert len(pulls) >= 11 and np.abs(pulls).max() < 4.5
+    finally:
+        bench.device.close()
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kind", ["killed", pytest.param("pulled", marks=pytest.mark.thorough)]
 )

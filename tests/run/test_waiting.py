@@ -49,7 +49,10 @@ def test_no_window_begins_in_a_turn(sways: bool) -> None:
     )
 
 
-@pytest.mark.parametrize(("creeps", "calls"), [(0.0, [20.0]), (4.0, [8.0])])
+@pytest.mark.parametrize(
+    ("creeps", "calls"),
+    [pytest.param(0.0, [20.0], marks=pytest.mark.thorough), (4.0, [8.0])],
+)
 def test_a_gust_is_no_turn_and_calls_nobody_anew(
     creeps: float, calls: list[float]
 ) -> None:

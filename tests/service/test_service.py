@@ -362,6 +362,7 @@ def test_a_process_of_its_own_serves_sessions_and_recordings(tmp_path: Path) -> 
     assert stored.serial == "A7" and stored.good
 
 
+@pytest.mark.thorough
 def test_a_recording_is_imported_with_what_is_said_of_it(tmp_path: Path) -> None:
     held = places(FACES, seconds=6.0, gap=6.0)
     block = recorded(Profile(), held, seed=2)

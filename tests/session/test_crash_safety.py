@@ -98,7 +98,7 @@ def test_a_description_cut_at_every_byte_is_read_or_refused_in_words(
             assert finding.text
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_changed_bytes_cost_their_batch_and_invent_nothing(
     data: st.DataObject, session: Path
@@ -160,7 +160,7 @@ def test_a_doubled_batch_counts_once(
     assert len(found) == BATCHES * ROWS and "twice" in says
 
 
-@pytest.mark.parametrize("times", [4, pytest.param(20, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("times", [2, pytest.param(20, marks=pytest.mark.thorough)])
 def test_a_killed_recording_keeps_every_batch_it_had_written(
     tmp_path: Path, times: int
 ) -> None:
@@ -312,6 +312,7 @@ def test_verify_says_each_thing_in_a_line(
     assert main(["verify", str(tmp_path / "nowhere")]) == 2
 
 
+@pytest.mark.thorough
 def test_a_session_that_was_run_and_diagnosed_is_held_to_its_schemas(
     recalibrated: Recalibrated, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded import block
+from session_folders import NINE, places, recorded, write_session
 
 from fieldcal.cli import main
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
+from fieldcal.sim_device.profile import Profile
 
 SIZE = 300_000
 ABOUT = {"format": 1, "position": [{"alpha_deg": 0.0, "beta_deg": 0.0}]}
@@ -82,13 +84,8 @@ def test_nothing_half_written_is_left(
 def test_results_are_written_whole_or_not_at_all(
     stick: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    practice = Path(__file__).resolve().parents[3] / "shared" / "practice" / "p01"
-    if not practice.is_dir():
-        pytest.skip("../shared/practice is not here")
-    copy = tmp_path / "p01"
-    copy.mkdir()
-    for name in ("session.toml", "samples.csv.gz"):
-        shutil.copyfile(practice / name, copy / name)
+    held = places(NINE[:5], seconds=6.0, gap=6.0)
+    copy = write_session(tmp_path / "s", recorded(Profile(), held), held)
     assert main(["solve", str(copy)]) in (0, 1)
     fill(stick)
     for kind in ("ardupilot", "json", "mcap"):

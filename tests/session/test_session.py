@@ -121,6 +121,7 @@ def test_a_gz_cut_off_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> N
         sample_files.read_samples(path)
 
 
+@pytest.mark.thorough
 def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path: Path) -> None:
     sizes = []
     with Recorder(tmp_path / "s", {"format": 1}) as recorder:

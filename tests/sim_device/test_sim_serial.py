@@ -92,7 +92,9 @@ def words(data: bytes) -> tuple[Array, Array]:
     return ms, payload
 
 
-@pytest.mark.parametrize("speed", ["5", "max"])
+@pytest.mark.parametrize(
+    "speed", [pytest.param("5", marks=pytest.mark.thorough), "max"]
+)
 def test_the_samples_are_those_of_the_device_at_any_speed(
     sims: list[Sim], speed: str
 ) -> None:

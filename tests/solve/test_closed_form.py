@@ -325,7 +325,7 @@ def test_tactical_bias_is_the_mean_less_what_is_known_of_the_earth() -> None:
     rng = np.random.default_rng(8)
     pulls = []
     nothing = np.full((5, 3), np.nan)
-    for _ in range(60):
+    for _ in range(30):
         psi = rng.uniform(-np.pi, np.pi)
         base = OMEGA * np.array(
             [np.cos(LATITUDE) * np.sin(psi), -np.sin(LATITUDE),

@@ -86,6 +86,7 @@ def test_few_orientations_leave_it_pointing_anywhere(tmp_path: Path) -> None:
     assert sigmas.min() > 1e-5 and np.abs((values - BIAS) / sigmas).max() < 4
 
 
+@pytest.mark.thorough
 def test_nothing_else_is_found_in_it(tmp_path: Path) -> None:
     session = held(tmp_path, 3)
     said = diagnose(session.block, session.about)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_circle import a_third
+from closed_circle import one_in
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from observed import BIAS, COUPLING, SCALE, G, observe, outputs, practice
@@ -104,12 +104,12 @@ def whitened(found: Sequence[Calibration], error: Array) -> Array:
 
 
 CASES = [
-    (Model(), TWO_POSITIONS, 100),
-    (Model("angle_offset"), FIVE_POSITIONS, 40),
+    pytest.param(Model(), TWO_POSITIONS, 100, marks=pytest.mark.thorough),
+    pytest.param(Model("angle_offset"), FIVE_POSITIONS, 40, marks=pytest.mark.thorough),
     pytest.param(Model("angle_offset"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     pytest.param(Model("base_tilt"), WIDE_POSITIONS, 60, marks=pytest.mark.thorough),
     (Model("base_tilt"), NINE, 25),
-    (Model(cross=True), SIX_FACES, 50),
+    pytest.param(Model(cross=True), SIX_FACES, 50, marks=pytest.mark.thorough),
 ]
 
 
@@ -148,12 +148,13 @@ def bumped(size: float) -> Disturb:
 
 @pytest.mark.parametrize(
     ("places", "size"),
-    a_third(
+    one_in(
+        5,
         [
             (some, size)
             for size in (3.0, 5.0, 10.0, 100.0, 3000.0)
             for some in (SIX, NINE)
-        ]
+        ],
     ),
 )
 def test_one_bad_position_is_doubted_and_never_spoils_the_interval(
@@ -212,7 +213,7 @@ def test_auto_takes_the_model_of_the_tilt_that_fits() -> None:
 def test_where_the_models_of_the_tilt_cannot_be_told_apart_both_are_covered() -> None:
     rng = np.random.default_rng(7)
     pulls = []
-    for k in range(40):
+    for k in range(24):
         small = (0.05 * rng.standard_normal(2)).tolist()
         tilt = {"base_deg": small} if k % 2 else {"offset_deg": small}
         u = outputs(FIVE_POSITIONS, **tilt)
@@ -266,6 +267,7 @@ def test_what_windows_scatter_by_is_an_rms_of_a_triad() -> None:
     assert window_scatter(mixture, (3, 4, 5)) == pytest.approx(1e-4 * np.sqrt(3))
 
 
+@pytest.mark.thorough
 def test_a_base_known_to_be_nearly_level_helps() -> None:
     rng = np.random.default_rng(11)
     places = (Position.deg(0, 0), Position.deg(45, 5), Position.deg(20, -5))
@@ -301,6 +303,7 @@ def set_by_hand(
     return really
 
 
+@pytest.mark.thorough
 def test_angles_that_are_loosely_set_are_in_the_uncertainty() -> None:
     rng = np.random.default_rng(12)
     found, error, chi2 = [], [], []
@@ -345,7 +348,7 @@ def test_positions_without_angles_among_others_are_used_by_their_length() -> Non
     rng = np.random.default_rng(21)
     places = (*FIVE_POSITIONS, *[Position("somewhere")] * 4)
     found, error, narrower = [], [], []
-    for _ in range(30):
+    for _ in range(18):
         u = np.vstack([outputs(FIVE_POSITIONS), by_hand(rng, 4)])
         u += SIGMA * rng.standard_normal(u.shape)
         found.append(solve(observe(places, u), tilt="none"))

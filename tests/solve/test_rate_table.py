@@ -93,7 +93,7 @@ def pulls(found: Calibration) -> Array:
     [
         (2e-3, "tactical"),
         pytest.param(1e-4, "tactical", marks=pytest.mark.thorough),
-        (1e-5, "navigation"),
+        pytest.param(1e-5, "navigation", marks=pytest.mark.thorough),
     ],
 )
 def test_axes_that_lie_level_count_and_the_earth_is_taken_out(
@@ -139,6 +139,7 @@ def test_left_in_as_printed_the_earth_is_in_the_bias(tmp_path: Path) -> None:
     assert abs(found.value("gyr_bias.y") - BIAS[1]) < 5e-6
 
 
+@pytest.mark.thorough
 def test_windows_on_a_table_are_no_rests_between_turns(tmp_path: Path) -> None:
     opened = session(tmp_path, 1e-4, 1)
     still = usable_windows(opened)

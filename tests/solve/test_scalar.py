@@ -94,6 +94,7 @@ def test_pulls_and_chi2_with_unequal_windows(cross: bool) -> None:
     assert 0.92 < (np.abs(pulls) < 1.96).mean() < 0.98
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("n", [8, pytest.param(14, marks=pytest.mark.thorough)])
 def test_scatter_beyond_the_windows_widens_the_intervals(n: int) -> None:
     rng = np.random.default_rng(n)

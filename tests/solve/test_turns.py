@@ -315,7 +315,7 @@ def published(i: int) -> Array:
 
 
 @pytest.mark.parametrize(
-    "i", [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 4))]
+    "i", [1, *(pytest.param(i, marks=pytest.mark.thorough) for i in (0, 2, 3, 4))]
 )
 def test_five_units_against_the_published_table(i: int) -> None:
     _, _, found = unit(i)
@@ -327,6 +327,7 @@ def test_five_units_against_the_published_table(i: int) -> None:
     assert np.sqrt((difference**2).mean()) < (0.004 if i == 1 else 0.002)
 
 
+@pytest.mark.thorough
 def test_where_the_published_table_differs_ours_predicts_the_turns_better() -> None:
     block, still, found = unit(1)
     bias = found.gyroscopes()[0]
@@ -339,9 +340,12 @@ def test_where_the_published_table_differs_ours_predicts_the_turns_better() -> N
         miss = []
         for k in range(len(still) - 1):
             part = (block.t >= still[k].end) & (block.t < still[k + 1].start)
-            attitude = Rotation.identity()
-            for rate in w[part]:
-                attitude = attitude * Rotation.from_rotvec(rate / 100)
+            steps = Rotation.from_rotvec(w[part] / 100)
+            while len(steps) > 1:  # neighbours in pairs, and a last one by itself
+                pairs = steps[: len(steps) // 2 * 2]
+                last = steps[len(pairs) :]
+                steps = Rotation.concatenate([pairs[::2] * pairs[1::2], last])
+            (attitude,) = steps
             miss.append(attitude.inv().apply(up[k]) - up[k + 1])
         misses.append(np.sqrt(np.mean(np.square(miss))))
     assert misses[0] < 0.5 * misses[1]
@@ -397,6 +401,7 @@ def test_solve_takes_the_turns_of_a_session_along(practised: Practise) -> None:
     assert not any("too weak" in w for w in result.warnings)
 
 
+@pytest.mark.thorough
 def test_solve_leaves_the_turns_out_when_told_to(practised: Practise) -> None:
     result = practised("p10", "--turns", "no").result
     assert "gyr_scale" not in result.groups

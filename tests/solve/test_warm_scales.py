@@ -160,6 +160,7 @@ def test_other_functions_without_physics_change_no_scale_factor() -> None:
         assert warm_scale(d, unknown(d, name, "ax")) is None
 
 
+@pytest.mark.thorough
 def test_scale_factors_beside_a_course_without_physics_are_those_at_the_end() -> None:
     """Drawn from the prior, all of what is said of the end is as far off as stated."""
     rng = np.random.default_rng(20)
@@ -210,7 +211,7 @@ def test_what_the_device_warms_up_by_unseen_is_in_its_scale_factors() -> None:
 def test_scale_factors_at_the_end_are_within_their_uncertainty() -> None:
     """Over devices whose scale factors change as the module says."""
     pulls = []
-    for seed in range(40):
+    for seed in range(20):
         rng = np.random.default_rng(seed)
         change = rng.normal(0.0, 0.25 * SIZE / 9.80665, 3)
         found = fitted(recording(change, rng.normal(0.0, 1e-3, (COUNT, 3))))

@@ -64,6 +64,7 @@ def assessed(folder: Path, temperature: float, seed: int) -> Calibration:
     return found
 
 
+@pytest.mark.thorough
 def test_sessions_at_several_temperatures_tell_what_the_next_one_costs(
     tmp_path: Path,
 ) -> None:

@@ -53,6 +53,7 @@ def later(block: Block, seconds: float) -> Block:
     return replace(block, t=block.t + seconds)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "concealed",
     [
@@ -165,6 +166,7 @@ def test_a_session_may_begin_at_any_time_of_the_device(
     assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
 
 
+@pytest.mark.thorough
 def test_the_twin_feels_the_earth_as_its_fixture_is_turned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -221,6 +223,7 @@ def test_of_a_line_the_replay_leaves_little(
     assert "Of the line it leaves" in said["says"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("concealed", "figure", "part"),
     [
@@ -340,7 +343,7 @@ def test_the_circle_closes(
     code, said, _ = diagnosed(first, capsys)
     assert code == 1 and [e["id"] for e in said["effects"]] == ["base_tilt"]
     twin = f"--virtual=--profile={first / 'twin.toml'}"
-    run = ["--headless", "--speed", "20", "--json", "--no-report", "--seconds", "20"]
+    run = ["--headless", "--speed", "60", "--json", "--no-report", "--seconds", "20"]
     # a chi-squared that is high by chance leaves the numbers less sure than is asked
     assert main(["run", "five_position", twin, *run, "-o", str(second)]) in (0, 1)
     result = json.loads(capsys.readouterr().out)

@@ -121,6 +121,7 @@ def test_durations_go_from_a_tenth_of_a_second_to_a_fourth_of_the_recording(
     assert (np.diff(found.tau) > 0).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.statistical
 def test_the_interval_holds_as_often_as_it_says() -> None:
     """White noise in two of three recordings, as chi-squared tells it."""

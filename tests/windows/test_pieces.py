@@ -48,15 +48,16 @@ def in_gusts(seed: int, off: Array | None = None) -> PiecedWindow:
 
 def test_pieces_add_up_and_the_error_of_their_mean_holds() -> None:
     pulls = []
-    for seed in range(16):
+    for seed in range(8):
         pieces = in_gusts(seed)
         found = pieces.average()
         if found is not None:
             assert len(pieces.gaps) == 2
             pulls.append((found.mean - AT_REST) / found.sigma)
-    assert len(pulls) >= 15, "chance alone gives up what was before"
+    assert len(pulls) >= 7, "chance alone gives up what was before"
     spread = float(np.sqrt(np.mean(np.square(pulls))))
-    assert 0.85 < spread < 1.15, spread
+    # of 48 numbers: the 2 sigma that 0.15 are of 96
+    assert 0.79 < spread < 1.21, spread
 
 
 def test_what_is_left_out_is_between_the_pieces() -> None:

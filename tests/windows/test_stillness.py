@@ -69,7 +69,7 @@ def test_a_turn_is_seen_and_rest_a_second_after_it(
     turn = next(i for i, (_, degrees) in enumerate(legs) if degrees)
     start = sum(seconds for seconds, _ in legs[:turn])
     end = start + legs[turn][0]
-    for seed in range(6):
+    for seed in range(3):
         seen = watch(stream(seed, legs, rate, level))
         inside = [s for t, s, _ in seen if start + 0.3 * (end - start) < t < end - 0.6]
         middle += sum(inside)
@@ -119,7 +119,7 @@ def test_a_device_carried_about_from_the_start_is_not_at_rest() -> None:
 
 
 @pytest.mark.statistical
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(cuts=st.lists(st.integers(0, 1000), max_size=10), seed=st.integers(0, 50))
 def test_how_samples_are_cut_into_blocks_does_not_matter(
     cuts: list[int], seed: int

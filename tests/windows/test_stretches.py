@@ -345,6 +345,7 @@ def test_a_rest_of_hours_is_one_stretch(monkeypatch: pytest.MonkeyPatch) -> None
         assert not any(start < at / 100 - 0.1 < end - 0.2 for start, end in found)
 
 
+@pytest.mark.thorough
 def test_a_device_that_warms_up_for_hours_is_at_rest_all_the_time() -> None:
     rng = np.random.default_rng(11)
     t = np.arange(72_000) / 10

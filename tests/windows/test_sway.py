@@ -66,7 +66,7 @@ def at_rest(t: Array, six: Array) -> tuple[Array, Array]:
     "hz",
     [
         (0.137,),
-        (0.2, 0.26, 0.31, 0.33),
+        pytest.param((0.2, 0.26, 0.31, 0.33), marks=pytest.mark.thorough),
         *(pytest.param((hz,), marks=pytest.mark.thorough) for hz in (0.1, 0.5)),
     ],
 )
@@ -84,7 +84,10 @@ def test_means_are_those_of_a_base_at_rest(hz: tuple[float, ...]) -> None:
     assert (np.sqrt((np.array(off) ** 2).mean(axis=0)) < 1.5 * white).all()
 
 
-@pytest.mark.parametrize("hz", [(0.137,), (0.2, 0.26, 0.31, 0.33)])
+@pytest.mark.parametrize(
+    "hz",
+    [pytest.param((0.137,), marks=pytest.mark.thorough), (0.2, 0.26, 0.31, 0.33)],
+)
 def test_accelerometers_alone_show_it_as_well(hz: tuple[float, ...]) -> None:
     """Mean forces as on firm ground; of what they turn about the vertical, nothing."""
     rng = np.random.default_rng(7)

@@ -62,11 +62,11 @@ def test_channels_that_wander_together_say_so() -> None:
 @pytest.mark.statistical
 def test_noise_alone_is_not_rejected() -> None:
     rejected = 0
-    for seed in range(60):
+    for seed in range(30):
         rng = np.random.default_rng(seed)
         for source in (white, low_passed(20), markov(0.5), flicker(0.03)):
             rejected += rejection(block_of(source(rng, 3000))) is not None
-    assert rejected <= 2, "of 240 windows"
+    assert rejected <= 1, "of 120 windows"
 
 
 @pytest.mark.statistical
@@ -181,7 +181,7 @@ def test_a_nan_is_a_missing_value() -> None:
 @pytest.mark.statistical
 def test_lost_samples_are_no_disturbance() -> None:
     rejected = 0
-    for seed in range(30):
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         block = block_of(white(rng, 3000))
         kept = np.sort(rng.choice(3000, 2200, replace=False))
@@ -192,7 +192,10 @@ def test_lost_samples_are_no_disturbance() -> None:
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("noise", [0.1, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize(
+    "noise",
+    [0.3, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0.1, 0.5, 1.0))],
+)
 def test_rounding_that_the_noise_does_not_hide_is_in_the_error(noise: float) -> None:
     errors, sigmas = [], []
     for seed in range(40):

@@ -86,10 +86,10 @@ def test_a_line_of_one_output_is_not_lost_among_those_of_its_triad() -> None:
 def test_noise_in_many_windows_makes_no_line_of_one_phase() -> None:
     """Frequencies are alike over 0.25 Hz there, and no local floor tells the noise."""
     said = 0
-    for seed in range(60):
+    for seed in range(20):
         spectra = compute_spectra(p := windows_of(100 + seed, 0.0))
         said += highest_peak(p, spectra, []) is not None
-    assert said <= 1
+    assert not said
 
 
 def test_a_line_comes_before_tremor_that_is_louder_at_the_same_frequencies() -> None:

@@ -48,7 +48,7 @@ def test_flicker_has_no_lines(seed: int) -> None:
     assert lines(noise(seed, 1.0)) == []
 
 
-@pytest.mark.parametrize("hz", [0.08, 17.0])
+@pytest.mark.parametrize("hz", [0.08, pytest.param(17.0, marks=pytest.mark.thorough)])
 def test_a_line_is_found_beside_flicker(hz: float) -> None:
     six = noise(3, 1.0)
     level = WHITE * np.sqrt((1 + 1.0 / hz) / N)
@@ -58,6 +58,7 @@ def test_a_line_is_found_beside_flicker(hz: float) -> None:
     assert abs(found - hz) < 1e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(s, marks=pytest.mark.thorough) for s in (1, 2))]
 )

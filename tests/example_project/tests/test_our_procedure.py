@@ -3,10 +3,13 @@
 import pytest
 from our_procedure import GRAVITY, recalibrate
 
+SPEED = 40
+"""A device at full speed sends far more than these tests need, and all is read."""
+
 
 @pytest.mark.parametrize("link", ["serial", "can"])
 def test_our_procedure_finds_what_is_concealed(virtual_imu, link):
-    device = virtual_imu(link, acc_bias=(0.1, -0.2, 0.3), gravity=GRAVITY)
+    device = virtual_imu(link, speed=SPEED, acc_bias=(0.1, -0.2, 0.3), gravity=GRAVITY)
     found = recalibrate(device.url, device.turn)
     device.assert_calibration(found, within={"acc_bias": 0.05, "gyr_bias": 2e-4})
 
@@ -17,14 +20,14 @@ def test_their_five_positions_over_mavlink(virtual_imu):
 
 
 def test_a_wrong_procedure_is_caught(virtual_imu):
-    device = virtual_imu("serial", gravity=GRAVITY)
+    device = virtual_imu("serial", speed=SPEED, gravity=GRAVITY)
     found = recalibrate(device.url, lambda alpha, beta: device.turn(-alpha, beta))
     with pytest.raises(pytest.fail.Exception, match="the calibration is wrong: acc"):
         device.assert_calibration(found)
 
 
 def test_a_bump_is_not_averaged_over(virtual_imu):
-    device = virtual_imu("serial", gravity=GRAVITY)
+    device = virtual_imu("serial", speed=SPEED, gravity=GRAVITY)
 
     def turn_and_bump(alpha: float, beta: float) -> float:
         there = device.turn(alpha, beta)

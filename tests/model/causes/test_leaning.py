@@ -154,6 +154,7 @@ def test_what_leans_is_no_change_of_a_bias(seed: int, lean: float) -> None:
         assert one.value == pytest.approx(true, abs=4 * one.sigma)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "seed", [2, *(pytest.param(s, marks=pytest.mark.thorough) for s in (3, 4))]
 )

@@ -61,8 +61,14 @@ def explained(seed: int, way: int | None) -> Explanation:
     return explain(prepare_recording(lossy(seed, way), parse_description(tables)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
-    ("seed", "way"), [(1, 0), pytest.param(2, 4, marks=pytest.mark.thorough), (3, None)]
+    ("seed", "way"),
+    [
+        (1, 0),
+        pytest.param(2, 4, marks=pytest.mark.thorough),
+        pytest.param(3, None, marks=pytest.mark.thorough),
+    ],
 )
 def test_the_turn_that_was_not_followed_is_told_and_no_other(
     seed: int, way: int | None

@@ -74,7 +74,7 @@ def test_a_walk_is_measured_beside_what_settles(size: float) -> None:
     assert np.median(shares) < 0.7  # before the rows it is 0.9
 
 
-@pytest.mark.parametrize("size", [2e-3, 1e-2])
+@pytest.mark.parametrize("size", [2e-3, pytest.param(1e-2, marks=pytest.mark.thorough)])
 def test_flicker_is_measured_and_is_no_walk(size: float) -> None:
     """At its own size: and cosines are as many as are above the noise, (5)."""
     found = []

@@ -189,6 +189,7 @@ def test_between_windows_a_device_that_only_sways_turns_by_nothing() -> None:
         assert abs(angle) < np.deg2rad(0.004)
 
 
+@pytest.mark.thorough
 def test_means_of_windows_pull_right(tmp_path: Path) -> None:
     pulls = []
     for seed in range(2):
@@ -246,6 +247,7 @@ def test_who_says_that_it_sways() -> None:
     assert not description.parse_description({"format": 1}).base_sways
 
 
+@pytest.mark.thorough
 def test_waves_take_slow_noise_with_them_and_the_rows_know_it(tmp_path: Path) -> None:
     """In the band of the waves hardly any noise is left: it is in their uncertainty."""
     block = played(8, IRREGULAR.format(40, 30), IRREGULAR.format(200, 120))

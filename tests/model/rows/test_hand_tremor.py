@@ -144,6 +144,7 @@ def off_and_told(angles: Array, seeds: range) -> tuple[Array, Array]:
     return off, np.array([one.sd[:, 3:] for one in shown])
 
 
+@pytest.mark.thorough
 def test_mean_rates_are_as_unsteady_as_the_hand_was_there_about_each_axis() -> None:
     """Angles a hundred times as large in one window as in another."""
     angles = np.geomspace(2e-4, 2e-2, 15).reshape(5, 3)[:, [2, 0, 1]]
@@ -214,6 +215,7 @@ def test_a_table_that_trembles_turns_no_force() -> None:
     assert 0.8 < np.sqrt(np.mean(np.square(along))) < 1.2
 
 
+@pytest.mark.thorough
 def test_where_it_is_quick_in_some_windows_the_others_tell_the_noise() -> None:
     """Half of them tremble so quickly that one sample shows it from the next."""
     angles = np.zeros((12, 3))
@@ -240,7 +242,7 @@ def test_of_one_that_is_held_in_some_windows_their_means_are_unsteady() -> None:
     angles = np.zeros((12, 3))
     angles[7] = 3e-3
     pulls, others = [], []
-    for seed in range(14):
+    for seed in range(7):
         source = recording(angles, seed, QUICKLY)
         found = rows_in_a_hand(source)
         assert found.x.position.tolist() == list(range(12))

@@ -21,6 +21,7 @@ FADING = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "sessions"),
     [

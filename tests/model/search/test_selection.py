@@ -128,15 +128,15 @@ def test_where_nothing_is_nothing_is_said() -> None:
     """Of what is said with half a chance at least, and not of what is suspected."""
     said, empty = 0, 0
     session = Session.of(ladder(2), SUSPECTED)
-    for seed in range(200):
+    for seed in range(100):
         rng = np.random.default_rng(1000 + seed)
         tau = unstable() * np.exp(rng.normal(-1.5, priors.AXES_LOG_SPREAD, 7))
         search = session.search(session.noise(rng, tau))
         best = search.run()
         empty += not best.members
         said += bool(Posterior(search, best).probable_causes())
-    assert said <= 2
-    assert empty >= 198
+    assert said <= 1
+    assert empty >= 99
 
 
 def with_sizes(empty: Set, groups: Sequence[Group], sizes: Sequence[int]) -> float:

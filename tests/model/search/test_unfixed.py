@@ -37,6 +37,7 @@ def explained(seed: int) -> Explanation:
         return explain(prepare_recording(session.block, session.about))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_three_effects_are_found_of_which_none_is_seen_alone(seed: int) -> None:
     """What bends |f| bends the turns as well, until accelerometers are set right."""

@@ -208,12 +208,14 @@ class Window:
         `target` is the wanted standard error of each accelerometer mean, m/s^2.
         """
         sigma = self.sigma[:3]
-        if target is not None and np.max(sigma) <= target:
+        if not np.isfinite(sigma).any():
+            return None
+        if target is not None and np.nanmax(sigma) <= target:
             return (
                 f"each accelerometer mean is known to {np.nanmax(sigma):.2g} m/s², "
                 f"{target:.2g} m/s² was wanted"
             )
-        if self.elapsed < SETTLED_S or not np.isfinite(sigma).any():
+        if self.elapsed < SETTLED_S:
             return None
         twice = np.sqrt(
             self._mean_error().sigma_of_doubled[:6] ** 2 + self._rounding_variance()
@@ -223,7 +225,7 @@ class Window:
             return (
                 f"the bias wanders as much as is averaged out: {np.nanmax(sigma):.2g} "
                 f"m/s² is reached, and {2 * self.elapsed:.0f} s would give "
-                f"{twice.max():.2g} m/s²"
+                f"{np.nanmax(twice):.2g} m/s²"
             )
         return None
 

@@ -27,7 +27,6 @@ def found_in(folder: Path, angles: tuple[tuple[float, float], ...]) -> Diagnosis
     return diagnose(session.block, session.about)
 
 
-@pytest.mark.thorough
 def test_the_position_that_is_asked_for_is_on_the_ladder_and_decides(
     tmp_path: Path,
 ) -> None:

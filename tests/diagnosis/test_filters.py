@@ -22,7 +22,6 @@ def told(found: Diagnosis, name: str) -> dict[str, tuple[float, float]]:
     }
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("acc", "gyr"), [(TAU, TAU), pytest.param(TAU, 0.02, marks=pytest.mark.thorough)]
 )

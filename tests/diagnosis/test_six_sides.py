@@ -55,7 +55,6 @@ def _up(rng: np.random.Generator, side: Array) -> Rotation:
 SEEDS = [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 5, 6, 7))]
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_every_triad_has_is_named_and_nothing_in_its_place(
     tmp_path: Path, seed: int, capsys: pytest.CaptureFixture[str]

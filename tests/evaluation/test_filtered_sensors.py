@@ -23,7 +23,6 @@ DEVICE = Profile(
 )  # fmt: skip
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("known_s", "right"),
     [

@@ -188,3 +188,22 @@ def test_accelerometers_and_gyroscopes_may_have_times_of_their_own(
         assert np.nanmax(np.abs(apart)) <= 0.5 / HZ
         np.testing.assert_allclose(block.gyr[60:90, 0], np.sin(3 * (1.7e9 + block.gyr[
             60:90, 1])), atol=1e-5)  # fmt: skip
+
+
+def test_a_part_of_a_file_without_rows_is_not_its_end(tmp_path: Path) -> None:
+    """Accelerometers and gyroscopes in files of their own, in unlike pieces."""
+    import pyarrow as pa
+
+    rows, files = face(0, 0.4), []
+    parts = {"acc": ((0, 1, 2, 3), (150, 150)), "gyr": ((0, 4, 5, 6), ())}
+    for name, (columns, cuts) in parts.items():
+        names = [HEADING.split(",")[i] for i in columns]
+        files.append(str(tmp_path / f"{name}.feather"))
+        schema = pa.schema([(n, pa.float64()) for n in names])
+        with pa.ipc.new_file(files[-1], schema) as written:
+            for part in np.split(rows, cuts):
+                columns_of_part = [part[:, i] for i in columns]
+                written.write_batch(pa.record_batch(columns_of_part, schema=schema))
+    out = tmp_path / "out"
+    assert main(["import", *files, "--join", "-o", str(out), "--gravity", str(G)]) == 0
+    np.testing.assert_allclose(Session.open(out).block.six, rows[:, 1:])

@@ -88,3 +88,17 @@ def test_a_time_that_steps_back_for_another_reason_stays() -> None:
         clock = RowTimes(ReadOptions(("t",), time_unit="s"))
         np.testing.assert_array_equal(clock.of({"t": t}, len(t)), t)
         assert not clock.says
+
+
+@pytest.mark.parametrize("cut", [0, 99, 100, 101, 102])
+def test_a_time_that_leaps_ahead_within_the_first_seconds_begins_nothing_anew(
+    cut: int,
+) -> None:
+    """The rows behind keep their times; the wrong one is left out by whoever judges."""
+    t = 0.01 * np.arange(400)
+    t[100] = 1e6
+    clock = RowTimes(ReadOptions(("t",), time_unit="s"))
+    parts = [t[:cut], t[cut:]] if cut else [t]
+    got = np.concatenate([clock.of({"t": part}, len(part)) for part in parts])
+    np.testing.assert_array_equal(got, t)
+    assert not clock.says

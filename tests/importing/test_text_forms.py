@@ -118,6 +118,7 @@ def test_any_lines_have_forms_that_can_be_undone(lines: list[str]) -> None:
         "Force in m/s^2\tX: {}\tY: {}\tZ: {}\tTurn in rad/s\tX: {}\tY: {}\tZ: {}",
         "Ax={} m/s²\tAy={} m/s²\tAz={} m/s²\tGx={} rad/s\tGy={} rad/s\tGz={} rad/s",
         "ax {} ay {} az {} gx {} gy {} gz {}",
+        "A X: {} A Y: {} A Z: {} G X: {} G Y: {} G Z: {}",
         "RAW. Acc [ {}, {}, {} ], Gyr [ {}, {}, {} ], Tmp [ 25.1 ]",
         "--- Accelerometer (m/s^2) ---\nX: {} Y: {} Z: {}\n"
         "--- Gyroscope (rad/s) ---\nX: {} Y: {} Z: {}",

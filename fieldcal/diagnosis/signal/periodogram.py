@@ -167,7 +167,7 @@ def window_spectrum(pieces: WindowSamples) -> Spectrum:
     n = 1 << (length - 1).bit_length()
     total, count = np.zeros((6, n // 2 + 1)), 0
     for samples, t in zip(pieces.samples, pieces.times, strict=True):
-        parts = max(1, len(samples) // PERIODOGRAM_SAMPLES)
+        parts = -(-len(samples) // PERIODOGRAM_SAMPLES)
         for part in np.array_split(np.arange(len(t)), parts):
             taper = np.hanning(len(part))
             tapered = samples[part].T * taper

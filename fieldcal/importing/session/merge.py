@@ -199,8 +199,9 @@ class MergedFiles(SeveralFiles):
         row = 0
         while True:
             for i, flow in enumerate(flows):
-                if not len(waiting[i]):
-                    waiting[i] = next(flow, waiting[i])
+                # a block without rows is not the end
+                while not len(waiting[i]) and (block := next(flow, None)) is not None:
+                    waiting[i] = block
             n = min(len(block) for block in waiting)
             if not n:
                 break

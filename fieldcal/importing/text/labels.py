@@ -119,7 +119,7 @@ def labelled_values(line: str) -> list[Labelled]:
         values = re.findall(_NUMBER, said[1]) if said else []
         if said is None or len(values) not in (1, len(AXES)):
             return []
-        label, moved = _split_unit(label)
+        label, moved = _split_unit(label, read)
         if moved and read:
             read = _with_unit(read, moved)
         label, unit = _complete_label(label, read)
@@ -199,10 +199,22 @@ def _split_labels(line: str) -> list[tuple[str, str]]:
     return [*zip(labels, texts[1:], strict=True)]
 
 
-def _split_unit(label: str) -> tuple[str, str]:
-    """A label, and the unit of the value before it that stands before it."""
+def _split_unit(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
+    """A label, and the unit of the value before it that stands before it.
+
+    In ``A Z: 3 G X: 4 G Y: 5`` the G is no unit: A X has been read, and G is what the
+    axis before begins with.
+    """
     first, _, rest = label.partition(" ")
-    return (rest.strip(), first) if rest.strip() and parse_unit(first) else (label, "")
+    rest = rest.strip()
+    if not rest or not parse_unit(first):
+        return label, ""
+    names = [name for name, _, _ in read]
+    own = rest.lower() in AXES and (
+        _complete_label(rest, read)[0] in names
+        or (bool(names) and names[-1].rpartition(" ")[0] == first)
+    )
+    return (label, "") if own else (rest, first)
 
 
 def _complete_label(

@@ -109,7 +109,7 @@ class RowTimes:
     def __init__(self, wanted: ReadOptions) -> None:
         self._wanted, self.says = wanted, list[str]()
         self._seen, self._sum, self._offset = 0, 0.0, 0.0
-        self._last = self._usual = np.nan
+        self._earlier = self._last = self._usual = np.nan
         self._anew: list[float] = []
         self._spread = BatchTimes(wanted.batch) if wanted.batch else None
 
@@ -137,19 +137,22 @@ class RowTimes:
             if name in columns:
                 t = t + columns[name] * size
         known = np.flatnonzero(np.isfinite(t))
-        steps = np.diff(t[known], prepend=self._last)
+        earlier = np.concatenate([[self._earlier, self._last], t[known]])
+        steps = np.diff(earlier[1:])
         forward = steps[steps > 0]
         self._usual = float(np.median(forward)) if len(forward) else self._usual
         offsets = np.full(len(t), self._offset)
         for i in np.flatnonzero(steps < 0).tolist():
             began = float(t[known[i]])
+            if began > earlier[i]:
+                continue  # it is the time before that leaps, by itself
             before = began - steps[i]
             period = self._period(before, began, scale)
             if not period and _lasts(t[known[i : i + 2]], before):
                 period = self._started(before, began)
             offsets[known[i] :] += period
             self._offset += period
-        self._last = float(t[known[-1]]) if len(known) else self._last
+        self._earlier, self._last = earlier[-2:].tolist()
         t = t + offsets
         return t
 

@@ -16,7 +16,6 @@ from fieldcal.model.system.turn_columns import TurnColumns, columns_of_turns
 from fieldcal.model.turns.turn import Turn
 
 
-@pytest.mark.thorough
 def test_all_turns_at_once_are_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """With every column that a session has, on the way as well."""
     seen: list[tuple[TurnColumns, TurnColumns]] = []

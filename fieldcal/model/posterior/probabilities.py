@@ -226,8 +226,9 @@ class Posterior:
         for name in self.cause_names(self.best):
             others = sorted(self.alternatives[name].items(), key=lambda i: -i[1].score)
             names = [n for n, _ in others]
+            # a function that no effect makes is no other name for an effect
             strange = self._kind(name) == "unknown"
-            alike = [n for n in names if not strange or self._kind(n) == "unknown"]
+            alike = [n for n in names if (self._kind(n) == "unknown") == strange]
             members = tuple(m for m in self.best.members if m[0].name == name)
             one = ProbableCause(name, members, np.nan, tuple(names))
             probability = self.probability([name, *alike], one.triads)

@@ -73,8 +73,8 @@ class WidenedSet:
         """Rise of ln Z with a cause, without its prior probability."""
         rest = tuple(m for m in self.set.members if m[0].key != key)
         less = self.search.evaluate(rest, Search.sizes_of(self.set, rest))
-        found = self.set.score - self.search.log_chance(self.set.members)
-        return float(found - less.score + self.search.log_chance(rest))
+        found = self.set.score - self.search.set_log_prior(self.set.members)
+        return float(found - less.score + self.search.set_log_prior(rest))
 
     def estimate(self, columns: Index) -> tuple[Array, Array]:
         """Values and covariance of some columns of the set."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.evidence.gram import Eliminated, evidence_gains
-from fieldcal.model.evidence.sets import log_chances
+from fieldcal.model.evidence.sets import variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Member
 from fieldcal.model.search.selection import Search
 from fieldcal.solve.explanations import WeightedExplanation, has_equation
@@ -121,7 +121,7 @@ def _scores(search: Search, members: tuple[Member, ...], member: Member) -> Arra
     inner, rhs = rest.schur_complement(every, np.ones(len(every)))
     alone = np.diag(rest.rows.matrix(every, every))
     beside = [m for m in members if m[0].key != member[0].key]
-    score = log_chances(member[0], beside) + np.zeros(len(others))
+    score = variant_log_priors(member[0], beside) + np.zeros(len(others))
     width = np.array([len(g.columns) for g in others])
     for k in np.unique(width).tolist():
         some = np.flatnonzero(width == k)

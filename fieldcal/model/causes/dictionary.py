@@ -139,18 +139,18 @@ class Dictionary(ColumnTable):
         return [EqualWidthGroups.of(some) for some in found.values()]
 
     @cached_property
-    def log_chances(self) -> Array:
-        """Log prior probability of each variant of every cause."""
+    def cause_log_priors(self) -> Array:
+        """Log prior probability of a variant of each cause, (causes,)."""
         return np.array([np.log(c.chance / len(c.variants)) for c in self.causes])
 
     @cached_property
     def typical(self) -> Array:
-        """The largest typical size of each column."""
-        out = np.ones(self.width)
+        """The largest typical size of each column; 1 if it is in no cause."""
+        out = np.zeros(self.width)
         for cause in self.causes:
             for group in cause.variants:
-                out[group.columns] = group.typical
-        return out
+                np.maximum.at(out, group.columns, group.typical)
+        return np.where(out > 0, out, 1.0)
 
     @cached_property
     def shown(self) -> NDArray[np.bool_]:
@@ -317,5 +317,5 @@ class Dictionary(ColumnTable):
     def _clear_caches(self) -> None:
         """Discard cached values that depend on the causes."""
         self.shown = np.pad(self.shown, (0, self.width - len(self.shown)))
-        for cached in ("groups_by_width", "log_chances", "typical"):
+        for cached in ("groups_by_width", "cause_log_priors", "typical"):
             self.__dict__.pop(cached, None)

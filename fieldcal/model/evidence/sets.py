@@ -51,7 +51,7 @@ class Set:
         return frozenset(c.key for c, _ in self.members)
 
 
-def log_chances(cause: Cause, there: Iterable[Member]) -> Array:
+def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.
 
     One value for each variant, or () if all variants have the same. A cause that begins
@@ -112,15 +112,15 @@ class Sets:
             sizes, score, wide = sizing.run()
             rows = self.gram_at(sizes.instability)
             state = Eliminated.of(rows, sizing.columns, wide)
-            score += self.log_chance(members)
+            score += self.set_log_prior(members)
             self.visited[key] = Set(members, sizes, score, state)
         return self.visited[key]
 
-    def log_chance(self, members: Iterable[Member]) -> float:
+    def set_log_prior(self, members: Iterable[Member]) -> float:
         """Log prior probability of the causes of a set."""
         total, before = 0.0, list[Member]()
         for cause, group in members:
-            shares = log_chances(cause, before)
+            shares = variant_log_priors(cause, before)
             own = shares[cause.variants.index(group)] if shares.ndim else shares
             total += float(own)
             before.append((cause, group))

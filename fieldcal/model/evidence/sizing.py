@@ -65,18 +65,22 @@ class Sizes:
 
 def instability_log_prior(
     instability: Sequence[int] | Array,
-    unstable: Array,
+    typical_instability: Array,
     density: Array = INSTABILITY_LOG_DENSITY,
 ) -> Any:
     """Log prior of instabilities (..., 7): those of a triad's axes are similar.
 
-    `instability` are indices in `priors.SIZES`. `unstable` (7,) is the typical size, 0
-    where there is none; `density` the log prior of each of `priors.SIZES`.
+    Parameters
+    ----------
+    instability : indices in `priors.SIZES`
+    typical_instability : (7,), 0 where there is none
+    density : log prior of each of `priors.SIZES`
+
     """
     sizes = np.asarray(instability, dtype=float)
     total = np.zeros(sizes.shape[:-1])
     for triad in TRIADS:
-        if on := [c for c in triad if unstable[c] > 0]:
+        if on := [c for c in triad if typical_instability[c] > 0]:
             total = total + triad_log_prior(sizes[..., on], density)
     return total if total.ndim else float(total)
 
@@ -84,9 +88,9 @@ def instability_log_prior(
 def triad_log_prior(some: Array, density: Array = INSTABILITY_LOG_DENSITY) -> Array:
     """Log prior of the instabilities (..., n) of the axes of one triad, (...)."""
     middle = some.sum(axis=-1) / some.shape[-1]
-    apart = (some - middle[..., None]) * (LOG_SIZE_STEP / priors.AXES_LOG_SPREAD)
+    distance = (some - middle[..., None]) * (LOG_SIZE_STEP / priors.AXES_LOG_SPREAD)
     likely = np.interp(middle, np.arange(len(density)), density)
-    out: Array = likely - 0.5 * (apart * apart).sum(axis=-1)
+    out: Array = likely - 0.5 * (distance * distance).sum(axis=-1)
     return out
 
 
@@ -95,11 +99,15 @@ def gain_terms(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, A
 
     `at` (..., k) are their indices in the state, `v` their sizes in it.
     """
-    wide, size = state.prior_sigma[at], np.asarray(v)[..., None]
+    prior_sigma, size = state.prior_sigma[at], np.asarray(v)[..., None]
     cov = state.inverse[at[..., :, None], at[..., None, :]]
-    part, axes = np.linalg.eigh(cov / wide[..., :, None] / wide[..., None, :])
+    part, axes = np.linalg.eigh(
+        cov / prior_sigma[..., :, None] / prior_sigma[..., None, :]
+    )
     part = np.clip(part, MIN_VARIANCE_RATIO, 1.0)
-    along = (np.swapaxes(axes, -1, -2) @ (state.estimate[at] / wide)[..., None])[..., 0]
+    along = (np.swapaxes(axes, -1, -2) @ (state.estimate[at] / prior_sigma)[..., None])[
+        ..., 0
+    ]
     return (1 / part - 1) / size**2, (along / (part * size)) ** 2
 
 
@@ -127,9 +135,11 @@ def most_probable_axis_size(
     """
     strength, power = gain_terms(state, at, v)
     middle, part = triad
-    apart = np.linspace(-4.0, 4.0, REFINED_SIZES)
-    near = middle * np.exp(priors.AXES_LOG_SPREAD * apart)
-    top = int(np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * apart**2))
+    distance = np.linspace(-4.0, 4.0, REFINED_SIZES)
+    near = middle * np.exp(priors.AXES_LOG_SPREAD * distance)
+    top = int(
+        np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * distance**2)
+    )
     best = float(near[top])
     share = best**2 * strength / (1 + best**2 * strength)
     alike = priors.AXES_LOG_SPREAD**-2
@@ -161,12 +171,15 @@ class Sizing:
         self,
         dictionary: Dictionary,
         gram: Gram,
-        unstable: Array,
+        typical_instability: Array,
         members: tuple[Member, ...],
         start: Sizes | None,
     ) -> None:
         self.groups: list[Group] = [*dictionary.always, *(g for _, g in members)]
-        self.count, self.typical_instability = len(dictionary.always), unstable
+        self.count, self.typical_instability = (
+            len(dictionary.always),
+            typical_instability,
+        )
         begin = start or Sizes(
             (UNIT_INDEX,) * self.count, (UNIT_INDEX,) * 7, (UNIT_INDEX,) * len(members)
         )
@@ -178,7 +191,7 @@ class Sizing:
         self.places = [slice(a, b) for a, b in pairwise(widths)]
         self.gram = gram.select_columns(self.columns)
         self._states: dict[tuple[int, ...], Eliminated] = {}
-        self._gained: dict[tuple[int, ...], Array] = {}
+        self._channel_gains: dict[tuple[int, ...], Array] = {}
 
     def run(self) -> tuple[Sizes, float, Array]:
         """Iterate until no size changes.
@@ -190,10 +203,10 @@ class Sizing:
         profiles: list[Array] = []
         for _ in range(MAX_ROUNDS):
             before = (*self.sizes, *self.instability)
-            profiles = self._groups(free)
+            profiles = self._maximise_groups(free)
             for triad in TRIADS:
                 if some := [c for c in triad if c in channels]:
-                    profiles += self._triad(some)
+                    profiles += self._maximise_triad(some)
             if (*self.sizes, *self.instability) == before:
                 break
         score = self.eliminated().score
@@ -205,7 +218,7 @@ class Sizing:
         found = Sizes(
             tuple(self.sizes[:k]), tuple(self.instability), tuple(self.sizes[k:])
         )
-        return found, score, self._wide()
+        return found, score, self._prior_sigma()
 
     def eliminated(self) -> Eliminated:
         """The set eliminated at the current sizes; cached."""
@@ -213,10 +226,10 @@ class Sizing:
         if key not in self._states:
             tau = priors.SIZES[self.instability] * self.typical_instability
             rows = self.gram.with_instability(tau)
-            self._states[key] = Eliminated.of(rows, self.columns, self._wide())
+            self._states[key] = Eliminated.of(rows, self.columns, self._prior_sigma())
         return self._states[key]
 
-    def _wide(self) -> Array:
+    def _prior_sigma(self) -> Array:
         parts = []
         for group, size in zip(self.groups, self.sizes, strict=True):
             free = float(priors.SIZES[size])
@@ -227,7 +240,7 @@ class Sizing:
             )
         return np.concatenate([np.empty(0), *parts])
 
-    def _groups(self, free: Sequence[int]) -> list[Array]:
+    def _maximise_groups(self, free: Sequence[int]) -> list[Array]:
         """F over the sizes of each of some groups; each size is set to the maximum.
 
         Each is sought with the others at their current sizes. Gains calculated for all
@@ -263,7 +276,7 @@ class Sizing:
             )
         return out
 
-    def _triad(self, channels: Sequence[int]) -> list[Array]:
+    def _maximise_triad(self, channels: Sequence[int]) -> list[Array]:
         """F over the instabilities of some channels of a triad; sets them.
 
         They are set together, since their prior keeps a single one near the others. If
@@ -272,44 +285,48 @@ class Sizing:
         small, but not all of them.
         """
         before, state = list(self.instability), self.eliminated()
-        profiles = self._together(channels)
-        if self.instability == before or self._level() >= (
+        profiles = self._maximise_jointly(channels)
+        if self.instability == before or self._score_of_instability() >= (
             state.score
             + float(instability_log_prior(before, self.typical_instability))
             - LOG_ROUNDING_ERROR
         ):
             return profiles
         self.instability = before
-        return [self._one(c, channels) for c in channels]
+        return [self._maximise_channel(c, channels) for c in channels]
 
-    def _level(self) -> float:
+    def _score_of_instability(self) -> float:
         """F at the current sizes, without the priors of the groups' sizes."""
         return self.eliminated().score + float(
             instability_log_prior(self.instability, self.typical_instability)
         )
 
-    def _one(self, c: int, channels: Sequence[int]) -> Array:
+    def _maximise_channel(self, c: int, channels: Sequence[int]) -> Array:
         """F over the instabilities of one channel; sets it to the maximum."""
-        profile = self._beside(c, channels, self._channel(c))
+        profile = self._profile_with_prior(c, channels, self._channel_gain(c))
         self.instability[c] = int(np.argmax(profile))
         return profile
 
-    def _together(self, channels: Sequence[int]) -> list[Array]:
+    def _maximise_jointly(self, channels: Sequence[int]) -> list[Array]:
         """F over the instabilities of each channel; sets all to the joint maximum."""
-        alone = [self._channel(c) for c in channels]
+        separate = [self._channel_gain(c) for c in channels]
         index = np.arange(len(LOG_DENSITY))
-        apart = np.subtract.outer(index, index) * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD
-        best = [gain - 0.5 * apart**2 for gain in alone]  # by middle, size
+        distance = (
+            np.subtract.outer(index, index) * LOG_SIZE_STEP / priors.AXES_LOG_SPREAD
+        )
+        best = [gain - 0.5 * distance**2 for gain in separate]  # by middle, size
         total = sum(b.max(axis=1) for b in best) + INSTABILITY_LOG_DENSITY
         middle = int(np.argmax(total))
         for c, one in zip(channels, best, strict=True):
             self.instability[c] = int(np.argmax(one[middle]))
         return [
-            self._beside(c, channels, one)
-            for c, one in zip(channels, alone, strict=True)
+            self._profile_with_prior(c, channels, one)
+            for c, one in zip(channels, separate, strict=True)
         ]
 
-    def _beside(self, c: int, channels: Sequence[int], gain: Array) -> Array:
+    def _profile_with_prior(
+        self, c: int, channels: Sequence[int], gain: Array
+    ) -> Array:
         """F over the instabilities of channel c, except for a constant.
 
         `gain` is its gain. The others among `channels`, which are similar, are fixed.
@@ -318,20 +335,20 @@ class Sizing:
         every[:, channels.index(c)] = np.arange(len(gain))
         return gain + triad_log_prior(every)
 
-    def _channel(self, c: int) -> Array:
+    def _channel_gain(self, c: int) -> Array:
         """Gain over the instabilities of one channel, the others fixed; cached."""
         key = (c, *self.sizes, *self.instability)
-        if key not in self._gained:
-            self._gained[key] = self._gained_by(c)
-        return self._gained[key]
+        if key not in self._channel_gains:
+            self._channel_gains[key] = self._calculate_channel_gain(c)
+        return self._channel_gains[key]
 
-    def _gained_by(self, c: int) -> Array:
+    def _calculate_channel_gain(self, c: int) -> Array:
         """Calculate the gain over the instabilities of one channel."""
         inner, rhs = self.eliminated().schur_complement_of_means(c, 1.0)
         tau = float(priors.SIZES[self.instability[c]] * self.typical_instability[c])
-        told, axes = np.linalg.eigh(inner)
-        told = np.clip(told, 0.0, (1 - MIN_VARIANCE_RATIO) / tau**2)
-        left = 1 - tau**2 * told
+        information, axes = np.linalg.eigh(inner)
+        information = np.clip(information, 0.0, (1 - MIN_VARIANCE_RATIO) / tau**2)
+        remaining = 1 - tau**2 * information
         size = float(self.typical_instability[c])
-        power = (axes.T @ rhs / left * size) ** 2
-        return gains_from_eigenvalues(told / left * size**2, power)
+        power = (axes.T @ rhs / remaining * size) ** 2
+        return gains_from_eigenvalues(information / remaining * size**2, power)

@@ -226,7 +226,7 @@ def _predict(
 ) -> None:
     """Residuals of held-out rows, with each position's own angles estimated in it."""
     white = {p.channel: p.white + p.design @ step[p.columns] for p in left}
-    wide = _angle_variances(chosen, d)
+    wide = _angle_sigmas(chosen, d)
     for j, at in _angles(left, d):
         size = wide[at]
         if not size.any():
@@ -258,8 +258,8 @@ def _random_estimate(chosen: Set, d: Dictionary) -> Array:
     return out
 
 
-def _angle_variances(chosen: Set, d: Dictionary) -> Array:
-    """Prior variances of the angles of each position, rad^2, by column."""
+def _angle_sigmas(chosen: Set, d: Dictionary) -> Array:
+    """Prior standard deviations of the angles of each position, rad, by column."""
     out = np.zeros(d.width)
     np.add.at(out, chosen.state.columns, chosen.state.prior_sigma**2)
     out[d.rotations_of(d.window_positions[d.unoriented])] += 1.0

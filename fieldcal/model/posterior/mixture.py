@@ -27,6 +27,7 @@ from fieldcal.model.evidence.gram import Gram, evidence_gains
 from fieldcal.model.evidence.levels import InstabilityScan, scan_instabilities
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import (
+    INSTABILITY_LOG_DENSITY,
     LOG_DENSITY,
     TRIADS,
     Sizing,
@@ -34,13 +35,10 @@ from fieldcal.model.evidence.sizing import (
 )
 
 MAX_LOG_DISTANCE = 4.0
-"""Evidence behind the best, ln, from which a hypothesis no longer counts: 50 to 1."""
+"""Evidence behind the best, ln, from which a hypothesis no longer counts: 55 to 1."""
 
 GIVEN_SET_LOG_DENSITY = np.log(priors.instability_density_of_given_set())
 """Log prior of instabilities if no causes were searched: others may scatter windows."""
-
-DEVICE_LOG_DENSITY = np.log(priors.density(priors.INSTABILITY_TAIL))
-"""Log prior of instabilities if every other scatter has a cause of its own."""
 
 NONE: Index = np.empty((0, 1), dtype=np.intp)
 """No columns."""
@@ -58,7 +56,7 @@ class Hypothesis:
     sizes : (7,) indices in `priors.SIZES`
     window : number of the bad window, -1 for none
     size : index of the size of its error
-    chance : log prior probability
+    log_prior : log prior probability
     score : ln of evidence times prior probability
 
     """
@@ -66,7 +64,7 @@ class Hypothesis:
     sizes: tuple[int, ...]
     window: int
     size: int
-    chance: float
+    log_prior: float
     score: float
 
 
@@ -117,18 +115,20 @@ class Mixing:
         dictionary: Dictionary,
         gram: Gram,
         there: Set,
-        unstable: Array,
+        typical_instability: Array,
         given: bool = True,
         doubt: bool = True,
     ) -> None:
         self.dictionary, self.there, self.typical_instability = (
             dictionary,
             there,
-            unstable,
+            typical_instability,
         )
-        self.density = GIVEN_SET_LOG_DENSITY if given else DEVICE_LOG_DENSITY
-        sizing = Sizing(dictionary, gram, unstable, there.members, there.sizes)
-        self.columns, self.wide = sizing.columns, there.state.prior_sigma
+        self.density = GIVEN_SET_LOG_DENSITY if given else INSTABILITY_LOG_DENSITY
+        sizing = Sizing(
+            dictionary, gram, typical_instability, there.members, there.sizes
+        )
+        self.columns, self.prior_sigma = sizing.columns, there.state.prior_sigma
         self.doubted = self._doubted() if given and doubt else []
         more = [at for _, at in self.doubted]
         self.gram = gram.select_columns(np.concatenate([self.columns, *more]))
@@ -136,7 +136,7 @@ class Mixing:
 
     def run(self) -> Mixture:
         """Average over all hypotheses that count."""
-        lists = [self._of_triad(triad) for triad in TRIADS]
+        lists = [self._triad_hypotheses(triad) for triad in TRIADS]
         best = sum(max(h.score for h in some) for some in lists)
         near = [parts for parts in product(*lists)
                 if sum(h.score for h in parts) > best - MAX_LOG_DISTANCE]  # fmt: skip
@@ -144,7 +144,7 @@ class Mixing:
             priors.SIZES[[self._sizes_of(parts) for parts in near]]
             * self.typical_instability
         )
-        score, means, covariances = self._exactly(near, tau)
+        score, means, covariances = self._combine_exactly(near, tau)
         score += instability_log_prior(
             self.there.sizes.instability, self.typical_instability, self.density
         )
@@ -155,7 +155,7 @@ class Mixing:
         covariance += covariance_of_means(means, weight)
         scatter = np.sqrt(weight @ tau**2)
         return Mixture(
-            self.columns, mean, covariance, self.wide, self.bad, scatter, total
+            self.columns, mean, covariance, self.prior_sigma, self.bad, scatter, total
         )
 
     def _doubted(self) -> list[tuple[int, Index]]:
@@ -168,7 +168,7 @@ class Mixing:
         every = np.array(seen) * held + d.windows
         return [(i, (every + i).astype(np.intp)) for i in range(held)]
 
-    def _of_triad(self, triad: Sequence[int]) -> list[Hypothesis]:
+    def _triad_hypotheses(self, triad: Sequence[int]) -> list[Hypothesis]:
         """Hypotheses about one triad that count, the other triads fixed."""
         mode = self.there.sizes.instability
         first = Hypothesis(mode, -1, 0, 0.0, 0.0)
@@ -177,21 +177,27 @@ class Mixing:
         sizes, known = self._shifted(triad)
         doubted = self._bad_columns() if triad[0] == 0 and self.doubted else NONE
         taus = priors.SIZES[np.array(sizes)] * self.typical_instability
-        there = scan_instabilities(self.gram, self.columns, self.wide, taus, doubted)
+        there = scan_instabilities(
+            self.gram, self.columns, self.prior_sigma, taus, doubted
+        )
         alone = there.score + known
         found = [
             Hypothesis(s, -1, 0, k, v)
             for s, k, v in zip(sizes, known.tolist(), alone.tolist(), strict=True)
         ]
         if len(doubted):
-            chance = (
+            log_prior = (
                 known[:, None] + float(np.log(priors.BAD_WINDOW_CHANCE)) + LOG_DENSITY
             )  # (n, v)
-            every = self._with_bad(there) + there.score[:, None, None] + chance[:, None]
+            every = (
+                self._with_bad(there) + there.score[:, None, None] + log_prior[:, None]
+            )
             each = np.logaddexp.reduce(every, axis=(0, 2))
             self.bad = np.exp(each - np.logaddexp.reduce([*alone, *each]))
             found += [
-                Hypothesis(sizes[n], i, v, float(chance[n, v]), float(every[n, i, v]))
+                Hypothesis(
+                    sizes[n], i, v, float(log_prior[n, v]), float(every[n, i, v])
+                )
                 for n, i, v in np.argwhere(
                     every > alone.max() - MAX_LOG_DISTANCE
                 ).tolist()
@@ -213,15 +219,15 @@ class Mixing:
                   for c, m in enumerate(mode))
             for s in range(-middle, top + 1 - middle)
         ]  # fmt: skip
-        chance: Array = instability_log_prior(
+        log_prior: Array = instability_log_prior(
             np.array(moved), self.typical_instability, self.density
         )
-        chance -= instability_log_prior(mode, self.typical_instability, self.density)
-        first = max(0, self._showing(triad) - 1)
-        chance[first] = np.logaddexp.reduce(chance[: first + 1])
-        return moved[first:], chance[first:]
+        log_prior -= instability_log_prior(mode, self.typical_instability, self.density)
+        first = max(0, self._smallest_visible_index(triad) - 1)
+        log_prior[first] = np.logaddexp.reduce(log_prior[: first + 1])
+        return moved[first:], log_prior[first:]
 
-    def _showing(self, triad: Sequence[int]) -> int:
+    def _smallest_visible_index(self, triad: Sequence[int]) -> int:
         """Index of the smallest of `SIZES` at which a triad's instability shows."""
         seen = np.isin(self.gram.kind, triad) & (self.gram.info > 0)
         noise = 1 / np.sqrt(self.gram.info[seen].max(initial=1e-300))
@@ -247,7 +253,7 @@ class Mixing:
                 sizes[c] = one.sizes[c]
         return sizes
 
-    def _exactly(
+    def _combine_exactly(
         self, near: Sequence[Hypotheses], tau: Array
     ) -> tuple[Array, Array, Array]:
         """Scores (h,), means (h, k), covariances (h, k, k) of combined hypotheses.
@@ -255,18 +261,21 @@ class Mixing:
         `near` are those of each triad, `tau` (h, 7) their instabilities.
         """
         k = len(self.columns)
-        score = np.array([sum(h.chance for h in parts) for parts in near])
+        score = np.array([sum(h.log_prior for h in parts) for parts in near])
         mean, covariance = np.empty((len(near), k)), np.empty((len(near), k, k))
         window = np.array([acc.window for acc, *_ in near])
         for bad in np.unique(window).tolist():
             some = np.flatnonzero(window == bad)
-            columns, wide = self.columns, np.tile(self.wide, (len(some), 1))
+            columns, prior_sigma = (
+                self.columns,
+                np.tile(self.prior_sigma, (len(some), 1)),
+            )
             if bad >= 0:
                 at = dict(self.doubted)[bad]
                 off = priors.SIZES[[near[h][0].size for h in some.tolist()]]
                 columns = np.append(columns, at)
-                wide = np.hstack([wide, np.outer(off, self._typical(at))])
-            there = scan_instabilities(self.gram, columns, wide, tau[some], NONE)
+                prior_sigma = np.hstack([prior_sigma, np.outer(off, self._typical(at))])
+            there = scan_instabilities(self.gram, columns, prior_sigma, tau[some], NONE)
             score[some] += there.score
             means, covariances = there.posterior()
             mean[some], covariance[some] = means[:, :k], covariances[:, :k, :k]

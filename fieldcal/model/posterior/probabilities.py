@@ -151,8 +151,8 @@ class Posterior:
         return max(at_points, self.evidence(nearer))
 
     def _predicted_evidence(self, less: Set, offer: Offer) -> float:
-        """Predicted log evidence of a set with an offer, without priors."""
-        return offer.score - self.search.log_chance([*less.members, offer.member])
+        """Predicted `evidence` of a set with an offer."""
+        return self._without_chances(offer.score, [*less.members, offer.member])
 
     def _with_both_triads(
         self, less: Set, offer: Offer, parts: set[str], offers: Sequence[Offer]
@@ -168,9 +168,13 @@ class Posterior:
         return there
 
     def evidence(self, there: Set) -> float:
-        """Log evidence of a set without the priors of its causes."""
-        counts = sum(np.log(len(c.variants)) for c, _ in there.members)
-        return there.score - self.search.log_chance(there.members) - float(counts)
+        """Log evidence of a set as if its causes were known, and their variants not."""
+        return self._without_chances(there.score, there.members)
+
+    def _without_chances(self, score: float, members: Sequence[Member]) -> float:
+        """A score without the prior of its causes; variants are equally probable."""
+        counts = sum(np.log(len(c.variants)) for c, _ in members)
+        return score - self.search.set_log_prior(members) - float(counts)
 
     def _kind(self, name: str) -> str:
         """Kind of a cause, by its name."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from hashlib import blake2b
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from fieldcal.model.causes.cause import CLOSURE, Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram, evidence_gains
-from fieldcal.model.evidence.sets import Set, Sets, log_chances
+from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
 from fieldcal.model.search.offer import (
     BestVariants,
@@ -43,7 +44,7 @@ RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
 """Sizes to which that of closures may rise when that of the accelerometers decreases:
 a closure's error has a part from accelerometers and a part of its own."""
 
-Level = tuple[InstabilityIndices, Eliminated, float]
+SetAtInstability = tuple[InstabilityIndices, Eliminated, float]
 """An instability, and a set's state and score at it."""
 
 OfferKey = tuple[tuple[tuple[str, int], ...], Sizes | None]
@@ -86,7 +87,7 @@ class Offers(Sets):
         super().__init__(dictionary, gram)
         self._tables: dict[OfferKey, list[OfferTable]] = {}
         self._at: dict[InstabilityIndices, WeightedColumns] = {}
-        self._known: dict[int, Array] = {}
+        self._wide_gains: dict[bytes, Array] = {}
 
     def offers(self, there: Set, beside: Sizes | None = None) -> list[Offer]:
         """Every cause that a set does not contain, at its best variant, the best first.
@@ -117,9 +118,9 @@ class Offers(Sets):
         if not outputs or len(group.columns) <= MAX_COSINES * outputs:
             return offer
         profile = LOG_DENSITY + table.state.gain_by_size(group.columns, group.typical)
-        chance = self.log_chance([*there.members, offer.member])
+        chance = self.set_log_prior([*there.members, offer.member])
         worth = float(np.logaddexp.reduce(profile)) + chance
-        score = table.score + worth - self.log_chance(there.members)
+        score = table.score + worth - self.set_log_prior(there.members)
         return replace(offer, score=score, size=int(np.argmax(profile)))
 
     def tables(self, there: Set, beside: Sizes | None = None) -> list[OfferTable]:
@@ -128,8 +129,8 @@ class Offers(Sets):
         beside = beside and replace(beside, members=())
         asked = key, None if (key, None) in self._tables else beside
         if asked not in self._tables:
-            levels = list(self._levels(there, beside))
-            found = self._best_variants(levels, *self._chances(there))
+            levels = list(self._at_instabilities(there, beside))
+            found = self._best_variants(levels, *self._cause_log_priors(there))
             self._tables[asked] = [
                 OfferTable(less, state, score, ranked_offers(there, score, less, best))
                 for (less, state, score), best in zip(levels, found, strict=True)
@@ -137,7 +138,10 @@ class Offers(Sets):
         return self._tables[asked]
 
     def _best_variants(
-        self, levels: Sequence[Level], share: Array, apart: dict[int, Array]
+        self,
+        levels: Sequence[SetAtInstability],
+        log_prior: Array,
+        log_prior_by_variant: dict[int, Array],
     ) -> list[BestVariants]:
         """Best variant of every cause at each level of a set."""
         found: list[BestVariants] = [{} for _ in levels]
@@ -148,14 +152,14 @@ class Offers(Sets):
             size = profile.argmax(axis=2)
             taken = np.take_along_axis(gain, size[:, :, None], 2)[:, :, 0]
             level, number = np.nonzero(
-                taken >= MIN_LOG_GAIN - extra_log_odds(alike, apart)
+                taken >= MIN_LOG_GAIN - extra_log_odds(alike, log_prior_by_variant)
             )
             evidence = np.logaddexp.reduce(profile[level, number], axis=1)
-            evidence += share[at[number]]
-            for i, shares in apart.items():
+            evidence += log_prior[at[number]]
+            for i, shares in log_prior_by_variant.items():
                 some = at[number] == i
-                evidence[some] += shares[alike.variant[number[some]]] - share[i]
-            near = evidence > share[at].min() - MAX_LOG_DISTANCE
+                evidence[some] += shares[alike.variant[number[some]]] - log_prior[i]
+            near = evidence > log_prior[at].min() - MAX_LOG_DISTANCE
             each = (level[near], number[near], evidence[near])
             for i, m, worth in zip(*(e.tolist() for e in each), strict=True):
                 cause = self.dictionary.causes[at[m]]
@@ -163,26 +167,31 @@ class Offers(Sets):
                     found[i][cause] = worth, int(alike.variant[m]), int(size[i, m])
         return found
 
-    def _chances(self, there: Set) -> tuple[Array, dict[int, Array]]:
+    def _cause_log_priors(self, there: Set) -> tuple[Array, dict[int, Array]]:
         """Log prior of every cause given a set; for each variant where they differ."""
         names = {c.name for c, _ in there.members}
         usual = any(c.usual for c, _ in there.members)
-        out, apart = self.dictionary.log_chances.copy(), dict[int, Array]()
+        out, log_prior_by_variant = (
+            self.dictionary.cause_log_priors.copy(),
+            dict[int, Array](),
+        )
         for i, cause in enumerate(self.dictionary.causes):
             if cause.name in names or cause.expected or (usual and cause.usual):
-                shares = log_chances(cause, there.members)
+                shares = variant_log_priors(cause, there.members)
                 out[i] = shares.min()
                 if shares.ndim:
-                    apart[i] = shares
-        return out, apart
+                    log_prior_by_variant[i] = shares
+        return out, log_prior_by_variant
 
-    def _levels(self, there: Set, beside: Sizes | None) -> Iterator[Level]:
+    def _at_instabilities(
+        self, there: Set, beside: Sizes | None
+    ) -> Iterator[SetAtInstability]:
         """The set's state and score at its own instability and at other ones."""
         sizes = there.sizes
         base = there.score - there.state.score
         base -= self.instability_log_prior(sizes.instability)
-        columns, wide = there.state.columns, there.state.prior_sigma
-        ways = [(wide, 0.0), self.with_typical_calibration(there)]
+        columns, prior_sigma = there.state.columns, there.state.prior_sigma
+        ways = [(prior_sigma, 0.0), self.with_typical_calibration(there)]
         own = None if beside is None else beside.instability
         for less in self._instabilities(sizes.instability, own):
             fallen = less != sizes.instability
@@ -207,7 +216,7 @@ class Offers(Sets):
                 # flicker is what few windows have instead of instability
                 down = [max(size - d, 0) for d in FLICKER_STEPS_DOWN if group.random]
                 for lower in dict.fromkeys([*down, 0]):
-                    small = wide.copy()
+                    small = prior_sigma.copy()
                     small[some] = group.prior_sigma(float(priors.SIZES[lower]))
                     state = Eliminated.of(rows, columns, small)
                     lost = LOG_DENSITY[lower] - LOG_DENSITY[size]
@@ -216,18 +225,22 @@ class Offers(Sets):
 
     def _with_flicker_of(
         self, there: Set, base: float, beside: Sizes
-    ) -> Iterator[Level]:
+    ) -> Iterator[SetAtInstability]:
         """The set with the flicker sizes of another set, if it has flicker."""
-        wide, less, changed = there.state.prior_sigma.copy(), beside.instability, False
+        prior_sigma, less, changed = (
+            there.state.prior_sigma.copy(),
+            beside.instability,
+            False,
+        )
         pairs = zip(self._permanent_groups(there), beside.calibration, strict=True)
         for (group, some, size), other in pairs:
             if group.random and group.fixed_size is None and other != size:
-                wide[some] = group.prior_sigma(float(priors.SIZES[other]))
+                prior_sigma[some] = group.prior_sigma(float(priors.SIZES[other]))
                 base += float(LOG_DENSITY[other] - LOG_DENSITY[size])
                 changed = True
         if changed:
             state = Eliminated.of(
-                self._weighted_columns(less).rows, there.state.columns, wide
+                self._weighted_columns(less).rows, there.state.columns, prior_sigma
             )
             yield less, state, base + state.score + self.instability_log_prior(less)
 
@@ -258,12 +271,12 @@ class Offers(Sets):
         If a large instability absorbs all differences, the most probable sizes of the
         calibration are too small.
         """
-        wide, cost = there.state.prior_sigma.copy(), 0.0
+        prior_sigma, cost = there.state.prior_sigma.copy(), 0.0
         for group, some, size in self._permanent_groups(there):
             if group.fixed_size is None and size < UNIT_INDEX:
-                wide[some] = group.prior_sigma(float(priors.SIZES[UNIT_INDEX]))
+                prior_sigma[some] = group.prior_sigma(float(priors.SIZES[UNIT_INDEX]))
                 cost += float(LOG_DENSITY[UNIT_INDEX] - LOG_DENSITY[size])
-        return wide, cost
+        return prior_sigma, cost
 
     def shown_beside(self, there: Set) -> Callable[[Group], bool]:
         """Test whether rows show a group in addition to a set and a free calibration.
@@ -271,11 +284,11 @@ class Offers(Sets):
         In two positions every cause looks like bias and scale factor; only their prior
         would distinguish it.
         """
-        wide = there.state.prior_sigma.copy()
+        prior_sigma = there.state.prior_sigma.copy()
         for group, some, _ in self._permanent_groups(there):
             if group.in_state and group.fixed_size is None:
-                wide[some] = group.prior_sigma(priors.FREE_SIZE)
-        free = Eliminated.of(there.state.rows, there.state.columns, wide)
+                prior_sigma[some] = group.prior_sigma(priors.FREE_SIZE)
+        free = Eliminated.of(there.state.rows, there.state.columns, prior_sigma)
 
         def is_shown(group: Group) -> bool:
             gains = free.gain_by_size(group.columns, group.typical)
@@ -300,7 +313,7 @@ class Offers(Sets):
             self._at[less] = WeightedColumns(rows, rows.rhs(None), blocks)
         return self._at[less]
 
-    def _screen(self, levels: Sequence[Level]) -> Iterator[Array]:
+    def _screen(self, levels: Sequence[SetAtInstability]) -> Iterator[Array]:
         """Gain at each size of every variant at each level, (l, m, sizes) by width.
 
         All levels are calculated together, which is faster than one by one.
@@ -331,14 +344,12 @@ class Offers(Sets):
             return evidence_gains(inner, rhs, own)
         shape, k = rhs.shape[:-1], rhs.shape[-1]
         inner, rhs, own = inner.reshape(-1, k, k), rhs.reshape(-1, k), own.ravel()
-        keys = [
-            hash(m.tobytes() + q.tobytes()) for m, q in zip(inner, rhs, strict=True)
-        ]
-        new = {key: i for i, key in enumerate(keys) if key not in self._known}
+        keys = [_digest(*each) for each in zip(inner, rhs, own[:, None], strict=True)]
+        new = {key: i for i, key in enumerate(keys) if key not in self._wide_gains}
         some = list(new.values())
         found = evidence_gains(inner[some], rhs[some], own[some])
-        self._known.update(zip(new, found, strict=True))
-        return np.array([self._known[key] for key in keys]).reshape(*shape, -1)
+        self._wide_gains.update(zip(new, found, strict=True))
+        return np.array([self._wide_gains[key] for key in keys]).reshape(*shape, -1)
 
     def accept(self, there: Set, *offers: Offer) -> Set:
         """The set with the offered members."""
@@ -352,3 +363,8 @@ class Offers(Sets):
         more = (o.size for o in offers)
         start = Sizes(sizes.calibration, less, (*sizes.members, *more))
         return self.evaluate((*there.members, *(o.member for o in offers)), start)
+
+
+def _digest(*arrays: Array) -> bytes:
+    """Key of some arrays, by their values."""
+    return blake2b(b"".join(a.tobytes() for a in arrays), digest_size=16).digest()

@@ -52,7 +52,7 @@ class Search(Offers):
             changes += [
                 self._with_two_more,
                 self._without_function,
-                self._wider,
+                self._with_wider_cause,
                 self._beside_usual,
             ]
         best = self.evaluate(start)
@@ -93,7 +93,10 @@ class Search(Offers):
             )
             bare = there.score - worth[group]
             rest = (*there.members[:i], *there.members[i + 1 :])
-            if bare - self.log_chance(there.members) + self.log_chance(rest) > least:
+            if (
+                bare - self.set_log_prior(there.members) + self.set_log_prior(rest)
+                > least
+            ):
                 self.without(there, i)
             for other, more in worth.items():
                 if other is not group and bare + more > least:
@@ -155,7 +158,7 @@ class Search(Offers):
             best = max(found, key=_score)
         return best
 
-    def _wider(self, there: Set) -> Set:
+    def _with_wider_cause(self, there: Set) -> Set:
         """The best set with all parameters of one of its causes, and one cause more.
 
         A cause found alone has only the parameters that raise the evidence. With
@@ -274,7 +277,7 @@ class Search(Offers):
     def _log_chance_of_two(self, there: Set, one: Offer, two: Offer) -> float:
         """Log prior of two more causes, given those of a set."""
         both = [*there.members, one.member, two.member]
-        return self.log_chance(both) - self.log_chance(there.members)
+        return self.set_log_prior(both) - self.set_log_prior(there.members)
 
 
 def _eliminate_without(there: Set, group: Group) -> Eliminated:

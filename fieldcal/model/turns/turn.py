@@ -214,16 +214,16 @@ class TurnTracker:
         leg = Leg(self.source, ends, bias, scale, late, pair, a, b)
         if (steps := divide_into_steps(leg)) is None:
             return None
-        rid: Array = np.zeros((len(steps.edge), 3))
+        correction: Array = np.zeros((len(steps.edge), 3))
         for _ in range(MAX_CORRECTIONS):
-            way = integrate_turn(leg, steps, rid)
+            way = integrate_turn(leg, steps, correction)
             x = self._edges(ends, steps.at, pair, way, steps.edge)
-            felt, x = x.f, apply_way_effects(x, state)
-            before, rid = (
-                rid,
+            force_before_effects, x = x.f, apply_way_effects(x, state)
+            before, correction = (
+                correction,
                 other_gyro_errors(state, x, self.time_since_turn(steps.at, pair[1])),
             )
-            if np.abs(rid - before).max() * float(np.ptp(steps.at)) < 1e-6:
+            if np.abs(correction - before).max() * float(np.ptp(steps.at)) < 1e-6:
                 break
         end = way.attitude[-1]
         if vertical_lost(ends, pair, end):
@@ -232,13 +232,16 @@ class TurnTracker:
         if np.arccos(np.clip((np.trace(end) - 1) / 2, -1, 1)) < MIN_TURN_RAD:
             return None
         noise = self.rows.noise[3:] / np.abs(state.scale[3:])
-        unsure = sampling_error(steps.t, way.rate - way.earth, steps.each, noise)
+        sampling_sigma = sampling_error(
+            steps.t, way.rate - way.earth, steps.each, noise
+        )
         samples = slice(steps.first, steps.first + len(steps.t))
         cut = steps.cut
         acc = trapezoid_means(steps.t, self.source.block.acc[samples], steps.edge[cut])
         sd = self.rows.noise[:3] / np.sqrt(np.diff(steps.edge[cut]))[:, None]
         turn = Turn(
-            pair, ends, x, felt, way.attitude, way.done, cut, acc, sd, unsure,
+            pair, ends, x, force_before_effects, way.attitude, way.done, cut, acc, sd,
+            sampling_sigma,
             1 / self.source.rate,
         )  # fmt: skip
         if self.standing is None:

@@ -368,7 +368,7 @@ def test_names_of_causes_and_triads() -> None:
 def test_chances_are_shared_among_variants_and_follow_changes() -> None:
     d = made(ladder())
     chances = [np.log(c.chance / len(c.variants)) for c in d.causes]
-    np.testing.assert_allclose(d.log_chances, chances)
+    np.testing.assert_allclose(d.cause_log_priors, chances)
     at = [c.key for c in d.causes].index("settling:acc")
     cause, width = d.causes[at], d.width
     shown = d.shown.copy()
@@ -379,11 +379,15 @@ def test_chances_are_shared_among_variants_and_follow_changes() -> None:
     assert new.params == cause.variants[3].params
     assert new.columns.min() >= width and d.width > width
     assert d.shown.tolist() == [*shown, *[False] * (d.width - width)]
-    assert d.log_chances[at] == pytest.approx(np.log(cause.chance / len(more.variants)))
+    assert d.cause_log_priors[at] == pytest.approx(
+        np.log(cause.chance / len(more.variants))
+    )
     assert len(d.typical) == d.width
     extra = Cause("extra", "", 0.5, (d.causes[0].variants[0],), "unknown")
     d.add_causes([extra])
-    assert d.causes[-1] is extra and d.log_chances[-1] == pytest.approx(np.log(0.5))
+    assert d.causes[-1] is extra and d.cause_log_priors[-1] == pytest.approx(
+        np.log(0.5)
+    )
     widths = {b.blocks.shape[1] for b in d.groups_by_width}
     assert len(widths) == len(d.groups_by_width)
     seen = sorted((int(c), int(v)) for b in d.groups_by_width

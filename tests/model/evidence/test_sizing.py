@@ -291,7 +291,7 @@ def test_the_chance_of_a_set_is_its_causes_each_by_its_variants() -> None:
     offset, drift = causes["angle_offset"], causes["bias_drift:gyr"]
     members = ((offset, offset.variants[0]), (drift, drift.variants[-1]))
     expected = sum(np.log(c.chance / len(c.variants)) for c in (offset, drift))
-    assert search.log_chance(members) == pytest.approx(expected)
+    assert search.set_log_prior(members) == pytest.approx(expected)
     key = search.key(members)
     assert key == (("angle_offset", 0), ("bias_drift:gyr", len(drift.variants) - 1))
     both = search.evaluate(members)

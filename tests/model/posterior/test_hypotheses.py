@@ -8,12 +8,11 @@ from small_sessions import SD, dictionary, ladder, nominal, rows_of
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.sizing import instability_log_prior
-from fieldcal.model.posterior.mixture import (
-    DEVICE_LOG_DENSITY,
-    GIVEN_SET_LOG_DENSITY,
-    Mixing,
+from fieldcal.model.evidence.sizing import (
+    INSTABILITY_LOG_DENSITY,
+    instability_log_prior,
 )
+from fieldcal.model.posterior.mixture import GIVEN_SET_LOG_DENSITY, Mixing
 from fieldcal.model.priors import SIZES
 from fieldcal.model.search.selection import Search
 from fieldcal.model.system.linear_system import gram
@@ -51,7 +50,7 @@ def test_what_cannot_be_seen_beside_the_noise_is_one_instability(
     noise = SD[triad[0]] / np.sqrt(ROWS)
     typical = D.typical_instability[triad[0]]
     least = int(np.argmax(SIZES * typical >= 0.2 * noise))
-    assert one._showing(triad) == least
+    assert one._smallest_visible_index(triad) == least
     sizes, chance = one._shifted(triad)
     mode = one.there.sizes.instability
     assert all(s[c] == mode[c] for s in sizes for c in range(7) if c not in triad)
@@ -77,13 +76,13 @@ def test_nobody_who_looked_for_causes_doubts_windows() -> None:
     np.testing.assert_allclose(
         np.exp(GIVEN_SET_LOG_DENSITY), priors.instability_density_of_given_set()
     )
-    np.testing.assert_allclose(np.exp(DEVICE_LOG_DENSITY), priors.density(8.0))
+    np.testing.assert_allclose(np.exp(INSTABILITY_LOG_DENSITY), priors.density(8.0))
     assert not found.run().bad.any() and asked.run().bad.any()
     assert len(asked.doubted) == 9
     for i, at in asked.doubted:
         expected = [D.window_columns(c)[i] for c in range(3)]
         assert at.tolist() == expected
-    hypotheses = asked._of_triad((3, 4, 5))
+    hypotheses = asked._triad_hypotheses((3, 4, 5))
     assert {h.window for h in hypotheses} == {-1}
     best = max(h.score for h in hypotheses)
     assert min(h.score for h in hypotheses) > best - 4.0

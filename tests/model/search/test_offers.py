@@ -10,7 +10,7 @@ import pytest
 from small_sessions import Session, ladder
 
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set, log_chances
+from fieldcal.model.evidence.sets import Set, variant_log_priors
 from fieldcal.model.evidence.sizing import Member, Sizes
 from fieldcal.model.search import offers
 from fieldcal.model.search.offer import Offer
@@ -38,7 +38,7 @@ def having(search: Search, *keys: str) -> Set:
 def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
     search = drawn()
     there = having(search, "bias_drift:acc", "time:acc")
-    share, apart = search._chances(there)
+    share, apart = search._cause_log_priors(there)
     found = dict(zip(KEYS, share, strict=True))
     assert not apart, "the variants of each are alike"
     for key, cause in CAUSES.items():
@@ -46,7 +46,8 @@ def test_an_effect_on_the_other_triad_is_likelier_and_nothing_else_is() -> None:
         chance = priors.COMPANION_CHANCE if again else cause.chance
         assert found[key] == pytest.approx(np.log(chance / len(cause.variants)))
     np.testing.assert_array_equal(
-        search._chances(search.evaluate(()))[0], SESSION.dictionary.log_chances
+        search._cause_log_priors(search.evaluate(()))[0],
+        SESSION.dictionary.cause_log_priors,
     )
 
 
@@ -130,17 +131,20 @@ ACC, GYR, DRIFT = JUMPS.dictionary.causes
 
 def test_what_jumps_on_both_triads_jumps_at_once_or_is_two_events() -> None:
     (one, *_) = [g for g in GYR.variants if len(g.params) == 3][20:]
-    shares = log_chances(ACC, [(GYR, one)])
+    shares = variant_log_priors(ACC, [(GYR, one)])
     at = np.array([g.shape["at_s"] for g in ACC.variants])
     at_once = np.abs(at - one.shape["at_s"]) == np.abs(at - one.shape["at_s"]).min()
     assert at_once.sum() == 4, "all axes together, or one"
     assert np.exp(shares[at_once]).sum() == pytest.approx(priors.COMPANION_CHANCE)
     np.testing.assert_allclose(shares[~at_once], np.log(ACC.chance / len(at)))
     for other in ([], [(DRIFT, DRIFT.variants[0])]):
-        assert log_chances(ACC, other) == pytest.approx(np.log(ACC.chance / len(at)))
+        assert variant_log_priors(ACC, other) == pytest.approx(
+            np.log(ACC.chance / len(at))
+        )
     again = np.log(priors.COMPANION_CHANCE / len(DRIFT.variants))
     assert (
-        log_chances(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])]) == again
+        variant_log_priors(DRIFT, [(replace(DRIFT, part="gyr"), DRIFT.variants[0])])
+        == again
     )
 
 
@@ -150,10 +154,10 @@ def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> 
     ((whole,), (other,)) = acc.expected, gyr.expected
     assert whole.shape["at_s"] == at and len(whole.params) == 3
     assert acc.variants == (*ACC.variants, whole) and whole.fixed_size == 1.0
-    alone, usual = log_chances(acc, []), np.log(ACC.chance / len(acc.variants))
+    alone, usual = variant_log_priors(acc, []), np.log(ACC.chance / len(acc.variants))
     assert alone[-1] == pytest.approx(np.log(priors.RESTART_CHANCE))
     np.testing.assert_allclose(alone[:-1], usual)
-    both = log_chances(acc, [(gyr, other)])
+    both = variant_log_priors(acc, [(gyr, other)])
     assert both[-1] == pytest.approx(np.log(priors.BOTH_RESTART_ODDS))
     there = np.array([g.shape["at_s"] == at for g in ACC.variants])
     assert np.exp(both[:-1][there]).sum() == pytest.approx(1 / priors.BOTH_RESTART_ODDS)
@@ -163,7 +167,9 @@ def test_where_the_device_may_have_been_off_both_triads_jump_as_is_typical() -> 
     (knock,) = Session.of(ladder(), ("base_step",)).dictionary.causes
     anew = knock.expecting_within([(at - 1e-3, at + 1e-3)])
     assert len(anew.expected) == 1, "set up anew meanwhile"
-    assert log_chances(anew, [])[-1] == pytest.approx(np.log(priors.RESTART_CHANCE))
+    assert variant_log_priors(anew, [])[-1] == pytest.approx(
+        np.log(priors.RESTART_CHANCE)
+    )
 
 
 @pytest.mark.parametrize("off", [True, False], ids=["off", "on"])
@@ -195,7 +201,9 @@ def test_a_jump_that_one_triad_hardly_shows_is_when_the_other_jumps(seed: int) -
     assert found["acc"] == pytest.approx(found["gyr"])
     search = JUMPS.search(off)
     acc, gyr = (next(m for m in best.members if m[0] is c) for c in (ACC, GYR))
-    assert search.log_chance((acc, gyr)) == pytest.approx(search.log_chance((gyr, acc)))
+    assert search.set_log_prior((acc, gyr)) == pytest.approx(
+        search.set_log_prior((gyr, acc))
+    )
     both = search.evaluate((gyr, acc))
     offered = search.offers(search.evaluate((gyr,)), both.sizes)
     (offer,) = [o for o in offered if o.member[0] is ACC]

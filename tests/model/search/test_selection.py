@@ -249,14 +249,14 @@ def test_the_chance_of_a_set_is_that_of_its_causes() -> None:
     acc, gyr, other = by_key.values()
     found = search.search(search.noise(np.random.default_rng(0)))
     first = (acc, acc.variants[0])
-    assert found.log_chance([]) == 0.0
-    assert found.log_chance([first]) == pytest.approx(
+    assert found.set_log_prior([]) == 0.0
+    assert found.set_log_prior([first]) == pytest.approx(
         np.log(acc.chance / len(acc.variants))
     )
-    both = found.log_chance([first, (gyr, gyr.variants[3])])
+    both = found.set_log_prior([first, (gyr, gyr.variants[3])])
     again = np.log(priors.COMPANION_CHANCE / len(gyr.variants))
-    assert both == pytest.approx(found.log_chance([first]) + again)
-    three = found.log_chance(
+    assert both == pytest.approx(found.set_log_prior([first]) + again)
+    three = found.set_log_prior(
         [first, (gyr, gyr.variants[3]), (other, other.variants[0])]
     )
     assert three == pytest.approx(both + np.log(priors.UNKNOWN_FUNCTION_CHANCE))

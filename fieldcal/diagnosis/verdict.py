@@ -239,7 +239,7 @@ def _probability(explanation: Explanation, verdict: Verdict) -> float:
         return posterior.probability_of_noise_alone
     if verdict == "ambiguous" and explanation.undecided:
         return 1 - posterior.probability_of_noise_alone
-    wanted = [{one.name, *one.aliases} for one in explanation.probable_causes]
+    wanted = [{one.name, *one.alike} for one in explanation.probable_causes]
     return sum(
         w
         for s, w in posterior.weights

@@ -58,7 +58,7 @@ def tried_candidates(
                 delta,
                 delta - width * float(np.log(rows)),
                 gain,
-                one.probability if one else posterior.probability([id_]),
+                posterior.probability([id_]),
                 one is not None,
                 why,
             )

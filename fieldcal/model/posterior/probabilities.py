@@ -33,8 +33,9 @@ class ProbableCause:
     ----------
     name : of the effect or the unknown function
     members : of the best set with that name
-    probability : that it, or an alias of it, is present
+    probability : that it, or an alias of its kind, is present
     aliases : names of its aliases, the likeliest first
+    alike : those of its kind: a function that no effect makes is no name of an effect
 
     """
 
@@ -42,6 +43,7 @@ class ProbableCause:
     members: tuple[Member, ...]
     probability: float
     aliases: tuple[str, ...]
+    alike: tuple[str, ...] = ()
 
     @property
     def triads(self) -> frozenset[str]:
@@ -230,11 +232,10 @@ class Posterior:
         for name in self.cause_names(self.best):
             others = sorted(self.alternatives[name].items(), key=lambda i: -i[1].score)
             names = [n for n, _ in others]
-            # a function that no effect makes is no other name for an effect
             strange = self._kind(name) == "unknown"
             alike = [n for n in names if (self._kind(n) == "unknown") == strange]
             members = tuple(m for m in self.best.members if m[0].name == name)
-            one = ProbableCause(name, members, np.nan, tuple(names))
+            one = ProbableCause(name, members, np.nan, tuple(names), tuple(alike))
             probability = self.probability([name, *alike], one.triads)
             if probability >= thresholds.NAMED:
                 out.append(replace(one, probability=probability))

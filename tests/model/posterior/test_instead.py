@@ -82,6 +82,24 @@ def test_what_its_chance_brings_near_counts_though_its_evidence_is_behind(
         assert not counts or walks[frozenset({"random_walk:acc"})] > 0.5
 
 
+def test_a_function_that_no_effect_makes_is_no_other_name_for_an_effect() -> None:
+    session = Session.of(ladder(), ("time:acc", "random_walk:acc"))
+    off, x = session.noise(np.random.default_rng(3)), session.dictionary.x
+    part = (x.t - x.t.min()) / np.ptp(x.t)
+    bent = part + 0.76 * part * (1 - part)
+    off[:, :3] += 3e-3 * bent[:, None] * [1.0, -0.5, 0.7]
+    search = session.search(off)
+    (walk,) = (c for c in session.dictionary.causes if c.name == "random_walk")
+    posterior = Posterior(search, search.evaluate(((walk, walk.variants[0]),)))
+    (found,) = posterior.probable_causes()
+    assert (found.aliases, found.alike) == (("time",), ())
+    own, both = (
+        posterior.probability(n) for n in (["random_walk"], ["random_walk", "time"])
+    )
+    assert found.probability == pytest.approx(own)
+    assert own < both
+
+
 def test_the_weights_are_of_the_sets_and_of_what_was_refined() -> None:
     search, best = drifting()
     posterior = Posterior(search, best)

@@ -64,7 +64,7 @@ class ArrivalTimebase:
         self._broken = False
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
-        """Return times (n,) on the host's clock, nan while the rate is learnt."""
+        """Return times (n,) on the host's clock, nan until the rate is estimated."""
         parts = []
         for batch, z in _split_by_arrival(steps, t_host):
             if np.isnan(self._t) or np.isnan(z):

@@ -1,8 +1,8 @@
 """Compares the device's clock with the host's.
 
-A sample stamped t on the device arrives at h = a + r t + delay, the delay never below
-that of an idle line. So the least h - t of each stretch of time is free of queueing,
-and a straight line through these tells offset a and rate r:
+A sample stamped t on the device arrives at h = a + r t + delay, where the delay is at
+least that of an idle line. The least h - t of each stretch of time is therefore free of
+queueing, and a straight line through these minima gives the offset a and the rate r:
 
     h_i = a + r t_i + e_i,   least squares,   s^2 = sum(e^2) / (n - 2)      (1)
 

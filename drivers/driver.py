@@ -4,9 +4,9 @@ To add one, write drivers/<scheme>_imu.py with a subclass of `Driver` named `Imu
 `open_driver("<scheme>:<address>")` finds it. Opening takes the address, which may carry
 options as a query: ``serial:/dev/ttyUSB0?baud=115200&format=witmotion``.
 
-`receive` returns what has come, or None when nothing whole came in time: None is no
-fault, an exception is. A link that stumbles and comes back resumes the stream; the gap
-shows in the times and in `LinkHealth`.
+`receive` returns the samples that arrived, or None if no complete frame arrived in
+time. None is no fault; an exception is one. A link that is interrupted and comes back
+resumes the stream; the gap shows in the times and in `LinkHealth`.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class ReadBack(NamedTuple):
 
 @dataclass(slots=True)
 class LinkHealth:
-    """How the link does, counted since it was opened.
+    """State of the link, counted since it was opened.
 
     Attributes
     ----------

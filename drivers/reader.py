@@ -1,12 +1,12 @@
-"""One thread a link: it reads as much as there is, and stamps when it came.
+"""One thread per link reads all available bytes and records their arrival time.
 
-An operating system keeps about 4 KB of a serial port, 40 ms at 921600 baud, so whoever
-records or draws must not hold up the reading. What was read waits here, up to a limit;
-then the reading waits as well, so that a peer with flow control loses nothing.
+An operating system buffers about 4 KB of a serial port, 40 ms at 921600 baud, so
+recording and drawing must not delay the reading. Bytes wait here, up to a limit. At the
+limit the reading waits as well, so that a sender with flow control loses nothing.
 
-A source that fails is opened again until bytes come or patience ends: one that opens
-and says nothing is not back, such as a CAN interface that is down. The first chunk
-after that says that the link was broken.
+A source that fails is opened again until bytes arrive or a time limit is reached. A
+source that opens without sending anything, such as a CAN interface that is down, counts
+as failed. The first chunk after an interruption is marked as such.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ the last update,
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
 counter is unwrapped first: where it falls by more than half its span, a span is added.
 A clock that falls by more than `RESTART_BACKWARD`, or leaps by more than
-`RESTART_FORWARD` where the host saw hardly any time go by, has begun anew: time goes on
-from the last sample by what the host saw.
+`RESTART_FORWARD` while hardly any time passed on the host, was restarted: time goes on
+from the last sample by the time that passed on the host.
 
 All in s. Symbols: k sample number, T period, q resolution, u phase.
 """

@@ -1,8 +1,7 @@
-"""From where on something counts: every threshold of what is said, each with why.
+"""Thresholds of everything that is reported, each with its reason.
 
-Chances and typical sizes, from which probabilities are made, are in `priors`; how far
-a search looks, which changes the time that it takes and nothing that is said, stands
-beside each search.
+Prior probabilities and typical sizes are in `priors`. Limits of a search, which change
+its duration and nothing that is reported, are in the module of that search.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ wrong."""
 
 ALIAS_LOG_MARGIN = 4.6
 """Evidence, ln, by which an explanation may be behind and still stand for another: 100
-to 1, beyond which nobody would ask."""
+to 1, which no one would question."""
 
 DETERMINED = 0.3
 """Largest part of its variance before the rows that a parameter that is told may

@@ -1,7 +1,7 @@
 """Carries out plans on a device, with an operator.
 
-Every sample that comes is recorded, whatever else happens; all waiting is counted in
-device time, so a virtual device may run faster than the wall clock and nothing changes.
+All received samples are recorded, whatever else happens. All waiting is counted in
+device time, so a virtual device may run faster than the wall clock.
 
 A hold goes through three phases. *Turning*: until the device has come to rest in the
 position; a wrong position is reported, and nothing is averaged there. *Averaging*:
@@ -234,7 +234,7 @@ class Engine:
         insisted = warned = False
         away = self._incoming.breaks
         for block in self._incoming.pieces:
-            if self._incoming.breaks != away:  # who knows how it stands by now
+            if self._incoming.breaks != away:  # its position is unknown now
                 away = self._incoming.breaks
                 self._operator.place(hold)
             if block.t_host[-1] < asked:

@@ -17,7 +17,7 @@ stated error is the difference to the mean of the next window, over sqrt(2). For
 and low-passed noise this is the standard error. Flicker and random walk also vary at
 frequencies below 1/T, which the window does not show. A knee below about 3/T is hidden
 by the white noise of one window, but several windows of a device show it together; the
-shapes learnt from one window can therefore be passed to the next.
+shapes estimated from one window can therefore be passed to the next.
 
 Sources: Whittle 1953; IEEE 952-1997 annex C (Allan variances).
 """
@@ -32,7 +32,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 
 BAND = 2.5
-"""Highest frequency the noise at f = 0 is learnt from, Hz."""
+"""Highest frequency the noise at f = 0 is estimated from, Hz."""
 
 _FEWEST = 8
 """Frequencies that are used even when they reach beyond the band."""

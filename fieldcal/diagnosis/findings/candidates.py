@@ -110,13 +110,13 @@ def _reason_rejected(
             )
     rise = _evidence_rise(alone, posterior.search.evaluate(())) if alone else 0.0
     if rise < thresholds.LITTLE_LOG_GAIN or alone is None:
-        return "takes no more than chance would"
+        return "explains no more than chance would"
     odds = _odds(alone.score - posterior.search.evaluate(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
     if beside is not None and _evidence_rise(beside, best) > thresholds.LITTLE_LOG_GAIN:
         return f"beside {names} it takes a little, at odds of {odds}"
-    return f"{names} takes it: beside that nothing is left for it"
+    return f"{names} already explains it"
 
 
 def _odds(gain: float) -> str:

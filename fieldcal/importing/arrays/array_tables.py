@@ -32,7 +32,7 @@ DIMENSIONS = (1, 2)
 
 MAX_UNPACKED_BYTES, MAX_COMPRESSION = 1 << 28, 50
 """Bytes that an archive may always unpack to, and how many times its size beyond that:
-noise is not to be compressed."""
+noise does not compress."""
 
 
 class ArrayTable(NamedTuple):

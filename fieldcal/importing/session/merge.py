@@ -22,7 +22,7 @@ PEEKED = 64
 
 AS_NAMED = (
     f"that of the files as they are named, {BETWEEN:g} s apart, since their times start"
-    " anew: what goes with time from file to file is not to be believed"
+    " anew: a drift from file to file cannot be estimated"
 )
 
 

@@ -173,8 +173,7 @@ def _fit(acc: Array, free: int, gravity: float) -> tuple[Array, float]:
 def _consistent_rows(acc: Array, free: int, gravity: float) -> NDArray[np.bool_]:
     """Rows without outliers, such as a position in which the device was moved.
 
-    Rows bear witness against one only where more of them are to spare than the
-    parameters use up.
+    Rows are rejected only if there are at least twice as many rows as parameters.
     """
     from scipy.optimize import least_squares
 

@@ -10,7 +10,7 @@
 
 An axis alone belongs to the label before it, which may stand without a value; three
 values behind one label are axes; a unit holds for all axes before it. A time of day at
-the beginning is one of the monitor.
+the beginning was written by the serial monitor.
 """
 
 from __future__ import annotations

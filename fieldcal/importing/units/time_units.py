@@ -104,7 +104,7 @@ TICKED_HZ = (4.0, 2000.0)
 """Rates of the devices that count them: of two units, one alone is within."""
 
 ABOUT = float(np.log(3.0))
-"""Logarithm by which a rate is out that somebody says, and his device does not keep."""
+"""Tolerance of the logarithm of a stated rate, which a device does not keep exactly."""
 
 RATE_TOLERANCE = 0.1
 """Part by which a rate that is said and that of the times differ."""

@@ -1,4 +1,4 @@
-"""What is taken for units that neither the file nor the user says, and why.
+"""Units that are assumed where neither the file nor the user states them, and why.
 
 What physics tells is taken, said, and kept as a guess until the user confirms it; where
 it leaves a choice, the user is asked, with what to add to the command.

@@ -1,14 +1,14 @@
 """The evidence of sets of groups, from one Gram matrix.
 
-Rows of a window are off by something that they share (an instability, rounding, the
-turns of an orientation that nobody knows), so a window counts as its course about its
-mean, which that leaves alone, and as its mean, of covariance
+The rows of a window share errors: an instability, rounding, rotations of an unknown
+orientation. Each window is therefore split into the deviations from its mean, which
+these errors do not affect, and the mean, with the covariance
 
     C_p = S_p^-1 + diag(tau^2) + A_p A_p^T                                         (1)
 
-with S_p its information, tau what each channel shares and A_p free turns. With G =
-Phi^T R^-1 Phi and b = Phi^T R^-1 (y - h) of all rows so weighed, and S the sizes v T of
-the columns of a set,
+with S_p the information on the mean, tau the instability of each channel and A_p the
+derivative by free rotations. With G = Phi^T R^-1 Phi and b = Phi^T R^-1 (y - h) of all
+rows with these weights, and S the prior standard deviations v T of a set's columns,
 
     ln Z = b^T S (I + S G S)^-1 S b / 2 - ln |I + S G S| / 2 - ln |R| / 2           (2)
 
@@ -17,8 +17,8 @@ Schur complement of T G T and q = U^T T b',
 
     gain(v) = sum_j [ v^2 q_j^2 / (1 + v^2 lambda_j) - ln(1 + v^2 lambda_j) ] / 2   (3)
 
-Nothing here is approximate but the grid of v. Source: M. Tipping and A. Faul, Fast
-marginal likelihood maximisation for sparse Bayesian models, 2003.
+The only approximation is the grid of v. Source: M. Tipping and A. Faul, Fast marginal
+likelihood maximisation for sparse Bayesian models, 2003.
 """
 
 from __future__ import annotations

@@ -1,19 +1,20 @@
 """The evidence of a set at many instabilities, calculated together.
 
-Instability of some kinds is in the noise of the means that are of these kinds; all
-other rows have the same information at each. With W the whitening of those means at one
-instability, and X the set's columns, further ones and last the rows themselves in them,
+Only the means of windows and the closures of turns depend on the instability; the
+information of all other rows is always the same. With W the whitening of those means at
+one instability, and X their columns of the set, further columns, and as the last column
+their residuals,
 
     T = T_0 + X^T W^T W X                                                           (1)
 
-has G and b of the set, what further columns share with it, R, what they are by
-themselves, M and c, and the square of the rows. With S the sizes of the set, and one
-for the rows,
+contains G and b of the set, its products R with the further columns, their own M and c,
+and the squares of the residuals. With S the prior standard deviations of the set, and 1
+for the residuals,
 
     [L 0; l^T r] [L 0; l^T r]^T = 1 + S T S,    l = L^-1 S b                        (2)
     ln Z = (1 - r^2 - ln |R|) / 2 - ln |L|                                          (3)
 
-is (2) of `gram`, and of further columns there is left
+is (2) of `gram`. After the elimination of the set, the further columns have
 
     N = L^-1 S R,    M' = M - N^T N,    c' = c - N^T l                              (4)
 """

@@ -1,13 +1,14 @@
 """Sets of causes with their evidence.
 
-A set's evidence is that of its groups at their likeliest sizes, times what every size
-besides leaves of it,
+The evidence of a set is that of its groups at their most probable sizes, times a factor
+for the width of the posterior of each size,
 
     ln Z = F(v*) + sum_k ln sum_j exp(F(v_k = v_j) - F(v*)),    F = (2) + ln p(v)
 
-and its weight is that times the chance of every cause in it. What is always there (an
-instability, say) has a size as well, and is estimated beside every set anew: held
-against the size of all that was unexplained before, no cause would explain anything.
+and its weight is the evidence times the prior probability of each of its causes. What
+is always present, such as an instability, has a size as well. That size is estimated
+again for every set: if it stayed at its value without a cause, it would explain
+everything that the cause explains.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""The likeliest sizes of one set, each sought beside the others.
+"""The most probable sizes of one set, each found with the others fixed.
 
-Once a set is eliminated with sizes v_0, its covariance says what the evidence would be
-at any other size of one group: with C = U diag(c) U^T the covariance of the group in
-units of what it was before, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are
-those of (3) of `gram`. What the means of windows share likewise: with S = U diag(s)
-U^T the information on them with tau in it, s / (1 - tau^2 s) is that without.
+Once a set is eliminated with sizes v_0, its covariance gives the evidence at any other
+size of one group: with C = U diag(c) U^T the posterior covariance of the group in units
+of its prior covariance, lambda = (1 / c - 1) / v_0^2 and q = U^T u / (c v_0) are those
+of (3) of `gram`. The same holds for the instability that means of windows share: with
+S = U diag(s) U^T the information on the means with tau, s / (1 - tau^2 s) is that
+without.
 """
 
 from __future__ import annotations

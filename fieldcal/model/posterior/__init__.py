@@ -1,6 +1,6 @@
-"""What follows from the sets that were visited: probabilities, numbers, predictions.
+"""Results of the visited sets: probabilities, estimates, predictions.
 
 Probabilities of causes and their aliases, mean and covariance mixed over hypotheses,
-and residuals of positions that were held out. Only results are formed here; nothing
-goes back into the search.
+and residuals of held-out positions. To find aliases, `probabilities` visits further
+sets; if one of them is better than the best, `diagnosis.explain` resumes the search.
 """

@@ -1,9 +1,9 @@
 """Held-out residuals: each position, predicted from the others.
 
-Each position in turn is left out and everything is chosen again without it: which of
-the sets in question, with which variants, which sizes, which values. With too few
-windows stretches of time are left out instead. What a position has of its own (the
-angles it was set at, an orientation that nobody knows) is sought in it; nothing else.
+Each position in turn is left out, and everything is chosen again without it: the set
+among the candidate sets, its variants, sizes and values. With too few windows,
+stretches of time are left out instead. Only what belongs to the position alone (its set
+angles, or an unknown orientation) is estimated from it.
 """
 
 from __future__ import annotations

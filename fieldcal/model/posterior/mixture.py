@@ -1,14 +1,16 @@
 """The estimate of a set, averaged over sizes and over windows that may be bad.
 
-How much biases wander from window to window is known by the scatter of few windows
-only, and any window may be disturbed in a way that it does not show itself. Both are
-hypotheses h, each with its evidence (`model.evidence`), and the answer is their mixture
+The instability of the biases is known only from the scatter of a few windows, and any
+window may be disturbed without showing it. Values of the instability and bad windows
+are hypotheses h, each with its evidence (`model.evidence`). The estimate is their
+mixture,
 
     mean = sum_h P(h) mean_h,    cov = sum_h P(h) [cov_h + off_h off_h^T],
     off_h = mean_h - mean
 
-so of few degrees of freedom an interval is as wide as Student's, and wide as well while
-it is not clear whether a window is bad; one that is for certain has no weight left.
+so with few degrees of freedom an interval is as wide as that of Student's t. It is also
+wide where a window may be bad; a window that is certainly bad has no weight.
+
 Source: Bayesian model averaging; for windows, Cook and Weisberg 1982, 2.1.
 """
 

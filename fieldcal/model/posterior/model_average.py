@@ -1,16 +1,14 @@
 """Estimates averaged over the sets that the search visited.
 
 The best set is not certain: an effect may have all of its parameters or only some, or
-an alias may be there instead. Each set s has an estimate, and its probability is its
-weight w_s,
+an alias may be present instead. With the estimate of each set s and its weight w_s,
 
     mean = sum_s w_s mean_s
     cov = sum_s w_s [cov_s + (mean_s - mean) (mean_s - mean)^T]                     (1)
 
-A parameter that a set does not have is 0 in it. An effect x that every device has a
-little of, and that is not in the set, is eliminated with it. Of the covariance Q before
-the rows are seen, M and b' what they say of it after the set is eliminated (see
-`model.evidence`),
+A parameter that a set does not have is 0 in it. An effect x that every device has to a
+small degree, and that is not in the set, is eliminated with it. With its prior
+covariance Q, and M and b' of `gram` after the elimination of the set,
 
     P = (Q^-1 + M)^-1
     mean_s - C_s G_sx P b'  and  C_s + C_s G_sx P G_xs C_s                          (2)

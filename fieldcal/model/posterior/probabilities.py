@@ -1,9 +1,9 @@
 """Probabilities of causes, and their aliases.
 
-The sets that were visited are weighted by evidence times chance. Another cause is an
-alias of one that was found when the best set with it instead has an evidence that is
-not clearly less, whatever the chances before; the probability that something is there
-counts the sets with an alias of it.
+The weight of a visited set is its evidence times its prior probability. Another cause
+is an alias of a cause if the best set with it instead has nearly the same evidence;
+prior probabilities do not count there. The probability of a cause is the weight of all
+sets that contain it or an alias of its kind.
 """
 
 from __future__ import annotations

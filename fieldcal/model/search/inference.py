@@ -1,8 +1,8 @@
-"""From rows to an explanation: linearise, search and update the state until both stay.
+"""From rows to an explanation: linearise, search, update the state, until it converges.
 
-The search is exact for the linearised rows. The state is updated to the estimate of the
-set that was found; there all rows are linearised and searched again, starting from that
-set. The search may also start from an explanation of a part of the recording.
+The search is exact for the linearised rows. The state is then updated to the estimate
+of the set that was found, the rows are linearised there, and the search begins again
+with that set. It may also begin with an explanation of a part of the recording.
 """
 
 from __future__ import annotations

@@ -1,25 +1,25 @@
 """Pairs of causes, which may explain rows that neither explains by itself.
 
-Of groups i and j beside a set, the sizes are sought in turn, each beside the other at
-its likeliest, by (3) of `gram`: what one alone needs to make up for both it does
-not need beside the other. With M_jj = U diag(lambda) U^T and q = U^T b_j, what is left
-of i beside j at size v is
+The sizes of groups i and j, added to a set, are found in turn by (3) of `gram`, each
+with the other at its most probable size: the size found for one alone is too large
+where both are present. With M_jj = U diag(lambda) U^T and q = U^T b_j, the matrix and
+vector of i after the elimination of j at size v are
 
     M_ii - S^T E S,    b_i - S^T E q,    S = U^T M_ji,  E = 1 / (lambda + 1 / v^2)  (1)
 
-Where i has more columns than j, its eigenvalues need not be sought again: with
+If i has more columns than j, its eigenvalues need not be calculated again: with
 W = U_i^T M_ij E^(1/2), B = 1 / (lambda_i + 1 / u^2) and A = I - W^T B W in its axes,
 
     |I + u^2 M'| = |I + u^2 M_ii| |A|,
     b'^T (M' + 1 / u^2)^-1 b' = b'^T B b' + (W^T B b')^T A^-1 (W^T B b')           (2)
 
-What a pair explains only grows with its sizes, and no determinant is below one, so
+What a pair explains grows with its sizes, and no determinant is below one, so
 
     gain <= q_j^T E q_j / 2 + b'^T (M' + 1 / u^2)^-1 b' / 2    at the largest u, v  (3)
 
-and pairs that this leaves below what is asked for need no sizes.
+and the sizes of pairs whose bound is below the required gain are not calculated.
 
-Source: the determinant lemma and the identity of Woodbury.
+Source: the matrix determinant lemma and the Woodbury identity.
 """
 
 from __future__ import annotations

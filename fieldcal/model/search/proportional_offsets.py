@@ -1,18 +1,19 @@
 """Offsets of the windows that all axes of a triad share in one proportion.
 
-Where the joints stand otherwise than they are said to, or what holds the device gives,
-all axes of a triad are off together, in a proportion a that nobody knows,
+If the joints stand at other angles than stated, or the fixture gives way, all axes of a
+triad have offsets in one unknown ratio a,
 
     y_pc = d_p a_c
 
-which is linear in neither alone. About d0 and a0, with r_j the directions across a0,
+which is a product of unknowns. Linearised about d0 and a0, with r_j the directions
+perpendicular to a0,
 
     y_pc = d_p a0_c + sum_j t_j d0_p r_jc                                          (1)
 
-is, so the group has a column for each window and one for each direction across, and
-what the proportion costs is counted as of any other columns. d0 and a0 are the leading
-singular vectors of what the windows of each axis are off by beside a set: where (1)
-fits best. Source: principal components, one step of Gauss and Newton about them.
+so the group has a column for each window and one for each perpendicular direction, and
+the unknown ratio costs evidence as any other columns do. d0 and a0 are the leading
+singular vectors of the offsets of each axis in each window, given a set. Source:
+principal components, and one Gauss-Newton step about them.
 """
 
 from __future__ import annotations

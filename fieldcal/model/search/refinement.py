@@ -1,7 +1,7 @@
-"""Shapes between the points of their grids: where the evidence of a set is highest.
+"""Finds the shape parameters, between their grid points, of the highest evidence.
 
-What happens at an instant happens to both triads, so the members of an effect that are
-at once are moved together.
+An effect with an instant acts on both triads at that instant, so its members with the
+same instant are moved together.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
 from fieldcal.model.search.pairs import Pair, pair_gains
 
 MIN_LOG_RISE = 0.02
-"""Rise of ln Z that is none."""
+"""Largest rise of ln Z that counts as zero."""
 
 MAX_STEPS = 30
 """Steps of one search."""

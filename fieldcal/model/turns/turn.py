@@ -1,4 +1,4 @@
-"""One turn between two windows, followed by the gyroscopes.
+"""One turn between two windows, integrated from the gyroscopes.
 
 With w^ = (W - d)/s - w_earth, corrected also for the other errors of the gyroscopes in
 the state, the attitude is integrated from position p to q, R_k = exp(-[w^ dt]x)

@@ -14,28 +14,29 @@ SIZES: Array = np.geomspace(1e-5, 1e3, 33)
 """Values of v, a factor of 1.78 apart: an evidence changes little between two."""
 
 SIZE_TAIL = 4.0
-"""A size v times what is typical is as rare as v^-TAIL: so are outliers of data
-sheets."""
+"""The prior density of ln v falls as v^-TAIL above the typical size, as the outliers of
+data sheets do."""
 
 INSTABILITY_TAIL = 8.0
-"""The same of instability: what scatters ten times as much as devices has a cause."""
+"""The same for instability: a scatter ten times that of devices has another cause."""
 
 BIAS_ACC, BIAS_GYR, SCALE = 0.3, 2e-2, 1e-2
 """Typical change from nominal: 30 mg, 1 deg/s, 1 %; what consumer grade reaches."""
 
 FREE_SIZE = 30.0
-"""Size of what a calibration is to find, in typical ones: it decides nothing there."""
+"""Prior standard deviation of the parameters that a calibration estimates, in typical
+sizes: 9 m/s^2 of bias, so that the prior has no influence on the estimate."""
 
 GYRO_COUPLING_SIZE = 2.5
-"""The same of the cross-coupling of gyroscopes: 0.05. Two turns do not show all of it,
-and what it may be is in the scale factors; no gyroscope is further off."""
+"""The same for the cross-coupling of gyroscopes: 0.05, which no gyroscope exceeds. Two
+turns do not determine all of it; the rest widens the scale factors' intervals."""
 
 INSTABILITY_ACC, INSTABILITY_GYR = 1e-3, 3e-5
 """Typical scatter of a bias from window to window, m/s^2 and rad/s: 0.1 mg, 6 deg/h."""
 
 CLOSURE_RAD = 5e-4
-"""Typical scatter of the angle that a turn closes with, rad, beyond noise: bandwidth,
-timing and the hand take half a milliradian."""
+"""Typical scatter of the closure of a turn beyond the noise, rad: bandwidth, timing and
+the hand make half a milliradian."""
 
 FILTERED_S = 0.1
 """Standard deviation of the time constant of a filter of the sensors, s: 1.6 Hz. Data
@@ -46,100 +47,104 @@ FLICKER_ACC, FLICKER_GYR = 2e-3, 1e-4
 level, 0.2 mg and 20 deg/h."""
 
 FLICKER_CHANCE = 0.1
-"""Chance that flicker noise, which neighbouring windows share, is more of what a bias
-wanders by than what comes anew in each of them, with how the device lies."""
+"""Probability that the larger part of a bias's wander is flicker, which neighbouring
+windows share, and not an offset that is new in each window."""
 
 AXES_LOG_SPREAD = 0.3
-"""Spread of the instabilities of a triad's axes, ln: they are made alike."""
+"""Spread of the instabilities of a triad's axes, ln: they are of the same make."""
 
 UNKNOWN_ACC, UNKNOWN_GYR = 2e-2, 1e-3
-"""Typical size of what no effect makes, m/s^2 and rad/s: that of the effects."""
+"""Typical size of a function that no effect makes, m/s^2 and rad/s: as of effects."""
 
 MAX_COSINES = 80
-"""Cosines of a walk or of flicker at most: one for some seconds of a session of
-minutes. What they leave of what is far above the noise is as good as white."""
+"""Largest number of cosines of a walk or of flicker: one for some seconds of a session
+of minutes. Their residual is nearly white."""
 
 BESIDE_TILT_DEG = 0.05
-"""What a base is off by beside joints that are, and joints beside a base, deg: one of
-them may explain the positions, and the other one is there as well. A bubble level shows
-no less."""
+"""Possible tilt of the base if offsets of the joints explain the positions, or offsets
+of the joints if a tilt does, deg. A bubble level does not show less."""
 
 SCALE_WARMING = 0.25
-"""How much a scale factor of an accelerometer changes with the temperature, at 1 g, as
-a part of what its bias does: 0.02 %/K beside 0.8 mg/K of an MPU-6050."""
+"""Change of an accelerometer's scale factor with the temperature, at 1 g, as a part of
+the change of its bias: 0.02 %/K and 0.8 mg/K in the data sheet of the MPU-6050."""
 
 MISSET_DEG = 3.0
 """Typical error of a position whose angle is not the stated one, deg."""
 
 SINGLE_MISTAKE_DEG, REPEATED_MISTAKE_DEG, GAUGE_ERROR = 10.0, 0.2, 5e-3
-"""Largest usual mistake of one position, deg, of an angle that is repeated, deg, and of
-a gauge that all angles come from, as a part of them."""
+"""Typical error of one position, deg, of an angle that is set several times, deg, and
+of a gauge that all angles come from, as a part of them."""
 
 LEAN_CHANCE, LEAN_RAD = 0.1, 2e-4
-"""Chance that what a device lies on gives way while it rests, and by how much, rad:
-tyres, foam and grass do, by tenths of a milliradian in a minute."""
+"""Probability that the support of a device gives way while it rests, and typical angle,
+rad: tyres, foam and grass yield by tenths of a milliradian in a minute."""
 
 SINK_CHANCE, SINK_RAD, SINK_FADING = 0.02, 5e-4, 0.2
-"""Chance that the base of a fixture turns while it is used, by how much, rad, and how
-much smaller each polynomial of that is than the one before: a tripod on soil or a table
-that bends settles within one to several times a session."""
+"""Probability that the base of a fixture turns during the session, typical angle, rad,
+and ratio of each polynomial to the one before: a tripod on soil or a bending table
+settles with time constants from one to several times the session."""
 
 LOST_TURN_CHANCE, LOST_TURN_RAD = 0.02, 0.03
-"""Chance that the gyroscopes did not follow one of the turns, and the angle that they
-missed, rad: a tenth of a second of a turn by hand."""
+"""Probability that the gyroscopes did not measure the whole of a turn, and the typical
+missed angle, rad: a tenth of a second of a turn by hand."""
 
 ARRIVAL_S = 0.3
 """Standard uncertainty of the instant at which a turn by hand ends."""
 
 BUILD_UP_ON_WAY, BUILD_UP_AT_END, BUILD_UP_S = 0.5, 0.15, 2.0
-"""How far what settles may be off on the way and at its end, in its size, and how
-smoothly, s."""
+"""Uncertainty of how a settling effect builds up, in its size: during the turn and at
+its end, and the correlation time of that error, s. Judged, not measured: how an effect
+develops during a turn is not known."""
 
 CLOCK_S, CLOCK_RATE = 1e-2, 1e-4
 """Typical error of an alignment by correlation, s, and of a quartz, 1."""
 
 AXES_TURNED = 0.1
-"""Typical turn between two axes that are taken for the same, rad."""
+"""Typical rotation between two sets of axes that are taken as the same, rad."""
 
 UPRIGHT, UNSEEN = 10.0, np.repeat([0.5, 0.01], 3)
-"""What a channel may have that a reference says nothing of, m/s^2 and rad/s: gravity
-along the axis that stands upright, and three degrees of it along those that lie."""
+"""Possible offset of a channel that the reference does not measure, m/s^2 and rad/s:
+gravity along the upright axis, and three degrees of it along the level axes."""
 
 SMALL_ROTATION = 1.0
-"""Turns of a position whose orientation nobody knows, rad: any."""
+"""Prior standard deviation of the rotations of an unknown orientation, rad: any."""
 
 LOOSE_FIXTURE_CHANCE, LOOSEST_FIXTURE = 0.2, 100.0
-"""Chance that something beside the device scatters the windows of a given set, a
-fixture that does not return or an effect that is left out, and by up to so many typical
-instabilities: 0.1 m/s^2, a joint that comes back to half a degree."""
+"""Probability that the windows of a given set scatter for another reason than the
+device (a fixture that does not return, an effect that is left out), and by how many
+typical instabilities at most: 0.1 m/s^2, a joint that returns to half a degree."""
 
 BAD_WINDOW_CHANCE = 5e-3
-"""Chance that a given window is disturbed in a way that it does not show itself."""
+"""Probability that a given window is disturbed without showing it."""
 
 COMPANION_CHANCE = 0.3
-"""Chance of an effect in the gyroscopes when the accelerometers have it, and back; and
-of what every triad has until it is calibrated, when another of these is there."""
+"""Probability of an effect in one triad if the other triad has it, and of an error of
+uncalibrated devices if another of these errors is present. Judged: many causes, such as
+a power-on or a temperature, act on both triads, and many do not."""
 
 SINGLE_AXIS_SHARE = 0.1
-"""Part of the biases that wander of which one axis does, and the others do not."""
+"""Part of the random walks that are those of a single axis. Judged: the axes of a triad
+are of the same make."""
 
 WRONG_LATITUDE_CHANCE = 1e-3
-"""Chance that a latitude that somebody wrote down is another one."""
+"""Probability that a stated latitude is wrong."""
 
 RESTART_CHANCE = 0.1
-"""Chance that what begins at an instant begins where samples are missing between two
-positions: a link fails more often than a supply."""
+"""Probability that an effect with an instant begins where samples are missing between
+two positions: a link fails more often than a supply."""
 
 BOTH_RESTART_ODDS = 20.0
-"""Odds that all axes of a triad do so if those of the other one do, by what is typical;
-and the inverse that some do, or by less."""
+"""Odds that all axes of a triad have changed there by a typical amount, if those of the
+other triad have; the inverse for some axes, or a smaller change. Judged: after a
+restart every bias is another one."""
 
 AS_STATED_CHANCE = 0.2
-"""Chance that a kind of error is as small as the stated grade has it in a device with
-biases of a coarser one: its gyroscopes tell little of its accelerometers."""
+"""Probability that a kind of error is as small as in the stated grade, if the biases
+are those of a coarser grade: the gyroscopes say little of the accelerometers."""
 
 UNKNOWN_FUNCTION_CHANCE = 5e-4
-"""Chance of a function that no effect makes, for each covariate."""
+"""Probability of a function that no effect makes, for each covariate: one in twenty of
+the probability of an effect."""
 
 
 def instability_density_of_given_set() -> Array:

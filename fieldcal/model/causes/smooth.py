@@ -21,6 +21,8 @@ from fieldcal.core.samples import Array
 from fieldcal.physics.experience import Experience
 
 MAX_COSINES = 40
+"""Cosines of the fastest course; its prior makes those beyond them negligible."""
+
 HALF_WAVES = (1.5, 4.0, 9.0, 20.0)
 """Half waves of a smooth course over the session, from slow to fast."""
 
@@ -28,8 +30,13 @@ MIN_COSINE_SIZE = 1e-3
 """Relative size below which a cosine is omitted from a course."""
 
 HARMONICS = 4
-SLOW = 4
-LONG_S = 1e4
+"""Sines and cosines of an angle; an effect of the fourth power has four."""
+
+TIME_POWERS = 4
+"""Legendre polynomials of time of a force that fades or grows."""
+
+MAX_SINCE_TURN_S = 1e4
+"""Time since a turn from which nothing changes any more, s."""
 
 
 class CourseSpan:
@@ -58,7 +65,7 @@ class CourseSpan:
     def fading(self, x: Experience) -> Array:
         """Force along each axis times powers of the time."""
         part = np.clip((x.t - self.start) / self.length, 0.0, 1.0)
-        steps = np.polynomial.legendre.legvander(2 * part - 1, SLOW)[:, 1:]
+        steps = np.polynomial.legendre.legvander(2 * part - 1, TIME_POWERS)[:, 1:]
         f = x.f / x.gravity
         out: Array = (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
         return out
@@ -81,7 +88,7 @@ def smooth_course_sizes(span: float) -> Array:
 
 def force_time_columns(axis: int) -> slice:
     """Columns of `CourseSpan.fading` that contain the force along one axis."""
-    return slice(axis * SLOW, (axis + 1) * SLOW)
+    return slice(axis * TIME_POWERS, (axis + 1) * TIME_POWERS)
 
 
 def alpha(x: Experience) -> Array:
@@ -122,7 +129,7 @@ def temperature(x: Experience) -> Array:
 
 def since_turn(x: Experience) -> Array:
     """Powers of the logarithm of the time since the turn."""
-    part = np.log1p(np.clip(x.since_turn, 0.0, LONG_S)) / np.log1p(100.0)
+    part = np.log1p(np.clip(x.since_turn, 0.0, MAX_SINCE_TURN_S)) / np.log1p(100.0)
     return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
 

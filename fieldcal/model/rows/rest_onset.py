@@ -18,6 +18,7 @@ from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
 
 PIECE_S = 0.2
+"""Length of the means that are compared with that of the window, s."""
 MOVING_SIGMAS = 7.0
 """Difference of a short mean from the window's that is motion, in standard errors."""
 

@@ -37,6 +37,7 @@ RIDGE = 1e-9
 """Of a fit's own information, added where too few means lie in a span."""
 
 MAX_MEANS = 3600
+"""Means of the temperature of a recording, of a second or longer."""
 
 PAUSE_S = 60.0
 """What of a pause without samples counts for the width of these steps, s."""

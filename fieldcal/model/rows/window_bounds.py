@@ -21,6 +21,7 @@ MIN_WINDOW_ROWS, MAX_WINDOW_ROWS = 8, 120
 """Rows of one window."""
 
 FIRST_S = 1.0
+"""Length of the first row of a window, in which settling changes fastest, s."""
 
 
 def window_bounds(block: Block, about: Description) -> NDArray[np.intp]:

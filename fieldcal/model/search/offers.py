@@ -32,17 +32,19 @@ from fieldcal.model.search.offer import (
 )
 
 INSTABILITY_STEPS_DOWN = (3, 6, 9, 40)
-"""Steps in size by which instability may decrease when a cause explains it."""
+"""Steps of `priors.SIZES` by which the instability may decrease when a cause explains
+it: by factors of 6, 32 and 180, and to the smallest size."""
 
 FLICKER_STEPS_DOWN = (1, 2)
-"""The same for flicker: at its full size it leaves little for a random walk."""
+"""The same for flicker: at its full size it explains most of a random walk."""
 
 LOWERED_TOGETHER = ((0, 1, 2), (3, 4, 5, 6))
 """Instabilities that decrease together: of a triad; closures with the gyroscopes."""
 
 RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
-"""Sizes to which that of closures may rise when that of the accelerometers decreases:
-a closure's error has a part from accelerometers and a part of its own."""
+"""Sizes to which the instability of closures may rise when that of the accelerometers
+decreases, since errors of closures come from both: one step above the typical size, and
+ten times it."""
 
 SetAtInstability = tuple[InstabilityIndices, Eliminated, float]
 """An instability, and a set's state and score at it."""
@@ -57,7 +59,8 @@ MIN_CACHED_COLUMNS = 30
 """Number of columns of a group from which its gains are cached."""
 
 MIN_LOG_GAIN = 0.5
-"""Gain of ln L below which there is no offer, unless the cause is likely a priori."""
+"""Gain of ln L below which there is no offer, unless the cause is likely a priori: one
+parameter gains that much from noise."""
 
 MAX_LOG_DISTANCE = 12.0
 """Largest distance of an offer from the best to be evaluated, ln."""

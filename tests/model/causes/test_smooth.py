@@ -64,7 +64,7 @@ def test_a_force_that_changes_in_time() -> None:
     s = 2 * (X.t - X.t[0]) / np.ptp(X.t) - 1
     legendre = [s, (3 * s**2 - 1) / 2, (5 * s**3 - 3 * s) / 2,
                 (35 * s**4 - 30 * s**2 + 3) / 8]  # fmt: skip
-    assert found.shape == (len(X), 3 * smooth.SLOW)
+    assert found.shape == (len(X), 3 * smooth.TIME_POWERS)
     for axis in range(3):
         some = found[:, smooth.force_time_columns(axis)]
         for column, power in zip(some.T, legendre, strict=True):

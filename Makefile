@@ -24,9 +24,9 @@ test: $(DEV)
 test-all: $(DEV)
 	$(BIN)/python -m pytest -q -n 3 --all
 
-# faults put into the formulas one by one, and whether the tests of the same room notice;
-# `make mutants-core` does one room; hours for all, so not in CI. DRAW=150 draws so many of
-# a room at random instead of all, SEED=2 others
+# faults put into the formulas one by one, and whether the tests of the same package notice;
+# `make mutants-core` does one package; hours for all, so not in CI. DRAW=150 draws so many of
+# a package at random instead of all, SEED=2 others
 mutants: mutants-core mutants-windows mutants-model mutants-solve
 
 mutants-%: .venv/.mutants

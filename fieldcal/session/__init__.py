@@ -1,5 +1,5 @@
 """A session on disk: its description, samples, marks, and whether they are whole.
 
-Only this room knows how the files of a session folder are laid out and written. It
+Only this package knows how the files of a session folder are laid out and written. It
 calculates nothing from the samples. A new kind of sample file is a branch of `files`.
 """

@@ -1,7 +1,7 @@
 """From samples to averages: mean, honest standard error, stillness, disturbance.
 
-This room has the only measurement of white noise and rounding. It knows no positions,
-parameters or files.
+This package has the only measurement of white noise and rounding. It knows no
+positions, parameters or files.
 """
 
 from fieldcal.windows.limits import StillnessLimits

@@ -52,7 +52,7 @@ class ColumnTable:
         self.window_positions = np.unique(x.position)
         self.position_count = int(x.position.max()) + 1
         self.wander = wander
-        self.span = smooth.CourseSpan(x.t, int(wander.modes.max()))
+        self.span = smooth.CourseSpan(x.t, int(wander.modes.max()), x.warming)
         self.bases: list[tuple[int, Basis]] = []
         self.width = 0
         self.bias = self.add(General("bias", columns.bias), 6)

@@ -40,18 +40,27 @@ MAX_SINCE_TURN_S = 1e4
 
 
 class CourseSpan:
-    """Time span of a session, and the functions of time over it.
+    """Span of a session in time and temperature, and the functions over it.
+
+    They are the same functions wherever they are evaluated: in the windows, during
+    turns, and at the end of the recording.
 
     Parameters
     ----------
     t : (n,) s, instants of the rows
     count : cosines of the time
+    warming : (n,) K, temperature of the rows less that at the session's start; nan
+        where unknown
 
     """
 
-    def __init__(self, t: Array, count: int = MAX_COSINES) -> None:
+    def __init__(
+        self, t: Array, count: int = MAX_COSINES, warming: Array | None = None
+    ) -> None:
         self.start, self.length = float(t[0]), max(float(np.ptp(t)), 1e-9)
         self.count = count
+        known = np.nan_to_num(np.zeros(1) if warming is None else warming)
+        self.cold, self.range = float(known[0]), float(np.ptp(known)) or 1.0
 
     def waves(self, x: Experience) -> Array:
         """Means of cosines of the time over the rows, (n, count)."""
@@ -69,6 +78,11 @@ class CourseSpan:
         f = x.f / x.gravity
         out: Array = (f[:, :, None] * steps[:, None, :]).reshape(len(x), -1)
         return out
+
+    def temperature(self, x: Experience) -> Array:
+        """Powers of the temperature, as a part of its range."""
+        part = (np.nan_to_num(x.warming) - self.cold) / self.range
+        return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
 
     def walk(self) -> Array:
         """Standard deviation of each cosine in a walk of 1 per sqrt(s), (count,)."""
@@ -121,12 +135,6 @@ def force(x: Experience) -> Array:
     return np.hstack([*powers, np.abs(f) / 2])
 
 
-def temperature(x: Experience) -> Array:
-    """Powers of the temperature."""
-    part = np.nan_to_num(x.warming) / max(float(np.ptp(np.nan_to_num(x.warming))), 1e-9)
-    return np.column_stack([part**n / n for n in (1, 2, 3, 4)])
-
-
 def since_turn(x: Experience) -> Array:
     """Powers of the logarithm of the time since the turn."""
     part = np.log1p(np.clip(x.since_turn, 0.0, MAX_SINCE_TURN_S)) / np.log1p(100.0)
@@ -141,6 +149,6 @@ def covariates(span: CourseSpan) -> Mapping[str, Callable[[Experience], Array]]:
         "joints": joints,
         "force": force,
         "force and time": span.fading,
-        "temperature": temperature,
+        "temperature": span.temperature,
         "since turn": since_turn,
     }

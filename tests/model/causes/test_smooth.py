@@ -10,6 +10,7 @@ from small_sessions import G, ladder
 
 from fieldcal.model.causes import smooth
 from fieldcal.model.causes.smooth import CourseSpan
+from fieldcal.model.turns.turn import select_rows
 
 X = ladder()
 
@@ -97,11 +98,17 @@ def test_powers_of_the_force() -> None:
 
 def test_powers_of_the_temperature_over_its_range() -> None:
     x = replace(X, warming=np.linspace(-1.0, 3.0, len(X)))
-    part = x.warming / 4.0
+    part = (x.warming + 1.0) / 4.0
     expected = np.column_stack([part, part**2 / 2, part**3 / 3, part**4 / 4])
-    np.testing.assert_allclose(smooth.temperature(x), expected)
-    unknown = smooth.temperature(replace(X, warming=np.full(len(X), np.nan)))
-    assert not unknown.any()
+    span = CourseSpan(x.t, warming=x.warming)
+    np.testing.assert_allclose(span.temperature(x), expected)
+    # one row is worth what it is among the others
+    for i in (0, 4, len(X) - 1):
+        one = span.temperature(select_rows(x, [i]))
+        np.testing.assert_allclose(one, expected[i : i + 1])
+    unknown = np.full(len(X), np.nan)
+    blind = replace(X, warming=unknown)
+    assert not CourseSpan(X.t, warming=unknown).temperature(blind).any()
 
 
 def test_powers_of_the_time_since_a_turn() -> None:
@@ -120,7 +127,7 @@ def test_every_covariate_has_its_function() -> None:
     expected = {
         "alpha": smooth.alpha(X), "beta": smooth.beta(X), "joints": smooth.joints(X),
         "force": smooth.force(X), "force and time": span.fading(X),
-        "temperature": smooth.temperature(X), "since turn": smooth.since_turn(X),
+        "temperature": span.temperature(X), "since turn": smooth.since_turn(X),
     }  # fmt: skip
     assert of.keys() == expected.keys()
     for name, values in expected.items():

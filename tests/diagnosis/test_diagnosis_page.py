@@ -43,7 +43,7 @@ def test_the_league_says_why_each_lost(tilted: Diagnosis) -> None:
     assert {"base_tilt", "angle_offset", "cross_coupling", "bias_drift"} <= set(tried)
     assert [c.id for c in found.candidates if c.chosen] == ["base_tilt"]
     assert not tried["base_tilt"].why
-    assert "base_tilt takes it" in tried["angle_offset"].why
+    assert "base_tilt already explains it" in tried["angle_offset"].why
     assert all(c.why for c in found.candidates if not c.chosen)
     squares = [c.delta_chi2 for c in found.candidates]
     assert squares == sorted(squares, reverse=True)

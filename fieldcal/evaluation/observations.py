@@ -29,7 +29,7 @@ from fieldcal.session.duplicate_channels import refuse_duplicate_channels
 from fieldcal.session.folder import Session
 from fieldcal.solve.observations import Observations
 from fieldcal.windows import Average, LearnedNoise
-from fieldcal.windows.dead_axis import dead_sensors, without_dead_axes
+from fieldcal.windows.dead_axis import DeadSensor, dead_sensors, without_dead_axes
 
 RANGE_TOLERANCE = 1e-6
 """Tolerance of a full scale for rounding and conversion of units, as a share of it."""
@@ -148,7 +148,16 @@ def usable_windows(session: Session) -> UsableWindows:
             f"{_missing_unit_hint(session.about)}"
         )
     rows = sorted(taken)
-    averages = [taken[i] for i in rows]
+    return _windows_without(dead, rows, [taken[i] for i in rows], warnings)
+
+
+def _windows_without(
+    dead: Sequence[DeadSensor],
+    rows: Sequence[int],
+    averages: Sequence[Average],
+    warnings: Sequence[str],
+) -> UsableWindows:
+    """The windows without sensors that cannot be used, which the warnings name."""
     for one in dead:
         averages = [_without_sensor(average, one.channels) for average in averages]
     return UsableWindows(
@@ -223,13 +232,7 @@ def _windows_of_means(session: Session) -> UsableWindows:
             " [[position]] a start_s and end_s about its mean"
         )
     dead = dead_sensors(np.array([average.mean for average in averages]))
-    for one in dead:
-        averages = [_without_sensor(average, one.channels) for average in averages]
-    return UsableWindows(
-        tuple(rows),
-        tuple(averages),
-        (*session.warnings, *(one.message for one in dead)),
-    )
+    return _windows_without(dead, rows, averages, session.warnings)
 
 
 def _range_warnings(session: Session) -> list[str]:

@@ -13,7 +13,7 @@ from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.sets import Set
-from fieldcal.model.evidence.sizing import (
+from fieldcal.model.evidence.size_between import (
     most_probable_axis_size,
     most_probable_size,
 )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import CHANNELS, Block, Index, concat
+from fieldcal.core.samples import CHANNELS, Block, Index, concat, runs_of_true
 from fieldcal.importing.recording import MAX_LISTED_FAULTS, MAX_READING
 
 MIN_GROUP_ROWS, MAX_GROUP_ROWS = 1 << 13, 1 << 15
@@ -149,9 +149,12 @@ class RowValidator:
         )
         late = ~ahead & (t <= newest[:-1])
         self._newest = float(newest[-1])
-        for i in np.flatnonzero(late | ahead).tolist():
-            what = "is later than below" if ahead[i] else "is not later than above"
-            self._note("t", what, numbers[i : i + 1])
+        bad = np.flatnonzero(late | ahead)
+        for run in np.split(bad, np.flatnonzero(np.diff(ahead[bad])) + 1):
+            what = (
+                "is later than below" if ahead[run].any() else "is not later than above"
+            )
+            self._note("t", what, numbers[run])
         self._leave_out(int((late | ahead).sum()))
         return _rows_of(block, ~(late | ahead | _without_numbers(block)))
 
@@ -182,8 +185,7 @@ def _rows_of(block: Block, some: Rows) -> Block:
     """Some rows of a block."""
     if some.all():
         return block
-    edges = np.flatnonzero(np.diff(some, prepend=False, append=False))
-    return concat(block[a:b] for a, b in edges.reshape(-1, 2).tolist())
+    return concat(block[a:b] for a, b in runs_of_true(some).tolist())
 
 
 def _all_zero(block: Block) -> Rows:

@@ -33,11 +33,6 @@ UNIT_INDEX = int(np.argmin(np.abs(np.log(priors.SIZES))))
 LOG_SIZE_STEP = float(np.log(priors.SIZES[1] / priors.SIZES[0]))
 """Step of ln v between neighbouring sizes."""
 
-REFINED_SIZES = 129
-"""Number of sizes that are tried between the neighbours of a size."""
-
-MIN_SIZE_INFORMATION = 0.1
-"""Least information on ln v."""
 
 MAX_ROUNDS = 5
 """Largest number of passes over all sizes."""
@@ -110,42 +105,6 @@ def gain_terms(state: Eliminated, at: Index, v: float | Array) -> tuple[Array, A
         ..., 0
     ]
     return (1 / part - 1) / size**2, (along / (part * size)) ** 2
-
-
-def most_probable_size(state: Eliminated, at: Index, v: float) -> tuple[float, float]:
-    """Most probable size of a group, and standard uncertainty of its logarithm.
-
-    The information on ln v is that of the shares lambda v^2 / (1 + lambda v^2).
-    """
-    strength, power = gain_terms(state, at, v)
-    near = v * np.exp(np.linspace(-LOG_SIZE_STEP, LOG_SIZE_STEP, REFINED_SIZES))
-    before = np.interp(np.log(near), np.log(priors.SIZES), LOG_DENSITY)
-    best = float(
-        near[np.argmax(gains_from_eigenvalues(strength, power, near) + before)]
-    )
-    share = best**2 * strength / (1 + best**2 * strength)
-    return best, float(np.maximum(2 * (share**2).sum(), MIN_SIZE_INFORMATION) ** -0.5)
-
-
-def most_probable_axis_size(
-    state: Eliminated, at: Index, v: float, triad: tuple[float, float]
-) -> tuple[float, float]:
-    """The same for one axis of a group, whose size is v in a set.
-
-    The axes are similar within `UNLIKE`; `triad` is the result for all of them.
-    """
-    strength, power = gain_terms(state, at, v)
-    middle, part = triad
-    distance = np.linspace(-4.0, 4.0, REFINED_SIZES)
-    near = middle * np.exp(priors.AXES_LOG_SPREAD * distance)
-    top = int(
-        np.argmax(gains_from_eigenvalues(strength, power, near) - 0.5 * distance**2)
-    )
-    best = float(near[top])
-    share = best**2 * strength / (1 + best**2 * strength)
-    alike = priors.AXES_LOG_SPREAD**-2
-    info = alike + 2 * float((share**2).sum())
-    return best, float(np.hypot(info**-0.5, alike / info * part))
 
 
 LOG_ROUNDING_ERROR = 1e-6

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +12,7 @@ from fieldcal.model.causes.equal_width_groups import EqualWidthGroups
 from fieldcal.model.evidence.gram import Eliminated
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
-
-InstabilityIndices = tuple[int, ...]
-"""Indices of instabilities in `priors.SIZES`, (7,)."""
+from fieldcal.model.search.instabilities import InstabilityIndices
 
 BestVariants = dict[Cause, tuple[float, int, int]]
 """For each cause: log evidence that it adds, indices of its variant and size."""
@@ -81,12 +78,3 @@ def ranked_offers(
         if cause.key not in there.keys
     ]
     return sorted(offers, key=lambda o: -o.score)
-
-
-def lowered_instability(
-    instability: InstabilityIndices, some: Sequence[int], down: int
-) -> InstabilityIndices:
-    """Instabilities with some of them lowered by `down` steps."""
-    return tuple(
-        max(size - down, 0) if i in some else size for i, size in enumerate(instability)
-    )

@@ -15,36 +15,23 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.causes.cause import CLOSURE, Group
+from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram, evidence_gains
 from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
+from fieldcal.model.search.instabilities import InstabilityIndices, tried_instabilities
 from fieldcal.model.search.offer import (
     BestVariants,
-    InstabilityIndices,
     Offer,
     OfferTable,
     extra_log_odds,
-    lowered_instability,
     ranked_offers,
 )
 
-INSTABILITY_STEPS_DOWN = (3, 6, 9, 40)
-"""Steps of `priors.SIZES` by which the instability may decrease when a cause explains
-it: by factors of 6, 32 and 180, and to the smallest size."""
-
 FLICKER_STEPS_DOWN = (1, 2)
 """The same for flicker: at its full size it explains most of a random walk."""
-
-LOWERED_TOGETHER = ((0, 1, 2), (3, 4, 5, 6))
-"""Instabilities that decrease together: of a triad; closures with the gyroscopes."""
-
-RAISED_CLOSURES = (UNIT_INDEX + 1, UNIT_INDEX + 5)
-"""Sizes to which the instability of closures may rise when that of the accelerometers
-decreases, since errors of closures come from both: one step above the typical size, and
-ten times it."""
 
 SetAtInstability = tuple[InstabilityIndices, Eliminated, float]
 """An instability, and a set's state and score at it."""
@@ -196,7 +183,9 @@ class Offers(Sets):
         columns, prior_sigma = there.state.columns, there.state.prior_sigma
         ways = [(prior_sigma, 0.0), self.with_typical_calibration(there)]
         own = None if beside is None else beside.instability
-        for less in self._instabilities(sizes.instability, own):
+        for less in tried_instabilities(
+            self.typical_instability, sizes.instability, own
+        ):
             fallen = less != sizes.instability
             rows = self._weighted_columns(less).rows
             for before, cost in ways if fallen and ways[1][1] else ways[:1]:
@@ -246,27 +235,6 @@ class Offers(Sets):
                 self._weighted_columns(less).rows, there.state.columns, prior_sigma
             )
             yield less, state, base + state.score + self.instability_log_prior(less)
-
-    def _instabilities(
-        self, instability: InstabilityIndices, beside: InstabilityIndices | None
-    ) -> list[InstabilityIndices]:
-        """The set's instability, and that of another set or some smaller ones."""
-        if beside is not None:
-            return list(dict.fromkeys([instability, beside]))
-        found = [instability]
-        for some in LOWERED_TOGETHER if self.typical_instability.any() else ():
-            for down in INSTABILITY_STEPS_DOWN:
-                found.append(lowered_instability(instability, some, down))
-        acc = LOWERED_TOGETHER[0]
-        if (
-            self.typical_instability[CLOSURE]
-            and max(instability[c] for c in acc) > UNIT_INDEX
-        ):
-            steady = lowered_instability(instability, acc, INSTABILITY_STEPS_DOWN[-1])
-            found += [
-                steady[:CLOSURE] + (max(steady[CLOSURE], up),) for up in RAISED_CLOSURES
-            ]
-        return list(dict.fromkeys(found))
 
     def with_typical_calibration(self, there: Set) -> tuple[Array, float]:
         """Prior sizes with no calibration below its typical size, and their cost, ln.

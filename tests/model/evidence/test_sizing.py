@@ -13,16 +13,21 @@ from fieldcal.core.samples import Array
 from fieldcal.model import priors
 from fieldcal.model.evidence.gram import Eliminated, gains_from_eigenvalues
 from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.size_between import (
+    most_probable_axis_size,
+    most_probable_size,
+)
 from fieldcal.model.evidence.sizing import (
     LOG_SIZE_STEP,
     UNIT_INDEX,
     instability_log_prior,
-    most_probable_axis_size,
-    most_probable_size,
 )
 from fieldcal.model.priors import SIZES
-from fieldcal.model.search.offer import lowered_instability
-from fieldcal.model.search.offers import INSTABILITY_STEPS_DOWN, LOWERED_TOGETHER
+from fieldcal.model.search.instabilities import (
+    INSTABILITY_STEPS_DOWN,
+    LOWERED_TOGETHER,
+    lowered_instability,
+)
 
 SET = np.array([0, 3, 4, 7])
 KEYS = ("angle_offset", "bias_drift:gyr", "alpha:ay")

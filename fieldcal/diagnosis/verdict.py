@@ -90,7 +90,10 @@ def make_diagnosis(block: Block, explanation: Explanation) -> Diagnosis:
     mismatch = tuple(
         counted(m) for m in _all_mismatches(block, explanation, lost, strange)
     )
-    strange = [replace(u, mismatch=counted(u.mismatch)) for u in strange]
+    strange = [
+        replace(u, mismatch=counted(u.mismatch), exchanged=indices_in_file(u.exchanged))
+        for u in strange
+    ]
     quality = _quality(explanation, lost, first, then)
     words = paragraph(
         verdict, effects, mismatch, strange, quality, explanation,

@@ -22,10 +22,14 @@ from fieldcal.calibration.names import TILTS
 from fieldcal.core.samples import CHANNELS
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import calibration_of_set
-from fieldcal.diagnosis.findings.unknown_mismatch import angle_errors, list_positions
+from fieldcal.diagnosis.findings.unknown_mismatch import (
+    angle_errors,
+    exchanged_positions,
+    list_positions,
+)
 from fieldcal.diagnosis.prepare import PreparedRecording
 from fieldcal.diagnosis.signal.chain import find_in_recorded_samples
-from fieldcal.diagnosis.wording.paragraph import angle_errors_text
+from fieldcal.diagnosis.wording.paragraph import angle_errors_text, exchange_text
 from fieldcal.effects import catalogue
 from fieldcal.model import thresholds
 from fieldcal.model.evidence.sets import Set
@@ -108,11 +112,11 @@ def wrong_angle_sentences(explanation: Explanation) -> list[str]:
     out = []
     for s in explanation.probable_causes:
         if s.kind == "position":
-            cure = (
-                "mend it before the next recording"
-                if any(group.moved_positions for _, group in s.members)
-                else "set it again and repeat it, and this is known better"
-            )
+            cure = "set it again and repeat it, and this is known better"
+            if any(group.moved_positions for _, group in s.members):
+                cure = "mend it before the next recording"
+            elif exchanged_positions(explanation, s):
+                cure = "exchange them in session.toml, and this is known better"
             out.append(
                 f"the recording shows {_describe_wrong_angles(explanation, s)}: the"
                 f" result is for the angle that was found; {cure}"
@@ -122,13 +126,16 @@ def wrong_angle_sentences(explanation: Explanation) -> list[str]:
 
 def _describe_wrong_angles(explanation: Explanation, standing: ProbableCause) -> str:
     """Wrong angles in words, with their positions and sizes."""
-    errors = angle_errors(explanation, standing)
-    return " and ".join(
-        f"a wrong angle, as {angle_errors_text(angles)} in {list_positions(positions)}"
-        if angles
-        else f"a wrong angle in {list_positions(positions)}"
-        for positions, angles in errors.items()
-    )
+    in_file = explanation.prepared.source.about.indices_in_file
+    pairs = exchanged_positions(explanation, standing)
+    exchanged = {p for pair in pairs for p in pair}
+    told = [f"that {exchange_text(in_file(pair))}" for pair in pairs]
+    for positions, angles in angle_errors(explanation, standing).items():
+        where = list_positions(in_file(positions))
+        if exchanged.isdisjoint(positions):
+            what = f", as {angle_errors_text(angles)}" if angles else ""
+            told.append(f"a wrong angle{what} in {where}")
+    return " and ".join(told)
 
 
 def _is_included(calibration: Calibration, standing: ProbableCause) -> bool:

@@ -52,6 +52,13 @@ def misset(monkeypatch: pytest.MonkeyPatch, window: int, *degrees: float) -> Non
     monkeypatch.setattr(ladder, "LADDER", tuple(way))
 
 
+def exchange(monkeypatch: pytest.MonkeyPatch, one: int, two: int) -> None:
+    """Turn to two positions in the other order than the session says."""
+    way = list(ladder.LADDER)
+    way[one], way[two] = way[two], way[one]
+    monkeypatch.setattr(ladder, "LADDER", tuple(way))
+
+
 def worn(monkeypatch: pytest.MonkeyPatch, joint: int, angle: float, off: float) -> None:
     """Turn the device otherwise wherever one angle of a joint is set."""
     way = [list(a) for a in ladder.LADDER]
@@ -101,6 +108,41 @@ def test_angles_that_were_set_otherwise_are_said(
             assert abs(float(value) - degrees) < 4 * float(sigma) < 0.01
         else:
             assert f"{joint} had been" not in said.says
+
+
+@pytest.mark.parametrize(
+    ("one", "two"), [(2, 6), pytest.param(0, 7, marks=pytest.mark.thorough)]
+)
+def test_two_positions_in_the_wrong_order_are_said(
+    one: int, two: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exchange(monkeypatch, one, two)
+    said = diagnosed(tmp_path / "s", TACTICAL, seed=one)
+    assert said.verdict == "unexplained" and not named(said)
+    assert {p for _, p in places(said)} == {(one,), (two,)}
+    pair = f"ositions {one + 1} and {two + 1}"
+    assert f"P{pair} are exchanged: each was held at the angles of" in said.says
+    assert "had been off" not in said.says
+    assert said.next[0] == (
+        f"Exchange the angles of p{pair} in session.toml: each was held at those of the"
+        " other."
+    )
+
+
+@pytest.mark.thorough
+def test_a_result_is_for_the_order_that_was_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    exchange(monkeypatch, 3, 8)
+    diagnosed(tmp_path / "s", TACTICAL, seed=5)
+    assert main(["solve", str(tmp_path / "s"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    (warning,) = (w for w in result["warnings"] if "the angle that was found" in w)
+    assert "positions 4 and 9 are exchanged" in warning
+    for name in ("acc_bias", "acc_scale", "gyr_bias"):
+        found = result["parameters"][name]
+        far = np.array(found["value"]) - getattr(TACTICAL, name)
+        assert (np.abs(far) < 4 * np.array(found["sigma"])).all()
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
+from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import column_estimates
 from fieldcal.diagnosis.result import Mismatch, Quantity
@@ -19,6 +21,10 @@ JOINTS = ("α", "β")
 
 Places = tuple[int, ...]
 """Positions, from 0."""
+
+EXCHANGED_WITHIN = 0.05
+"""Largest distance from the angles of another position, as a part of that between the
+two, at which a position counts as held there."""
 
 AngleErrors = tuple[tuple[str, Quantity], ...]
 """Joints, each with the error of its angle, deg."""
@@ -33,12 +39,15 @@ class UnknownMismatch:
     cause : name of the model's cause: "time", "alpha", "window", "misset" ...
     mismatch : channel, positions and time
     angle_errors : joints, each with the error of its angle that would explain it
+    exchanged : the two positions whose stated angles are each the other's, if it is
+        one of them
 
     """
 
     cause: str
     mismatch: Mismatch
     angle_errors: tuple[tuple[str, Quantity], ...] = ()
+    exchanged: Places = ()
 
 
 def unknown_mismatches(
@@ -46,8 +55,17 @@ def unknown_mismatches(
 ) -> list[UnknownMismatch]:
     """Mismatches of one cause, each with the angle errors that would explain it."""
     turned = angle_errors(explanation, standing)
+    pairs = {
+        p: pair for pair in exchanged_positions(explanation, standing) for p in pair
+    }
     return [
-        UnknownMismatch(standing.name, m, turned.get(m.positions, ())) for m in found
+        UnknownMismatch(
+            standing.name,
+            m,
+            turned.get(m.positions, ()),
+            pairs.get(m.positions[0], ()) if m.positions in turned else (),
+        )
+        for m in found
     ]
 
 
@@ -65,6 +83,32 @@ def angle_errors(
         for member in standing.members
         for one in single_errors(explanation, member)
     }
+
+
+def exchanged_positions(
+    explanation: Explanation, standing: ProbableCause
+) -> list[Places]:
+    """Pairs of positions of a cause that were held at each other's stated angles."""
+    groups = {c.position: g for c, g in standing.members if c.position >= 0}
+    stated, held = dict[int, Array](), dict[int, Array]()
+    for p, group in groups.items():
+        x = explanation.rows.x
+        row = int(np.argmax(x.position == p))
+        stated[p] = np.array([x.alpha[row], x.beta[row]])
+        held[p] = stated[p] + column_estimates(explanation.best.set, group.columns)[0]
+    return [
+        (p, q)
+        for p, q in combinations(sorted(groups), 2)
+        if _is_at(held[p], stated[q], stated[p])
+        and _is_at(held[q], stated[p], stated[q])
+    ]
+
+
+def _is_at(held: Array, there: Array, stated: Array) -> bool:
+    """Whether angles are those stated elsewhere, and not those stated, rad."""
+    whole = 2 * np.pi
+    off, apart = ((held - a + np.pi) % whole - np.pi for a in (there, stated))
+    return bool(np.abs(off).max() < EXCHANGED_WITHIN * np.abs(apart).max())
 
 
 def single_errors(explanation: Explanation, member: Member) -> list[Group]:

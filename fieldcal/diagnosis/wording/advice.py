@@ -161,6 +161,12 @@ MISMATCH_REMEDIES = {
 def _remedy(unknown: UnknownMismatch) -> tuple[str, str]:
     """Remedy for a mismatch, and its reason with placeholders for the channels."""
     places = list_positions(unknown.mismatch.positions)
+    if unknown.exchanged:
+        one, two = (p + 1 for p in unknown.exchanged)
+        return (
+            f"Exchange the angles of positions {one} and {two} in session.toml",
+            ": each was held at those of the other.",
+        )
     if unknown.angle_errors and len(unknown.mismatch.positions) > 1:
         joints = join_words([joint for joint, _ in unknown.angle_errors], "and")
         return (

@@ -168,6 +168,8 @@ def _unexplained(one: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
             f" {100 * where.share:.0f} % of its variance."
         )
     places = list_positions(where.positions)
+    if one.exchanged:
+        return exchange_text(one.exchanged).capitalize() + "."
     if one.angle_errors:
         angles = angle_errors_text(one.angle_errors, "had been")
         if len(where.positions) > 1:
@@ -184,6 +186,19 @@ def _unexplained(one: UnknownMismatch, all_: Sequence[UnknownMismatch]) -> str:
     channels = " and ".join(dict.fromkeys(u.mismatch.channel for u in alike))
     verb = "is" if len(alike) == 1 else "are"
     return f"{channels} {verb} off in {places} only."
+
+
+def exchange_text(pair: Sequence[int]) -> str:
+    """Two positions whose angles were exchanged, as part of a sentence.
+
+    >>> exchange_text([3, 6])
+    'positions 4 and 7 are exchanged: each was held at the angles of the other'
+    """
+    one, two = (p + 1 for p in pair)
+    return (
+        f"positions {one} and {two} are exchanged: each was held at the angles of the"
+        " other"
+    )
 
 
 def angle_errors_text(turned: Sequence[tuple[str, Quantity]], verb: str = "was") -> str:

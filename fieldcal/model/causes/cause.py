@@ -138,6 +138,8 @@ class Cause:
     variants : groups, one for each value of the shape
     kind : "effect" of the catalogue, "random" effect, "noise" that every device has,
         "unknown" function without physics, error of a "position", or "given"
+    position : position whose angles it changes, one of several causes of the same name;
+        -1 if it does not belong to one
     expected : variants that begin where the device may have been off: they are likelier
 
     """
@@ -147,6 +149,7 @@ class Cause:
     chance: float
     variants: tuple[Group, ...]
     kind: Kind = "effect"
+    position: int = -1
     expected: frozenset[Group] = frozenset()
     _nearest: dict[Group, tuple[Group, ...]] = field(
         default_factory=dict, init=False, repr=False
@@ -217,4 +220,10 @@ class Cause:
     @property
     def key(self) -> str:
         """Unique among the causes of a session."""
-        return f"{self.name}:{self.part}" if self.part else self.name
+        name = self.name if self.position < 0 else f"{self.name} {self.position}"
+        return f"{name}:{self.part}" if self.part else name
+
+    @property
+    def kin(self) -> tuple[str, str]:
+        """Common to causes that differ only in the position they belong to."""
+        return self.name, self.part

@@ -48,16 +48,17 @@ def random_causes(table: ColumnTable) -> Iterator[Cause]:
 def _wrong_angles(table: ColumnTable, oriented: Index) -> Iterator[Cause]:
     """Causes of a position set at wrong angles, and of an angle with a repeated error.
 
-    Only positions with known angles have either. A fixture with one worn detent may
-    have others, so one variant contains all of them.
+    Only positions with known angles have either. Each may be set wrongly whether or not
+    another is: two are if their angles were exchanged. A fixture with one worn detent
+    may have others, so one variant contains all of them.
     """
     size = np.full(2, np.deg2rad(priors.MISSET_DEG))
-    groups = tuple(
-        Group("misset", "", table.rotations_of(p), size, params=(0, 1),
-              position=int(p), in_state=True)
-        for p in oriented
-    )  # fmt: skip
-    yield Cause("misset", "", CHANCE, groups, "position")
+    for p in oriented.tolist():
+        group = Group("misset", "", table.rotations_of(p), size, params=(0, 1),
+                      position=p, in_state=True)  # fmt: skip
+        yield Cause(
+            "misset", "", CHANCE / len(oriented), (group,), "position", position=p
+        )
     several = [
         d for d in detents(table.x, oriented) if 1 < len(d.positions) < len(oriented)
     ]

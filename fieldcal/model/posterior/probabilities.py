@@ -8,6 +8,7 @@ sets that contain it or an alias of its kind.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -175,8 +176,16 @@ class Posterior:
 
     def _without_chances(self, score: float, members: Sequence[Member]) -> float:
         """A score without the prior of its causes; variants are equally probable."""
-        counts = sum(np.log(len(c.variants)) for c, _ in members)
+        counts = sum(np.log(self._variants_of_kin[c.kin]) for c, _ in members)
         return score - self.search.set_log_prior(members) - float(counts)
+
+    @cached_property
+    def _variants_of_kin(self) -> Counter[tuple[str, str]]:
+        """Number of variants of all causes that differ only in their position."""
+        counts = Counter[tuple[str, str]]()
+        for cause in self.search.dictionary.causes:
+            counts[cause.kin] += len(cause.variants)
+        return counts
 
     def _kind(self, name: str) -> str:
         """Kind of a cause, by its name."""

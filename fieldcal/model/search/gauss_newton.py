@@ -6,6 +6,7 @@ Source: Gauss and Newton.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,7 @@ class GaussNewton:
         sizes: Sizes | None = None,
     ) -> tuple[State, Array, Set]:
         """The state at the estimate of a set, by Gauss and Newton, and that set."""
-        values = self.pad(values)
+        state, values = self._near_set_angles(state, self.pad(values), members)
         for _ in range(MAX_NEWTON_STEPS):
             wanted = self.wanted_columns(members) | (values != 0)
             linear = self.system.linearised(state, wanted)
@@ -107,6 +108,19 @@ class GaussNewton:
             if self.largest_step(found, before, values) < CONVERGED:
                 break
         return state, values, found
+
+    def _near_set_angles(
+        self, state: State, values: Array, members: Sequence[Member]
+    ) -> tuple[State, Array]:
+        """The state with new members that are angles begun near where they are."""
+        new = [g for c, g in members if c.position >= 0 and not values[g.columns].any()]
+        turns = [self.system.starting_angles(self.nominal, g.position) for g in new]
+        if not any(turn.any() for turn in turns):
+            return state, values
+        values, small = values.copy(), state.small_rotation.copy()
+        for group, turn in zip(new, turns, strict=True):
+            values[group.columns] = small[group.position] = turn
+        return replace(state, small_rotation=small), values
 
     def largest_step(self, found: Set, before: Array, values: Array) -> float:
         """Largest change of the state's parameters, in their standard deviations."""

@@ -176,6 +176,8 @@ class Inference(Refinement):
         """Starting sets whose states may be far from the nominal one."""
         if (far := self._set_with_large_angle(search)) is not None:
             yield far
+        if elsewhere := self._positions_elsewhere():
+            yield search.evaluate(elsewhere)
         usual = tuple((c, c.variants[0]) for c in self.dictionary.causes if c.usual)
         keys = {c.key for c, _ in usual}
         scatter = priors.SIZES[list(found.sizes.instability)]
@@ -211,6 +213,22 @@ class Inference(Refinement):
             there = estimates_by_column(one.state, self.dictionary)[group.columns]
             return one if np.abs(there).max() >= LARGE_ANGLE else None
         return None
+
+    def _positions_elsewhere(self) -> tuple[Member, ...]:
+        """Positions whose force is far from the stated one, if they are the fewer.
+
+        Two that were exchanged hide each other: about the stated angles, everything
+        else seems likelier.
+        """
+        causes = [c for c in self.dictionary.causes if c.position >= 0]
+        far = [
+            c
+            for c in causes
+            if self.system.starting_angles(self.nominal, c.position).any()
+        ]
+        if 2 * len(far) >= len(causes):  # then the device is what is different
+            return ()
+        return tuple((c, c.variants[0]) for c in far)
 
     def refine_beside(self, found: InferenceResult, there: Set) -> Set:
         """A set with its shapes refined, except those that the result contains.

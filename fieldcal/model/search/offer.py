@@ -71,10 +71,16 @@ def extra_log_odds(alike: EqualWidthGroups, apart: dict[int, Array]) -> Array:
 def ranked_offers(
     there: Set, score: float, less: InstabilityIndices, best: BestVariants
 ) -> list[Offer]:
-    """Offers of causes that a set does not contain, the best first."""
+    """Offers of causes that a set does not contain, the best first.
+
+    Of causes that differ only in their position, the best one.
+    """
     offers = [
         Offer((cause, cause.variants[v]), score + worth, size, less)
         for cause, (worth, v, size) in best.items()
         if cause.key not in there.keys
     ]
-    return sorted(offers, key=lambda o: -o.score)
+    kin: dict[tuple[str, str], Offer] = {}
+    for offer in sorted(offers, key=lambda o: -o.score):
+        kin.setdefault(offer.member[0].kin, offer)
+    return [*kin.values()]

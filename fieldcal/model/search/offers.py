@@ -82,18 +82,18 @@ class Offers(Sets):
     def offers(self, there: Set, beside: Sizes | None = None) -> list[Offer]:
         """Every cause that a set does not contain, at its best variant, the best first.
 
+        Of causes that differ only in their position, the best one.
+
         With `beside`, the sizes of another set, only its instability and flicker are
         tried besides the set's own: a cause that replaces a removed one needs these.
         """
-        best: dict[str, Offer] = {}
+        best: dict[tuple[str, str], Offer] = {}
         for table in self.tables(there, beside):
             for each in table.offers:
-                offer, name = (
-                    self._evaluate_all_columns(there, each, table),
-                    each.member[0].key,
-                )
-                if name not in best or offer.score > best[name].score:
-                    best[name] = offer
+                offer = self._evaluate_all_columns(there, each, table)
+                kin = each.member[0].kin
+                if kin not in best or offer.score > best[kin].score:
+                    best[kin] = offer
         return sorted(best.values(), key=lambda o: -o.score)
 
     def _evaluate_all_columns(

@@ -82,15 +82,15 @@ class Search(Offers):
     def visit_variations(self, there: Set, top: float) -> None:
         """Visit the set with other parameters of each cause, and without each cause.
 
-        Only sets are visited that are predicted near the weight `top`.
+        An angle that was set wrongly may be that of another position. Only sets are
+        visited that are predicted near the weight `top`.
         """
         least = top - ALTERNATIVE_MARGIN
         for i, (cause, group) in enumerate(there.members):
-            if cause.kind != "effect":
+            others = self._variations(there, cause, group)
+            if not others:
                 continue
-            worth = _log_worth(
-                _eliminate_without(there, group), group.with_same_shape(cause.variants)
-            )
+            worth = _log_worth(_eliminate_without(there, group), others)
             bare = there.score - worth[group]
             rest = (*there.members[:i], *there.members[i + 1 :])
             if (
@@ -101,8 +101,21 @@ class Search(Offers):
             for other, more in worth.items():
                 if other is not group and bare + more > least:
                     members = list(there.members)
-                    members[i] = (cause, other)
+                    members[i] = (others[other], other)
                     self.evaluate(tuple(members), there.sizes)
+
+    def _variations(self, there: Set, cause: Cause, group: Group) -> dict[Group, Cause]:
+        """The group and what may be in its place, each with its cause."""
+        if cause.kind == "effect":
+            return dict.fromkeys(group.with_same_shape(cause.variants), cause)
+        if cause.position < 0:
+            return {}
+        return {
+            other.variants[0]: other
+            for other in self.dictionary.causes
+            if other.kin == cause.kin
+            and (other is cause or other.key not in there.keys)
+        }
 
     def widen_outputs(self, there: Set) -> Set:
         """The set with its causes on more outputs, if that raises the weight."""

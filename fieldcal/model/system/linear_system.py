@@ -58,6 +58,10 @@ class System(ABC):
     ) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
 
+    def starting_angles(self, nominal: State, position: int) -> Array:
+        """Turn of a position from which to begin, (2,) rad; zero if nothing tells."""
+        return np.zeros(2)
+
 
 def append_course(
     parts: Parts, at: Index, table: Array, kept: NDArray[np.bool_]

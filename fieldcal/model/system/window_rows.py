@@ -20,6 +20,7 @@ from fieldcal.model.system.linear_system import (
     System,
     append_course,
 )
+from fieldcal.model.system.starting_angles import starting_angles
 
 MIN_VISIBLE_ACC = 1e-6
 """Least change of an accelerometer by a column of typical size that windows show,
@@ -58,6 +59,10 @@ class WindowSystem(System):
             for part in out:
                 d.shown[part.columns] |= self._shows(part)
         return out
+
+    def starting_angles(self, nominal: State, position: int) -> Array:
+        """Turn of a position to where its mean force is, (2,) rad; zero if near."""
+        return starting_angles(self.rows, nominal, position)
 
     def _parts(self, view: RowView, wanted: NDArray[np.bool_]) -> Parts:
         """Wanted columns with influence on each channel."""

@@ -167,7 +167,7 @@ def test_squares_of_what_is_predicted_count_what_the_prediction_does_not_know() 
 @pytest.mark.parametrize("free", [(), (3, 4)], ids=["misset", "loose"])
 def test_a_positions_own_angles_are_sought_in_it(free: tuple[int, ...]) -> None:
     """Those it was set at, or those that nobody knows; nothing else is."""
-    one = refit(() if free else ("misset",), free)
+    one = refit(() if free else ("misset 4",), free)
     d, found = one.dictionary, held_out_residuals(one.fitted, [one.fitted.set])
     for p in range(len(LADDER)):
         left = d.x.position == p
@@ -197,8 +197,8 @@ def test_sets_are_chosen_again() -> None:
     rows = rows_of(x, y + rng.normal(0, 3e-4, y.shape))
     linear = WindowSystem(rows, d).linearised(state)
     search = Search(d, gram(linear, d, np.zeros(d.width)))
-    misset = next(c for c in d.causes if c.key == "misset")
-    sets = [search.evaluate(m) for m in ((), ((misset, misset.variants[4]),))]
+    misset = next(c for c in d.causes if c.key == "misset 4")
+    sets = [search.evaluate(m) for m in ((), ((misset, misset.variants[0]),))]
     assert sets[1].score > sets[0].score + 100
     best = FittedSet(rows, d, linear, np.zeros(d.width), sets[1])
     found = held_out_residuals(best, sets)

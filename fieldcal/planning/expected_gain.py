@@ -175,11 +175,10 @@ class ExpectedGain:
                 out.append(self._with_one_more_cause(best, cause))
         score = np.array([s for _, s in out])
         share = np.exp(score - np.logaddexp.reduce(score))
-        return [
-            replace(one, chance=float(p))
-            for (one, _), p in zip(out, share, strict=True)
-            if p > MIN_PROBABILITY
-        ]
+        kept = np.flatnonzero(share > MIN_PROBABILITY)
+        # they add up to 1, or every mean would be off by a part of the value itself
+        share /= share[kept].sum()
+        return [replace(out[i][0], chance=float(share[i])) for i in kept]
 
     def _with_common_causes(
         self, one: Set, chance: float

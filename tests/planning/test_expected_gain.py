@@ -80,6 +80,23 @@ def three() -> ExpectedGain:
     return gain_of(explained(START))
 
 
+def test_the_value_of_a_parameter_is_no_uncertainty(three: ExpectedGain) -> None:
+    """Chances add up to one, also without the explanations that are too unlikely."""
+    assert sum(e.chance for e in three.explanations) == pytest.approx(1.0)
+    further, away = [Position.deg(22.5, 5)], copy(three)
+    column = three.dictionary.bias
+    away.explanations = [
+        replace(e, state=replace(e.state, estimate=e.state.estimate
+                                 + 7.0 * (e.state.columns == column)))
+        for e in three.explanations
+    ]  # fmt: skip
+    told, same = three.of(further), away.of(further)
+    np.testing.assert_allclose(same.variance, told.variance, rtol=1e-6)
+    np.testing.assert_allclose(
+        same.expected_variance, told.expected_variance, rtol=1e-6
+    )
+
+
 @pytest.mark.parametrize(
     "place",
     [

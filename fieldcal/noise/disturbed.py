@@ -5,6 +5,9 @@ of the other cells of the same minutes: a robust z of 6 in the cube root of the 
 (nearly normal, Wilson and Hilferty 1931) or in the second difference. Disturbed samples
 are replaced by a line between both sides with the mirrored noise from before. If the
 disturbance lasts long, or if the level changes, the recording is split there.
+
+Samples come in pieces. What lies near the end of a piece is left for the next one, so
+that every disturbance is seen whole, with both of its sides.
 """
 
 from __future__ import annotations
@@ -36,7 +39,12 @@ CELLS_BESIDE = 16
 """Cells on each side from which a disturbance is bridged."""
 
 MIN_CELLS = 20
-"""Fewest cells in which disturbances are looked for."""
+"""Fewest cells in which disturbances are looked for, and that are left for the next
+piece: more than `CELLS_BESIDE` and the neighbours of a cell."""
+
+CELLS_OF_PIECE = 100
+"""Fewest cells of a piece that is not the last one: half of them, which may be one
+disturbance, and its sides."""
 
 
 class CalmStretch(NamedTuple):
@@ -55,7 +63,9 @@ class CalmStretch(NamedTuple):
     bridged: int
 
 
-def bridge_disturbances(rows: Array, dt: float, noisy: int) -> list[CalmStretch]:
+def bridge_disturbances(
+    rows: Array, dt: float, noisy: int, last: bool
+) -> tuple[list[CalmStretch], Array]:
     """Bridge disturbances, or split the samples there.
 
     Parameters
@@ -63,12 +73,46 @@ def bridge_disturbances(rows: Array, dt: float, noisy: int) -> list[CalmStretch]
     rows : (n, c) samples, some minutes of them
     dt : s between samples
     noisy : columns that are channels
+    last : whether no samples follow
+
+    Returns
+    -------
+    calm stretches, and the samples to be given again before those that follow
 
     """
     size = max(MIN_CELL_SAMPLES, round(CELL / dt))
     cells = len(rows) // size
+    if not last and cells < CELLS_OF_PIECE:
+        return [], rows
     if cells < MIN_CELLS:
-        return [CalmStretch(rows, False, 0)]
+        return [CalmStretch(rows, False, 0)], rows[:0]
+    odd, scale = _disturbed_cells(rows, size, noisy)
+    end = len(rows) if last else _first_left(odd) * size
+    if not odd[: end // size].any():
+        return [CalmStretch(rows[:end], False, 0)], rows[end:]
+    odd = odd[: end // size]
+    return _split_and_bridge(rows[:end], odd, size, dt, scale), rows[end:]
+
+
+def _first_left(odd: Flags) -> int:
+    """Index of the first cell that is left for the next piece.
+
+    It is calm, and so are those of the side of a disturbance that is not seen whole.
+    """
+    left = len(odd) - MIN_CELLS
+    edges = np.flatnonzero(np.diff(np.r_[False, odd, False].astype(int)))
+    for first, end in edges.reshape(-1, 2)[::-1].tolist():
+        if end + CELLS_BESIDE > left:
+            left = min(left, first - CELLS_BESIDE)
+    return max(left, 0)
+
+
+def _disturbed_cells(rows: Array, size: int, noisy: int) -> tuple[Flags, Array]:
+    """Disturbed cells, and the robust sigma of the second differences of means.
+
+    No cell is disturbed where most are: that is how the device behaves.
+    """
+    cells = len(rows) // size
     some = rows[: cells * size, :noisy].reshape(cells, size, noisy)
     means = np.einsum("nsc->nc", some) / size
     off = some - means[:, None]
@@ -79,9 +123,9 @@ def bridge_disturbances(rows: Array, dt: float, noisy: int) -> list[CalmStretch]
     odd = (np.abs(bends) > ODD * scale).any(axis=1)
     odd |= (_robust_z(np.cbrt(squares)) > ODD).any(axis=1)
     odd = _with_neighbours(odd)
-    if not odd.any() or odd.mean() > MAX_DISTURBED_SHARE:
-        return [CalmStretch(rows, False, 0)]
-    return _split_and_bridge(rows, odd, size, dt, scale)
+    if odd.mean() > MAX_DISTURBED_SHARE:
+        odd[:] = False
+    return odd, scale
 
 
 def _robust_z(values: Array) -> Array:

@@ -54,12 +54,13 @@ class Reducer:
         self._done: list[ReducedStretch] = []
         self._levels: CosineLevels | None = None
         self._waiting: list[Block] = []
+        self._held: Array = np.empty((0, CHANNELS + 1))
+        self._cell_dt = np.nan
         self._rows = self._samples = self._bridged = 0
         self._last = self._first = np.nan
         self._steps, self._stepped, self._span = 0, 0.0, (np.nan, np.nan)
         self._known = np.zeros(CHANNELS, dtype=bool)
         self._value = np.full(CHANNELS + 1, np.nan)
-        self._dt = np.nan
 
     def add(self, block: Block) -> None:
         """Take samples, in order of time."""
@@ -71,14 +72,14 @@ class Reducer:
             if edge > first:
                 self._take(block[first:edge])
             if edge < len(block):
-                self._flush()
+                self._flush(last=True)
                 self._end()
             first = edge
         self._last = float(block.t[-1])
 
     def reduction(self) -> Reduction:
         """Return the reduction of all samples so far."""
-        self._flush()
+        self._flush(last=True)
         self._end()
         return Reduction(
             tuple(self._done),
@@ -94,26 +95,25 @@ class Reducer:
         self._rows += len(block)
         self._samples += len(block)
         self._span = (float(np.fmin(self._span[0], block.t[0])), float(block.t[-1]))
-        if self._rows >= ROWS:
-            self._flush()
+        while self._rows >= ROWS:
+            self._flush(last=False)
 
-    def _flush(self) -> None:
-        """Process the waiting samples."""
-        if not self._rows:
-            return
-        t = np.concatenate([b.t for b in self._waiting])
-        rows = np.concatenate(
-            [np.column_stack([b.acc, b.gyr, b.temperature]) for b in self._waiting]
-        )
-        self._waiting, self._rows = [], 0
+    def _flush(self, last: bool) -> None:
+        """Process waiting samples: `ROWS` of them, or all if they are the last ones.
+
+        Pieces of equal length make the result independent of the lengths of blocks.
+        """
+        t, rows = self._next(self._rows if last else ROWS)
         if len(t) > 1:
             self._steps += len(t) - 1
             self._stepped += float(t[-1] - t[0])
         if not self._steps:
             return
-        for calm in bridge_disturbances(
-            self._filled(rows), self._stepped / self._steps, CHANNELS
-        ):
+        if np.isnan(self._cell_dt):
+            self._cell_dt = self._stepped / self._steps
+        held = np.concatenate([self._held, self._filled(rows)])
+        found, self._held = bridge_disturbances(held, self._cell_dt, CHANNELS, last)
+        for calm in found:
             if calm.begins:
                 self._end(keep=True)
             if self._levels is None:
@@ -121,9 +121,26 @@ class Reducer:
             self._levels.add(calm.rows)
             self._bridged += calm.bridged
 
+    def _next(self, count: int) -> tuple[Array, Array]:
+        """Take the first of the waiting samples: times (n,) and values (n, 7)."""
+        taken: list[Block] = []
+        while count:
+            block = self._waiting.pop(0)
+            if len(block) > count:
+                self._waiting.insert(0, block[count:])
+                block = block[:count]
+            taken.append(block)
+            count -= len(block)
+            self._rows -= len(block)
+        t = np.concatenate([np.empty(0), *(b.t for b in taken)])
+        rows = [np.column_stack([b.acc, b.gyr, b.temperature]) for b in taken]
+        return t, np.concatenate([np.empty((0, CHANNELS + 1)), *rows])
+
     def _filled(self, rows: Array) -> Array:
         """Replace missing values by the last known one; 0 if there is none."""
         # by column, which is faster than along rows of seven
+        if not len(rows):
+            return rows
         missing = np.ascontiguousarray(~np.isfinite(rows).T)
         found = np.logical_not(missing.all(axis=1))
         self._known |= found[:CHANNELS]
@@ -146,7 +163,7 @@ class Reducer:
             self._done.append(replace(self._levels.reduced(), dt=dt))
         self._levels = None
         if not keep:
-            self._steps, self._stepped = 0, 0.0
+            self._steps, self._stepped, self._cell_dt = 0, 0.0, np.nan
 
 
 def reduce_recording(blocks: Iterable[Block]) -> Reduction:

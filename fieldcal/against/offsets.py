@@ -19,7 +19,7 @@ from fieldcal.core.samples import CHANNELS, Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.calibrated import GROUP_UNITS
 from fieldcal.diagnosis.result import Mismatch, Quantity
-from fieldcal.model import priors, thresholds
+from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Group
 from fieldcal.model.posterior.mixture import covariance_of_means
 from fieldcal.model.posterior.model_average import average_of_columns
@@ -140,8 +140,8 @@ def bias_wander(there: WidenedSet, axes: Index) -> Array:
     It combines the instability from window to window and the rms q sqrt(T / 3) of the
     mean of a random walk.
     """
-    size = np.array(there.set.sizes.instability)[axes]
-    square = (priors.SIZES[size] * there.search.typical_instability[axes]) ** 2
+    tau = there.search.instability_sigma(there.set.sizes.instability)
+    square = tau[axes] ** 2
     length = float(np.ptp(there.inference.dictionary.x.t))
     for member in there.set.members:
         for name, q in cause_quantities(there, member).items():

@@ -25,7 +25,6 @@ from fieldcal.against.side import DiagnosedRecording
 from fieldcal.against.widened import WidenedSet
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.findings.stretch_means import rms_over_parts
-from fieldcal.model import priors
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
@@ -112,9 +111,7 @@ def _squares(
         real.inference.wanted_columns(real.set.members) | (real.values != 0)
     )
     rows = gram(linear, d, real.values, (), some)
-    tau = (
-        priors.SIZES[list(real.set.sizes.instability)] * real.search.typical_instability
-    )
+    tau = real.search.instability_sigma(real.set.sizes.instability)
     weighed = rows.with_instability(tau)
     inner, rhs = weighed.matrix(columns, columns), weighed.rhs(columns)
     left = weighed.square - 2 * values @ rhs + values @ inner @ values

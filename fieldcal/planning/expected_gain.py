@@ -279,10 +279,8 @@ class ExpectedGain:
             view, x=replace(view.x, w=view.x.w + self._turns_to(alpha, beta))
         )
         turned = (_column_table(d, felt, used) - _column_table(d, view, used))[:, GYR]
-        size = priors.SIZES[self.found.best.sizes.instability[CLOSURE]]
-        miss = (
-            1 / np.median(info[info > 0]) + (size * d.typical_instability[CLOSURE]) ** 2
-        )
+        tau = d.instability_sigma(self.found.best.sizes.instability)
+        miss = 1 / np.median(info[info > 0]) + tau[CLOSURE] ** 2
         both = np.zeros((len(positions), len(seen) + 3, len(seen) + 3))
         both[:, : len(seen), : len(seen)] = noise
         both[:, len(seen) :, len(seen) :] = (miss + 2 * self.angles**2) * np.eye(3)
@@ -309,10 +307,7 @@ class ExpectedGain:
         sd = np.nanmedian(rows.sd, axis=0) / np.sqrt(
             len(rows.x) / len(d.window_positions)
         )
-        tau = (
-            priors.SIZES[list(self.found.best.sizes.instability)]
-            * d.typical_instability
-        )
+        tau = d.instability_sigma(self.found.best.sizes.instability)
         own = sd**2 + np.nanmedian(rows.window_error, axis=0) ** 2 + tau[:6] ** 2
 
         def output(a: float, b: float) -> Array:

@@ -101,6 +101,11 @@ class Dictionary(ColumnTable):
         out.always = [replace(g, fixed_size=free) for g in known]
         return out
 
+    def instability_sigma(self, instability: Sequence[int]) -> Array:
+        """Standard deviation of the instability of some indices, (7,)."""
+        sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
+        return sigma
+
     def independent_copy(self) -> Self:
         """A copy to which columns can be added without changing this one."""
         out = copy(self)

@@ -130,9 +130,14 @@ class Sets:
     def gram_at(self, instability: tuple[int, ...]) -> WeightedGram:
         """The Gram matrix weighted with the instabilities of some indices; cached."""
         if instability not in self._weighed:
-            tau = priors.SIZES[list(instability)] * self.typical_instability
+            tau = self.instability_sigma(instability)
             self._weighed[instability] = self.gram.with_instability(tau)
         return self._weighed[instability]
+
+    def instability_sigma(self, instability: Sequence[int]) -> Array:
+        """Standard deviation of the instability of some indices, (7,)."""
+        sigma: Array = priors.SIZES[list(instability)] * self.typical_instability
+        return sigma
 
     def instability_log_prior(self, instability: Sequence[int] | Array) -> Any:
         """Log prior of instabilities (..., 7), as `sizing.instability_log_prior`."""

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
-from fieldcal.model import priors
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
@@ -120,9 +119,7 @@ class HeldOut:
             return
         for search in filter(None, searches):
             found = search.evaluate(one.members, one.sizes)
-            tau = (
-                priors.SIZES[list(found.sizes.instability)] * search.typical_instability
-            )
+            tau = search.instability_sigma(found.sizes.instability)
             rest = found.state
             yield (
                 Eliminated.of(

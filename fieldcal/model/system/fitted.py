@@ -70,20 +70,13 @@ class FittedSet:
 
     def squares_of(self, residual: Array) -> Array:
         """The same for other residuals."""
-        tau = (
-            priors.SIZES[list(self.set.sizes.instability)]
-            * self.dictionary.typical_instability
-        )
+        tau = self.dictionary.instability_sigma(self.set.sizes.instability)
         out = np.zeros(6)
         for part in self.linear:
             c = part.channel
             white = residual[part.rows, c] * part.weight
-            first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            info = np.add.reduceat(part.weight**2, first)
-            mean = np.add.reduceat(white * part.weight, first) / info
-            shared = (
-                self.dictionary.window_error[part.window[first], c] ** 2 + tau[c] ** 2
-            )
+            info, mean = part.info, part.window_means(white)
+            shared = self.dictionary.window_error[part.windows, c] ** 2 + tau[c] ** 2
             kept = 1 / (1 + info * shared)
             out[c] = float(white @ white) - float((info * mean**2) @ (1 - kept))
         return out

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fieldcal.core.samples import Array, Index
 
 
@@ -30,3 +32,27 @@ class LinearRows:
     columns: Index
     design: Array
     white: Array
+
+    @property
+    def starts(self) -> Index:
+        """First row of each of its windows, (w,)."""
+        first: Index = np.flatnonzero(np.diff(self.window, prepend=-1))
+        return first
+
+    @property
+    def windows(self) -> Index:
+        """Number of each of its windows, (w,)."""
+        return self.window[self.starts]
+
+    @property
+    def info(self) -> Array:
+        """Inverse variance of the mean of each window, (w,)."""
+        total: Array = np.add.reduceat(self.weight**2, self.starts)
+        return total
+
+    def window_means(self, white: Array) -> Array:
+        """Weighted mean of each window, (w, ...), of whitened rows (r, ...)."""
+        weight = self.weight.reshape(-1, *[1] * (white.ndim - 1))
+        total = np.add.reduceat(white * weight, self.starts, axis=0)
+        mean: Array = total / self.info.reshape(-1, *[1] * (white.ndim - 1))
+        return mean

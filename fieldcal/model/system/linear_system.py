@@ -127,12 +127,8 @@ def _add_windows(out: Gram, part: LinearRows, values: Array) -> tuple[float, int
     at, design = all_[there], part.design if there.all() else part.design[:, there]
     in_state = np.flatnonzero(values[part.columns])
     white = part.white + part.design[:, in_state] @ values[part.columns[in_state]]
-    first = np.flatnonzero(np.diff(part.window, prepend=-1))
-    windows = part.window[first]
-    weight = np.add.reduceat(part.weight**2, first)
-    mean = np.add.reduceat(design * part.weight[:, None], first, axis=0)
-    mean /= weight[:, None]
-    middle = np.add.reduceat(white * part.weight, first) / weight
+    windows, weight = part.windows, part.info
+    mean, middle = part.window_means(design), part.window_means(white)
     inner = design.T @ design - (mean * weight[:, None]).T @ mean
     out.within[np.ix_(at, at)] += inner
     out.rhs[at] += design.T @ white - mean.T @ (weight * middle)

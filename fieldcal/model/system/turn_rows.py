@@ -279,11 +279,8 @@ def _window_columns(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     out = np.zeros((len(d.window_positions), 3, d.width))
     for part in windows:
         if part.channel < 3:
-            first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            weight = part.weight[:, None]
-            table = np.add.reduceat(part.design * weight, first, axis=0)
-            table /= np.add.reduceat(weight**2, first, axis=0)
-            out[part.window[first][:, None], part.channel, part.columns] = table
+            table = part.window_means(part.design)
+            out[part.windows[:, None], part.channel, part.columns] = table
     return out
 
 
@@ -292,10 +289,7 @@ def _window_residuals(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     out = np.zeros((len(d.window_positions), 3))
     for part in windows:
         if part.channel < 3:
-            first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            total = np.add.reduceat(part.white * part.weight, first)
-            total /= np.add.reduceat(part.weight**2, first)
-            out[part.window[first], part.channel] = total
+            out[part.windows, part.channel] = part.window_means(part.white)
     return out
 
 
@@ -304,9 +298,7 @@ def _window_variances(windows: Sequence[LinearRows], d: Dictionary) -> Array:
     out = d.window_error[:, :3] ** 2
     for part in windows:
         if part.channel < 3:
-            first = np.flatnonzero(np.diff(part.window, prepend=-1))
-            info = np.add.reduceat(part.weight**2, first)
-            out[part.window[first], part.channel] += 1 / info
+            out[part.windows, part.channel] += 1 / part.info
     return out
 
 

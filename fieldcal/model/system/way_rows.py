@@ -138,8 +138,8 @@ class WayRows:
             arm = arm * density[axis]
             blocks = bridge[:, None, :, None] * np.multiply.outer(arm, arm)
             cov += blocks.reshape(cov.shape)
-        sizes = priors.SIZES[list(self.known.sizes.instability)]
-        loose = (sizes * self.dictionary.typical_instability)[:3]
+        sigma = self.dictionary.instability_sigma(self.known.sizes.instability)
+        loose = sigma[:3]
         # the instability of windows may change with the attitude during a turn
         apart = np.subtract.outer(middle, middle) / priors.BUILD_UP_S
         course = 1.0 + np.exp(-(apart**2) / 2)

@@ -27,6 +27,9 @@ from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram
 from fieldcal.model.evidence.sizing import Member, Sizes, Sizing, instability_log_prior
 
+SetKey = tuple[tuple[str, int], ...]
+"""Key of a set: the keys of its causes with the indices of their variants."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Set:
@@ -95,12 +98,12 @@ class Sets:
         self.typical_instability = dictionary.typical_instability * np.isin(
             np.arange(7), there
         )
-        self.visited: dict[tuple[tuple[str, int], ...], Set] = {}
+        self.visited: dict[SetKey, Set] = {}
         self._weighed: dict[tuple[int, ...], WeightedGram] = {}
 
     @staticmethod
-    def key(members: Iterable[Member]) -> tuple[tuple[str, int], ...]:
-        """Key of a set: the keys of its causes with the indices of their variants."""
+    def key(members: Iterable[Member]) -> SetKey:
+        """Key of a set of these members."""
         return tuple(sorted((c.key, c.variants.index(g)) for c, g in members))
 
     def evaluate(self, members: tuple[Member, ...], start: Sizes | None = None) -> Set:

@@ -158,10 +158,15 @@ def average_over_sets(
     return mean, cov + covariance_of_means(np.array(means), weight)  # (1)
 
 
+def _groups_not_in(one: Set, more: Sequence[Group]) -> list[Group]:
+    """Groups, each named by its part, of effects that a set does not contain."""
+    names = {cause.name for cause, _ in one.members}
+    return [group for group in more if group.part not in names]
+
+
 def eliminate_with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
     """Eliminate a set's columns and those groups of `more` that it lacks."""
-    names, told = {cause.name for cause, _ in one.members}, one.state
-    left = [group for group in more if group.part not in names]
+    left, told = _groups_not_in(one, more), one.state
     columns = np.concatenate([told.columns, *(group.columns for group in left)])
     sizes = np.concatenate([told.prior_sigma, *(group.typical for group in left)])
     return Eliminated.of(told.rows, columns, sizes)
@@ -169,9 +174,7 @@ def eliminate_with_groups(one: Set, more: Sequence[Group]) -> Eliminated:
 
 def set_estimate(one: Set, unfitted: Sequence[Group] = ()) -> Estimate:
     """Estimate of a set's columns, with the groups of `unfitted` eliminated, (2)."""
-    names = {cause.name for cause, _ in one.members}
-    left = [group for group in unfitted if group.part not in names]
-    told = one.state
+    left, told = _groups_not_in(one, unfitted), one.state
     if not left:
         return told.estimate, told.half.T
     columns = np.concatenate([group.columns for group in left])

@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldcal.core.samples import Array
 from fieldcal.model import priors
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, SetKey
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.proportional_offsets import proportional_causes
 from fieldcal.model.search.refinement import Refinement
@@ -35,9 +35,6 @@ be linearised again."""
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
-
-Key = tuple[tuple[str, int], ...]
-"""Key of a set: the keys of its causes with their variants."""
 
 LARGE_ANGLE = 0.05
 """An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
@@ -67,7 +64,7 @@ class InferenceResult:
     values: Array
     turn_rows: Sequence[TurnRows]
     contradicted_turns: tuple[tuple[int, int], ...]
-    visited_keys: frozenset[Key]
+    visited_keys: frozenset[SetKey]
 
 
 class Inference(Refinement):
@@ -109,7 +106,7 @@ class Inference(Refinement):
         values: Array,
         found: Set,
         thorough: bool,
-        been: frozenset[Key] = frozenset(),
+        been: frozenset[SetKey] = frozenset(),
     ) -> InferenceResult:
         """Update the state and search in turn, starting from set `found`.
 

@@ -19,7 +19,7 @@ from fieldcal.model.causes.cause import Group
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.causes.smooth import MAX_COSINES
 from fieldcal.model.evidence.gram import Eliminated, Gram, WeightedGram, evidence_gains
-from fieldcal.model.evidence.sets import Set, Sets, variant_log_priors
+from fieldcal.model.evidence.sets import Set, SetKey, Sets, variant_log_priors
 from fieldcal.model.evidence.sizing import LOG_DENSITY, UNIT_INDEX, Sizes
 from fieldcal.model.search.instabilities import InstabilityIndices, tried_instabilities
 from fieldcal.model.search.offer import (
@@ -36,7 +36,7 @@ FLICKER_STEPS_DOWN = (1, 2)
 SetAtInstability = tuple[InstabilityIndices, Eliminated, float]
 """An instability, and a set's state and score at it."""
 
-OfferKey = tuple[tuple[tuple[str, int], ...], Sizes | None]
+OfferKey = tuple[SetKey, Sizes | None]
 """Key of a set, and the sizes to which its offers are restricted, if any."""
 
 FLICKER_OUTPUTS = 3

@@ -46,6 +46,7 @@ from fieldcal.model.search.inference import (
     InferenceResult,
 )
 from fieldcal.model.search.selection import MIN_LOG_RISE, Search
+from fieldcal.model.search.settled_scores import correct_scores
 from fieldcal.model.state import State
 from fieldcal.model.system.fitted import FittedSet
 from fieldcal.model.system.turn_rows import Turns
@@ -206,13 +207,15 @@ def explain(
     for _ in range(MAX_RESUMPTIONS):
         better, now = found.search.best_visited, found.best
         # the same causes, with shapes between the grid points, are no improvement
-        if better.score <= now.score + (
+        if found.search.corrected_score(better) <= now.score + (
             TIME_CONSTANT_LOG_LOSS if better.keys == now.keys else MIN_LOG_RISE
         ):
             break
         # an alias explains the rows better than the cause that it was an alias of
-        found = found.inference.resume(better, found)
-        posterior = _calculate_posterior(found)
+        resumed = found.inference.resume(better, found)
+        if resumed.best.score < now.score:  # about its own state it does not
+            break
+        found, posterior = resumed, _calculate_posterior(resumed)
     inference = found.inference
     windows = inference.system.linearised(found.state)
     best = FittedSet(
@@ -230,11 +233,13 @@ def explain(
 
 def _calculate_posterior(found: InferenceResult) -> Posterior:
     """Probabilities of the causes found, and of their aliases."""
-    return Posterior(
+    posterior = Posterior(
         found.search,
         found.best,
         lambda there: found.inference.refine_beside(found, there),
     )
+    correct_scores(found)
+    return posterior
 
 
 def _starting_causes(before: Explanation) -> tuple[Member, ...]:

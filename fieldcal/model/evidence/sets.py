@@ -54,6 +54,11 @@ class Set:
         """Keys of its causes."""
         return frozenset(c.key for c, _ in self.members)
 
+    @property
+    def keys_in_state(self) -> frozenset[str]:
+        """Keys of its causes that the base state contains."""
+        return frozenset(c.key for c, g in self.members if g.in_state)
+
 
 def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.
@@ -90,7 +95,15 @@ def _with_other_odds(
 
 
 class Sets:
-    """Evaluates sets over one Gram matrix, and keeps those that were evaluated."""
+    """Evaluates sets over one Gram matrix, and keeps those that were evaluated.
+
+    Attributes
+    ----------
+    visited : evaluated sets by their keys
+    corrections : what to add to the score of sets whose own state is far from that of
+        the Gram matrix, by the keys of their causes in the state
+
+    """
 
     def __init__(self, dictionary: Dictionary, gram: Gram) -> None:
         self.dictionary, self.gram = dictionary, gram
@@ -99,6 +112,7 @@ class Sets:
             np.arange(7), there
         )
         self.visited: dict[SetKey, Set] = {}
+        self.corrections: dict[frozenset[str], float] = {}
         self._weighed: dict[tuple[int, ...], WeightedGram] = {}
 
     @staticmethod
@@ -119,6 +133,10 @@ class Sets:
             score += self.set_log_prior(members)
             self.visited[key] = Set(members, sizes, score, state)
         return self.visited[key]
+
+    def corrected_score(self, there: Set) -> float:
+        """Score of a set about its own state."""
+        return there.score + self.corrections.get(there.keys_in_state, 0.0)
 
     def set_log_prior(self, members: Iterable[Member]) -> float:
         """Log prior probability of the causes of a set."""

@@ -196,7 +196,7 @@ class Posterior:
     def weights(self) -> list[tuple[Set, float]]:
         """Visited sets with their probabilities."""
         sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
-        score: Array = np.array([s.score for s in sets])
+        score: Array = np.array([self.search.corrected_score(s) for s in sets])
         share = np.exp(score - score.max())
         share /= share.sum()
         return list(zip(sets, share.tolist(), strict=True))

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldcal.core.samples import Array
+from fieldcal.core.gravity import G0
+from fieldcal.core.samples import GYR, Array
 from fieldcal.model import priors
+from fieldcal.model.evidence.gram import Gram
 from fieldcal.model.evidence.sets import Set, SetKey
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.search.proportional_offsets import proportional_causes
@@ -35,9 +37,6 @@ be linearised again."""
 
 LARGE_INSTABILITY = 4.0
 """Instability, in typical ones, above which causes may hide that show only together."""
-
-LARGE_ANGLE = 0.05
-"""An angle whose square shows, rad: half of it is 0.01 m/s^2 of gravity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +64,16 @@ class InferenceResult:
     turn_rows: Sequence[TurnRows]
     contradicted_turns: tuple[tuple[int, int], ...]
     visited_keys: frozenset[SetKey]
+
+
+def visible_angle(gram: Gram) -> float:
+    """Smallest angle whose square the accelerometers show, rad.
+
+    Half of it, times gravity, is as large as the noise of a window's mean.
+    """
+    info = gram.info[gram.kind < GYR.start]
+    sigma = 1 / np.sqrt(np.median(info[info > 0])) if info.any() else np.inf
+    return float(np.sqrt(2 * sigma / G0))
 
 
 class Inference(Refinement):
@@ -199,7 +208,7 @@ class Inference(Refinement):
         """Set of one position with a large angle error, if there seems to be one.
 
         A large angle is not linear: about the stated angle its residuals make it less
-        likely than causes with more columns.
+        likely than causes with more columns. It is large if its square shows.
         """
         nothing = search.evaluate(())
         for offer in search.offers(nothing):
@@ -208,7 +217,7 @@ class Inference(Refinement):
                 continue
             one = search.accept(nothing, offer)
             there = estimates_by_column(one.state, self.dictionary)[group.columns]
-            return one if np.abs(there).max() >= LARGE_ANGLE else None
+            return one if np.abs(there).max() >= visible_angle(search.gram) else None
         return None
 
     def _positions_elsewhere(self) -> tuple[Member, ...]:

@@ -66,7 +66,9 @@ class Search(Offers):
     @property
     def best_visited(self) -> Set:
         """The set of the highest weight of all that were visited."""
-        return self._prefer_effects(max(self.visited.values(), key=_score))
+        return self._prefer_effects(
+            max(self.visited.values(), key=self.corrected_score)
+        )
 
     def drop_superfluous(self, members: tuple[Member, ...]) -> Set:
         """Set of some members without those whose removal raises the weight."""
@@ -141,11 +143,12 @@ class Search(Offers):
         if not has_unknown_cause(best):
             return best
         every = list(self.visited.values())
-        score = np.array([one.score for one in every])
+        score = np.array([self.corrected_score(one) for one in every])
         share = np.exp(score - np.logaddexp.reduce(score))
         if share[[has_unknown_cause(one) for one in every]].sum() >= thresholds.NAMED:
             return best
-        return max((one for one in every if not has_unknown_cause(one)), key=_score)
+        known = (one for one in every if not has_unknown_cause(one))
+        return max(known, key=self.corrected_score)
 
     @staticmethod
     def _step(there: Set, changes: Iterable[Callable[[Set], Set]]) -> Set:

@@ -58,6 +58,14 @@ class System(ABC):
     ) -> list[LinearRows]:
         """Rows of every channel about a state, with all columns or those wanted."""
 
+    def linearisation_error(self, state: State, other: State, step: Array) -> float:
+        """Largest error of the rows of another state, linearised about a state.
+
+        `step` (k,) is the change of the columns in the state. In standard deviations of
+        a window's mean; 0 where the rows are linear.
+        """
+        return 0.0
+
     def starting_angles(self, nominal: State, position: int) -> Array:
         """Turn of a position from which to begin, (2,) rad; zero if nothing tells."""
         return np.zeros(2)

@@ -60,6 +60,25 @@ class WindowSystem(System):
                 d.shown[part.columns] |= self._shows(part)
         return out
 
+    def linearisation_error(self, state: State, other: State, step: Array) -> float:
+        """Largest error of the means at another state, linearised about a state, σ.
+
+        Windows of unknown orientation do not count.
+        """
+        d, x = self.dictionary, self.rows.x
+        here, there = (
+            s.output(RowView.of(x, d.since, s).x, d.since) for s in (state, other)
+        )
+        wanted, largest = step != 0, 0.0
+        wanted[d.bias : d.bias + 6] = True  # so that every channel has its rows
+        for part in self.linearised(state, wanted):
+            moved = (there - here)[part.rows, part.channel] * part.weight
+            off = part.window_means(moved - part.design @ step[part.columns])
+            counted = ~d.unoriented[part.windows]
+            sigmas = np.abs(off) * np.sqrt(part.info)
+            largest = max(largest, float(sigmas[counted].max(initial=0.0)))
+        return largest
+
     def starting_angles(self, nominal: State, position: int) -> Array:
         """Turn of a position to where its mean force is, (2,) rad; zero if near."""
         return starting_angles(self.rows, nominal, position)

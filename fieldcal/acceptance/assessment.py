@@ -30,7 +30,7 @@ from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join_words
-from fieldcal.evaluation.observations import UsableWindows
+from fieldcal.evaluation.observations import UsableWindows, angle_setting
 from fieldcal.history.store import History, HistoryRun, family_runs
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
@@ -74,12 +74,12 @@ def assess(
     circumstances = Circumstances(
         temperatures=[a.temperature for a in windows.averages],
         link=_link(session, windows.averages, marks),
-        verification=_verification(calibration, session, marks, limits),
+        verification=_verification(calibration, session, marks),
         family=earlier.calibrations if earlier else None,
         temperature_sigma=earlier.sigma if earlier else {},
         doubts=[*_insisted_positions(marks), *dead, *taken_out],
         windows=windows.at_rest(session).averages,
-        held_positions=[session.about.positions[i] for i in windows.position_numbers],
+        position_numbers=windows.position_numbers,
     )
     warnings += [w for w in _restart_warnings(marks) if w not in warnings]
     made = decide(calibration, session.about, limits, circumstances)
@@ -202,7 +202,6 @@ def _verification(
     calibration: Calibration,
     session: Session,
     marks: Sequence[Mapping[str, Any]],
-    limits: GradeLimits,
 ) -> Verification | None:
     position = planned_verification(session.about)
     window = verification_window(marks, len(session.positions))
@@ -212,14 +211,16 @@ def _verification(
         held = average(session.block.between(*window))
     except FieldcalError:
         return None
-    angle = float(np.deg2rad(limits.angle_setting_deg))
+    used = calibration.info.get("angle_sigma_deg")
+    stated = calibration.info.get("angles_stated_deg", used)
+    angle = float(np.deg2rad(stated or angle_setting(session.about)))
     return verify(calibration, session.about, position, held, angle)
 
 
 def _link(
     session: Session, windows: Sequence[Average], marks: Sequence[Mapping[str, Any]]
 ) -> dict[str, int]:
-    """Samples and missing samples in the windows, and refused frames of the run.
+    """Samples and missing samples in the windows; frames of the whole run, and refused.
 
     Gaps between the used pieces of a window do not count as missing.
     """
@@ -235,7 +236,7 @@ def _link(
                 lost[(t[:-1] >= np.nextafter(start, -np.inf)) & (t[1:] <= end)] = 0
             missing += int(lost.sum())
     bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
-    return {"samples": samples, "missing": missing, "bad": bad}
+    return {"samples": samples, "missing": missing, "bad": bad, "taken": len(block)}
 
 
 def _insisted_positions(marks: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -45,14 +45,14 @@ def check_link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Chec
         return [Check("link", None, "losses of the link were not recorded")]
     samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))
     checks = []
-    for name, count, limit in (
-        ("samples missing", missing, limits.lost_share),
-        ("frames refused", bad, limits.bad_share),
+    for name, count, good, limit in (
+        ("samples missing", missing, samples, limits.lost_share),
+        ("frames refused", bad, link.get("taken", samples), limits.bad_share),
     ):
-        share = count / (samples + count)
+        share = count / (good + count)
         ok = share <= limit
         says = (
-            f"{count} of {samples + count} {name} ({share:.2%}), allowed {limit:.2%}"
+            f"{count} of {good + count} {name} ({share:.2%}), allowed {limit:.2%}"
             f"{'' if ok else ': check the cable and the baud rate'}"
         )
         checks.append(Check(f"link: {name}", ok, says, share, limit, "1"))

@@ -39,7 +39,6 @@ from fieldcal.acceptance.witnesses import (
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.escaping import escape_line
-from fieldcal.core.positions import Position
 from fieldcal.core.probability import chi2_tail
 from fieldcal.session.description import Description
 from fieldcal.solve.doubtful_position import DoubtfulPosition
@@ -82,7 +81,7 @@ class Circumstances:
     temperature_sigma : uncertainty added to these for the change of temperature
     doubts : sentences about events of the run, each a reason for NO-GO
     windows : windows of the calibration
-    held_positions : positions that have a window; empty if all have
+    position_numbers : of the positions that have a window, from 0; empty if all have
 
     """
 
@@ -93,7 +92,7 @@ class Circumstances:
     temperature_sigma: Mapping[str, float] = field(default_factory=dict)
     doubts: Sequence[str] = ()
     windows: Sequence[Average] = ()
-    held_positions: Sequence[Position] = ()
+    position_numbers: Sequence[int] = ()
 
 
 def decide(
@@ -162,11 +161,13 @@ def _find_remedy(
         for check in checks
         if check.ok is False and check.name.endswith(UNCERTAINTY)
     ]
-    length, held = (
-        float(np.ceil(seconds)),
-        circumstances.held_positions or about.positions,
+    others = [c.name for c in checks if c.ok is False]
+    others = [name for name in others if not name.endswith(UNCERTAINTY)]
+    numbers = circumstances.position_numbers or range(len(about.positions))
+    length = float(np.ceil(seconds))
+    return cheapest_remedy(
+        calibration, about, numbers, limits, failed, sigma, length, others
     )
-    return cheapest_remedy(calibration, about, held, limits, failed, sigma, length)
 
 
 def with_decision(calibration: Calibration, made: Decision) -> Calibration:
@@ -306,6 +307,12 @@ def _verification_check(
     if verification is None:
         says = "no verification position was recorded (--verify)"
         return Check("verification", None, says)
+    if not np.isfinite([verification.residual_size, verification.chance]).all():
+        says = (
+            f"{verification.position.name}, which was to verify the result, could not"
+            " be measured: record it again with all axes of the accelerometers"
+        )
+        return Check("verification", False, says)
     far = verification.residual_size > limits.verification_residual
     odd = verification.chance < limits.verification_chance
     sigma = float(np.linalg.norm(verification.sigma))

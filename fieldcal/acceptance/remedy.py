@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fieldcal.acceptance.factory import factory_errors_used
+from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.calibration.names import group_of, sensor_of
@@ -27,6 +28,7 @@ from fieldcal.calibration.wording import parameter_title
 from fieldcal.core.factory import FactoryErrors
 from fieldcal.core.positions import Position, ladder_settings, specific_forces
 from fieldcal.core.samples import Array
+from fieldcal.core.sentences import join_words
 from fieldcal.model.causes.planned import design_matrix, parameters
 from fieldcal.planning.planner import parameter_sigma
 from fieldcal.session.description import Description
@@ -76,11 +78,12 @@ class Remedy:
 def cheapest_remedy(
     calibration: Calibration,
     about: Description,
-    had: Sequence[Position],
+    numbers: Sequence[int],
     limits: GradeLimits,
     failed: Collection[str],
     sigma: float,
     seconds: float,
+    others: Sequence[str] = (),
 ) -> Remedy | None:
     """The cheapest remedy that is possible at the ladder; None if there is none.
 
@@ -88,26 +91,43 @@ def cheapest_remedy(
     ----------
     calibration : calibration that is NO-GO
     about : description of its session
-    had : positions that have a window
+    numbers : of the positions that have a window, from 0
     limits : limits of its grade
     failed : groups whose uncertainty is above its limit
     sigma : standard error of the mean of a window, m/s^2
     seconds : length of a window, s
+    others : failed checks that are not of an uncertainty
 
     """
     doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
-    names = [p.name for p in about.positions]
-    if doubt and doubt.name in names:
-        number = names.index(doubt.name)
+    bad = calibration.info.get("bad_position", ())
+    if doubt and len(bad) == len(numbers):
+        number = numbers[int(np.argmax(bad))]  # a place may be held more than once
         which = f"position {number + 1} ({doubt.name})"
         says = f"take {which} again: it disagrees with the others"
         return Remedy(says, again=(number,), seconds=seconds)
+    had = [about.positions[i] for i in numbers]
     over = _limit_ratios(calibration, limits, failed)
     if not over or not all(p.oriented for p in about.positions):
         return None
-    if all(sensor_of(group_of(name)) == "gyr" for name in over):
-        return _hold_longer(calibration, about, had, over, seconds)
-    return _further_positions(calibration, about, had, limits, over, sigma, seconds)
+    of_gyr = {name for name in over if sensor_of(group_of(name)) == "gyr"}
+    if len(of_gyr) == len(over):
+        return _hold_longer(calibration, about, had, over, seconds, others)
+    # further positions determine the accelerometers, gyroscopes have to be held longer
+    groups = dict.fromkeys(group_of(name) for name in of_gyr)
+    left = [*others, *(group + UNCERTAINTY for group in groups)]
+    over = {name: part for name, part in over.items() if name not in of_gyr}
+    return _further_positions(
+        calibration, about, had, limits, over, sigma, seconds, left
+    )
+
+
+def _expectation(left: Sequence[str]) -> str:
+    """What a remedy leads to, if some failed checks are left as they are."""
+    if not left:
+        return "then GO is expected"
+    verb, more = ("fails", "has") if len(left) == 1 else ("fail", "have")
+    return f"then {join_words(left)} still {verb}, and {more} to be mended as well"
 
 
 def _limit_ratios(
@@ -133,6 +153,7 @@ def _hold_longer(
     had: Sequence[Position],
     over: dict[str, float],
     seconds: float,
+    left: Sequence[str],
 ) -> Remedy | None:
     """Remedy for gyroscopes: a longer mean in the present position.
 
@@ -154,7 +175,7 @@ def _hold_longer(
         return None
     more = float(np.ceil(whole * (times - 1) / 5) * 5)
     number = len(about.positions)
-    says = f"hold position {number} for {more:.0f} s more: then GO is expected"
+    says = f"hold position {number} for {more:.0f} s more: {_expectation(left)}"
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
 
 
@@ -166,6 +187,7 @@ def _further_positions(
     over: dict[str, float],
     sigma: float,
     seconds: float,
+    left: Sequence[str],
 ) -> Remedy | None:
     """Further positions of the ladder, each time the best one."""
     tilts = [g for g in ("angle_offset", "base_tilt") if g in calibration.groups]
@@ -183,12 +205,15 @@ def _further_positions(
         best = int(np.argmin(ratios))
         chosen.append(candidates[best])
         if ratios[best] <= LIMIT_SHARE:
-            return _as_remedy(chosen, over, seconds)
+            return _as_remedy(chosen, over, seconds, left)
     return None
 
 
 def _as_remedy(
-    chosen: Sequence[Position], over: dict[str, float], seconds: float
+    chosen: Sequence[Position],
+    over: dict[str, float],
+    seconds: float,
+    left: Sequence[str],
 ) -> Remedy:
     word = "one position" if len(chosen) == 1 else f"{len(chosen)} positions"
     where = " and ".join(p.name for p in chosen)
@@ -197,7 +222,7 @@ def _as_remedy(
     if not np.isfinite(over[worst]):
         now = "not determined yet"
     says = (
-        f"{word} more for {seconds:.0f} s, {where}: then GO is expected"
+        f"{word} more for {seconds:.0f} s, {where}: {_expectation(left)}"
         f" ({parameter_title(worst)} is {now})"
     )
     angles = tuple(p.degrees or (0.0, 0.0) for p in chosen)

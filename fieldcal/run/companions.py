@@ -175,7 +175,7 @@ class LeadRecorder:
         whenever the process is killed.
         """
         for other in self.others:
-            if event in ("asked", "insisted", POSITION_ADDED):
+            if event in ("asked", "insisted", "repeated", "skipped", POSITION_ADDED):
                 other.mark(event, **what)
             elif event == "window":
                 host = self._times.host_time

@@ -42,6 +42,7 @@ class WarmUpWatch:
         self._second, self._sum, self._n = -np.inf, 0.0, 0
         self._step = np.inf
         self._last = np.nan
+        self._temperature: Array = np.empty(0)
         self._until: float | None = None
         self.waived = False
 
@@ -68,7 +69,9 @@ class WarmUpWatch:
         self._second, self._sum, self._n = -np.inf, 0.0, 0
 
     def _note_step(self, temperature: Array) -> None:
-        steps = np.abs(np.diff(temperature))
+        """Note the smallest change between samples, also from block to block."""
+        steps = np.abs(np.diff(temperature, prepend=self._temperature))
+        self._temperature = temperature[-1:]
         steps = steps[steps > 0]
         if len(steps):
             self._step = min(self._step, float(steps.min()))

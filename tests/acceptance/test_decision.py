@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
+from session_folders import CALM, NINE, SITE, places, recorded, write_session
 
+from fieldcal.acceptance import assessment
 from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
 from fieldcal.acceptance.growth import navigation_errors
 from fieldcal.acceptance.verification import propose_verification, verify
@@ -23,8 +26,10 @@ from fieldcal.core.positions import (
     WIDE_POSITIONS,
     Position,
 )
+from fieldcal.evaluation.observations import usable_windows
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
+from fieldcal.session.folder import Session
 from fieldcal.solve import Observations, solve
 from fieldcal.windows import Average
 
@@ -421,6 +426,64 @@ def test_a_position_that_was_not_fitted_is_a_witness() -> None:
     window = Average(mean, np.eye(6) * 1e-8, 21.0, 3000, 0.0, 30.0)
     agrees = verify(found, about, held, window)
     assert decided(found, verification=agrees).go
+
+
+def test_frames_are_those_of_the_whole_run() -> None:
+    """They may have been refused anywhere, and windows are a part of it."""
+    seen = {**LINK, "bad": 9}
+    share = BOUNDS.bad_share
+    assert 9 / 10009 > 0.5 * share > 9 / 90009
+    (check,) = (
+        c
+        for c in decided(calibration(), link={**seen, "taken": 90000}).checks
+        if c.name == "link: frames refused"
+    )
+    assert check.value == pytest.approx(9 / 90009) and "9 of 90009" in check.says
+
+
+@pytest.mark.parametrize("missing", ["residual", "sigma"])
+def test_a_verification_that_was_not_measured_verifies_nothing(missing: str) -> None:
+    about = description.parse_description({"site": {"gravity": G}})
+    mean = np.concatenate([[0.1, 0.1 - G, 0.1], np.full(3, 0.01)])
+    cov = np.eye(6) * 1e-8
+    if missing == "residual":
+        mean[2] = np.nan
+    else:
+        cov[2, 2] = np.nan
+    window = Average(mean, cov, 21.0, 3000, 0.0, 30.0)
+    seen = verify(calibration(), about, Position.deg(0, 0), window)
+    made = decided(calibration(), verification=seen)
+    (said,) = made.reasons
+    assert not made.go and "could not be measured" in said
+
+
+@pytest.mark.parametrize(("stated", "expected"), [(0.2, 0.2), (None, 0.05)])
+def test_a_verification_is_set_as_well_as_the_session_says(
+    stated: float | None,
+    expected: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The angle setting of the grade holds only where none is stated."""
+    asked: list[float] = []
+    monkeypatch.setattr(
+        assessment, "verify", lambda *args: asked.append(np.rad2deg(args[-1]))
+    )
+    held = places(NINE[:6])
+    site = dict(SITE) if stated is None else {**SITE, "angle_setting_deg": stated}
+    last = {"alpha_deg": NINE[5][0], "beta_deg": NINE[5][1]}
+    block = recorded(CALM, held)
+    write_session(tmp_path / "s", block, held[:5], site=site, verification=last)
+    span = {key: held[5][key] for key in ("start_s", "end_s")}
+    mark = {"event": "window", "position": 5, **span}
+    (tmp_path / "s" / "marks.jsonl").write_text(json.dumps(mark) + "\n")
+    session = Session.open(tmp_path / "s")
+    windows = usable_windows(session)
+    found = calibration()
+    bounds = limits.read("tactical")
+    assert bounds.angle_setting_deg == 0.05
+    assessment.assess(found, session, windows, bounds, None)
+    assert asked == pytest.approx([expected])
 
 
 @pytest.mark.parametrize(

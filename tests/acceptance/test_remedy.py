@@ -86,7 +86,13 @@ def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
     session = about(tmp_path / "s", five)
     remedy = cheapest_remedy(
-        found, session.about, session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
+        found,
+        session.about,
+        range(len(session.about.positions)),
+        LIMITS,
+        ["gyr_bias"],
+        1e-3,
+        30.0,
     )
     assert remedy is not None and remedy.says.startswith("hold position 5 for ")
     assert remedy.positions == (five[-1],)
@@ -104,7 +110,7 @@ def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> N
     seconds = []
     for angles in ([(0.0, 0.0)] * 6, [(a, 0.0) for a in (0.0, 90.0, 180.0, 270.0)]):
         session = about(tmp_path / str(len(angles)), angles)
-        had = session.about.positions
+        had = range(len(angles))
         remedy = cheapest_remedy(
             found, session.about, had, LIMITS, ["gyr_bias"], 1e-3, 30.0
         )
@@ -115,7 +121,7 @@ def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> N
     assert seconds[1] == pytest.approx((1.1 / 0.9) ** 2, abs=5 / 120)
     more = replace(found, info={"g_sensitivity_sigma": 0.95 * limit / 9.81})
     session = about(tmp_path / "home", [(0.0, 0.0)] * 6)
-    args = session.about.positions, LIMITS, ["gyr_bias"], 1e-3, 30.0
+    args = range(6), LIMITS, ["gyr_bias"], 1e-3, 30.0
     assert cheapest_remedy(more, session.about, *args) is None
 
 
@@ -125,7 +131,13 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
     session = about(tmp_path / "s", two)
     found = found_with(names, [1e-3] * 4)
     remedy = cheapest_remedy(
-        found, session.about, session.about.positions, LIMITS, ["acc_scale"], 1e-4, 30.0
+        found,
+        session.about,
+        range(len(session.about.positions)),
+        LIMITS,
+        ["acc_scale"],
+        1e-4,
+        30.0,
     )
     assert remedy is not None and "not determined yet" in remedy.says
     assert set(remedy.positions) <= set(ladder_settings(TWO_POSITIONS)) - set(two)
@@ -134,7 +146,7 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
         cheapest_remedy(
             found,
             session.about,
-            session.about.positions,
+            range(2),
             hopeless,
             ["acc_scale"],
             1e-4,
@@ -147,11 +159,60 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
 def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:
     session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS])
     doubtful = {"name": session.positions[2].name, "probability": 0.99}
-    found = replace(
-        found_with(("acc_bias.x",), [1e-3]), info={"doubtful_position": doubtful}
-    )
-    remedy = cheapest_remedy(
-        found, session.about, session.about.positions, LIMITS, [], 1e-3, 30.0
-    )
+    info = {"doubtful_position": doubtful, "bad_position": [0.0, 0.0, 0.99, 0.0, 0.0]}
+    found = replace(found_with(("acc_bias.x",), [1e-3]), info=info)
+    remedy = cheapest_remedy(found, session.about, range(5), LIMITS, [], 1e-3, 30.0)
     assert remedy is not None and remedy.again == (2,)
     assert remedy.says.startswith("take position 3 (α = 22.5°, β = 2.5°) again")
+
+
+def test_the_window_in_doubt_is_taken_again_not_another_at_its_place(
+    tmp_path: Path,
+) -> None:
+    twice = [(0.0, 0.0), (45.0, 5.0), (-45.0, 5.0), (0.0, 5.0), (45.0, 5.0)]
+    session = about(tmp_path / "s", twice)
+    name = session.about.positions[4].name
+    assert name == session.about.positions[1].name
+    info = {"doubtful_position": {"name": name, "probability": 0.99}}
+    found = found_with(("acc_bias.x",), [1e-3])
+    found = replace(found, info={**info, "bad_position": [0.0, 0.1, 0.0, 0.99]})
+    numbers = [0, 1, 3, 4]  # the third was left out
+    remedy = cheapest_remedy(found, session.about, numbers, LIMITS, [], 1e-3, 30.0)
+    assert remedy is not None and remedy.again == (4,)
+    assert remedy.says.startswith(f"take position 5 ({name}) again")
+
+
+@pytest.mark.parametrize(
+    ("failed", "others", "says"),
+    [
+        (["acc_bias"], [], "then GO is expected"),
+        (
+            ["acc_bias"],
+            ["temperature change"],
+            "then temperature change still fails, and has to be mended as well",
+        ),
+        (
+            ["acc_bias", "gyr_bias"],
+            ["site"],
+            "then site and gyr_bias uncertainty still fail, and have to be mended as",
+        ),
+        (
+            ["gyr_bias"],
+            ["link: frames refused"],
+            "s more: then link: frames refused still fails, and has to be mended",
+        ),
+    ],
+)
+def test_go_is_promised_only_if_nothing_else_fails(
+    failed: list[str], others: list[str], says: str, tmp_path: Path
+) -> None:
+    five = [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS]
+    names = tuple(f"{g}.{a}" for g in ("acc_bias", "gyr_bias") for a in "xyz")
+    sigma = [1e-4, 1e-4, 1.05 * LIMITS.acc_bias_sigma, *[1e-9] * 3]
+    sigma[5] = 1.1 * LIMITS.gyr_bias_sigma
+    found, session = found_with(names, sigma), about(tmp_path / "s", five)
+    remedy = cheapest_remedy(
+        found, session.about, range(5), LIMITS, failed, 1e-4, 30.0, others
+    )
+    assert remedy is not None and says in remedy.says
+    assert ("GO" in remedy.says) == (not others)

@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,10 +15,11 @@ from fieldcal.commands.virtual_address import driver_address
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
-from fieldcal.run.companions import ArrivalTimes
+from fieldcal.run.companions import ArrivalTimes, Companion, LeadRecorder
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
+from fieldcal.session.recorder import Recorder
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
 BIASES = ["0.2,-0.3,0.1", "-0.1,0.3,0.2", "0.3,0.1,-0.2"]
@@ -169,3 +170,34 @@ def test_whoever_records_may_be_late() -> None:
     assert times.device_time(501.75) == pytest.approx(2.5)
     assert times.host_time(1.5) == pytest.approx(500.5)
     assert times.device_time(times.host_time(2.7)) == pytest.approx(2.7)
+
+
+class Recorded:
+    """A further device, whose marks are kept."""
+
+    failed, folder = None, Path("two")
+
+    def __init__(self) -> None:
+        self.marks: list[tuple[str, int]] = []
+
+    def mark(self, event: str, **what: Any) -> None:
+        self.marks.append((event, what["position"]))
+
+    def window(self, position: int, span: Any, without: Any = ()) -> None:
+        self.marks.append(("window", position))
+
+
+def test_what_the_operator_discards_is_discarded_of_every_device(
+    tmp_path: Path,
+) -> None:
+    other = Recorded()
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        leads = LeadRecorder(recorder, [cast(Companion, other)])
+        leads.append(Block.of(np.arange(9.0), np.zeros((9, 3))))
+        leads.mark("asked", position=0, name="home")
+        leads.mark("window", position=0, start_s=1.0, end_s=8.0)
+        leads.mark("repeated", position=0)
+        leads.mark("asked", position=0, name="home")
+        leads.mark("skipped", position=0)
+    events = ["asked", "window", "repeated", "asked", "skipped"]
+    assert other.marks == [(event, 0) for event in events]

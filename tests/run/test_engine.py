@@ -555,6 +555,22 @@ def test_what_was_before_a_restart_is_no_cooling_down(tmp_path: Path) -> None:
     assert not any("cooling" in text for text in turner.told)
 
 
+def test_a_step_between_two_blocks_is_a_step() -> None:
+    """A slope of whole degrees is no better known if blocks are short."""
+    t = np.arange(6000) / 100
+    temperature = np.where(t < 30.0, 20.0, 21.0)
+    rates = []
+    for length in (1, 7, 10, 50):
+        warm_up = WarmUpWatch(0.5, 600.0)
+        for i in range(0, len(t), length):
+            some = slice(i, i + length)
+            at_rest = np.zeros((len(t[some]), 3))
+            warm_up.add(Block.of(t[some], at_rest, temperature=temperature[some]))
+        rates.append(warm_up.rate)
+    sigma = np.array(rates)[:, 1]
+    assert sigma.min() > 0.9 and sigma == pytest.approx(sigma[0], rel=0.05)
+
+
 def _temperatures(seed: int, step: float, rate: float) -> Iterator[Block]:
     """Two minutes of a device whose temperature changes by `rate` K/min."""
     rng = np.random.default_rng(seed)

@@ -130,6 +130,23 @@ def test_noise_is_found_in_the_drift(tmp_path: Path) -> None:
     assert told["runs"] == 6 and not told["missing"]
 
 
+def test_noise_of_positions_is_not_that_of_velocities(tmp_path: Path) -> None:
+    """Positions of 5 cm say little more than velocities of 2 mm/s, and harm nothing."""
+    noise = np.repeat([2e-3, 5e-2], 3)
+    quiet = Sensors(np.full(3, 0.01), np.ones(3), np.full(3, 1e-5), 1e-5, 1e-7)
+    how: dict[str, Any] = {"sensors": quiet, "faces": FACES[:2], "out_noise": noise}
+    alone, _ = solved(tmp_path / "v", **how)
+    both, _ = solved(
+        tmp_path / "vp", columns=("vn", "ve", "vd", "pn", "pe", "pd"), **how
+    )
+    told = both.info["navigator"]
+    assert 0.7 < told["velocity_noise_m_s"] / 2e-3 < 1.4
+    assert 0.7 < told["position_noise_m"] / 5e-2 < 1.4
+    assert alone.info["navigator"]["position_noise_m"] is None
+    assert both.uncertainty("gyr_bias.x") < 1.2 * alone.uncertainty("gyr_bias.x")
+    assert np.abs(pulls(both, quiet)).max() < 4
+
+
 def test_a_base_that_points_elsewhere(tmp_path: Path) -> None:
     found, sensors = solved(tmp_path, azimuth_deg=70.0)
     assert np.abs(pulls(found, sensors)).max() < 4

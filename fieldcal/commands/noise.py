@@ -9,7 +9,6 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -66,8 +65,9 @@ def run(args: argparse.Namespace) -> int:
             _open_session(path, Path(place) / str(i))
             for i, path in enumerate(args.sessions)
         ]
-        found = noise_result(sessions, args.limits, args.history)
-    found = replace(found, sessions=[str(path) for path in args.sessions])
+        found = noise_result(
+            sessions, args.limits, args.history, [str(p) for p in args.sessions]
+        )
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
                    if p.is_dir()), None)  # fmt: skip
@@ -132,13 +132,20 @@ def noise_result(
     sessions: Sequence[Session],
     limits: Path | None = None,
     history: StoreLocation | None = None,
+    names: Sequence[str] = (),
 ) -> NoiseResult:
     """The noise of a device, from its recordings at rest.
+
+    Parameters
+    ----------
+    sessions : recordings of the device
+    limits, history : the user's files instead of the usual ones
+    names : of the sessions, as the user gave them; their folders if there are none
 
     Raises
     ------
     InputError
-        If the sessions are of several devices, or not long enough at rest.
+        If the sessions are of several devices or rates, or not long enough at rest.
 
     """
     from fieldcal.noise import estimate_noise, reduce_recording
@@ -146,7 +153,9 @@ def noise_result(
     from fieldcal.noise.document import NoiseResult
 
     _check_one_device(sessions)
-    model = estimate_noise([reduce_recording(_blocks_at_rest(s)) for s in sessions])
+    names = names or [str(s.folder) for s in sessions]
+    reduced = [reduce_recording(_blocks_at_rest(s)) for s in sessions]
+    model = estimate_noise(reduced, names)
     about = sessions[0].about
     grade = about.grade
     serial = str(about.device.get("serial", ""))
@@ -157,7 +166,7 @@ def noise_result(
         compass = gyrocompass_heading(gyroscopes, about.latitude)
     device = {k: str(about.device[k]) for k in ("name", "serial") if k in about.device}
     return NoiseResult(
-        [str(s.folder) for s in sessions],
+        names,
         {**device, "grade": grade},
         model,
         recalibrate,

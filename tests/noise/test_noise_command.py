@@ -138,6 +138,24 @@ def test_sessions_of_two_devices_are_refused(
     assert "is of device B2" in capsys.readouterr().err
 
 
+def test_sessions_of_two_rates_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a clock is off by is no other rate."""
+    rng = np.random.default_rng(25)
+    paths = []
+    for rate in (50.0, 200.0, 50.5):
+        block = recording(noise(rng, int(60 * rate), 1 / rate, 6, N=N), 1 / rate)
+        paths.append(tmp_path / f"{rate:g}")
+        with Recorder(paths[-1], {"format": 1}) as recorder:
+            recorder.append(block)
+    assert main(["noise", *map(str, paths)]) == 2
+    said = capsys.readouterr().err
+    assert f"{paths[0]} has 50 samples a second" in said
+    assert f"{paths[1]} has 200: estimate the noise of each rate by itself" in said
+    assert main(["noise", str(paths[0]), str(paths[2])]) == 0
+
+
 def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

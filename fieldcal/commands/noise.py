@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from fieldcal.noise import NoiseModel
     from fieldcal.noise.document import NoiseResult
     from fieldcal.noise.recalibration import HistoryStep, Recalibration
+    from fieldcal.session.clock_steps import ClockStepRemover
     from fieldcal.session.folder import Session
 
 RARE = ("history", "limits")
@@ -190,19 +191,29 @@ def _check_one_device(sessions: Sequence[Session]) -> None:
 
 def _blocks_at_rest(session: Session) -> Iterator[Block]:
     """Samples of the windows; all samples if the session has no windows."""
-    spans: list[list[float]] = []
-    for start, end in sorted(w for w in session.windows if w):
-        if spans and start - spans[-1][1] <= JOINED_GAP_S:
-            spans[-1][1] = max(spans[-1][1], end)
-        else:
-            spans.append([start, end])
-    for block in session.blocks():
+    from fieldcal.session.clock_steps import ClockStepRemover
+
+    clock = ClockStepRemover()
+    for block in session.blocks(clock):
+        spans = _joined_windows(session, clock)
         if not spans:
             yield block
         for start, end in spans:
             part = block.between(start, end)
             if len(part):
                 yield part
+
+
+def _joined_windows(session: Session, clock: ClockStepRemover) -> list[list[float]]:
+    """Windows in corrected times, s; those with a short gap between are joined."""
+    windows = [w for w in session.windows if w]
+    spans: list[list[float]] = []
+    for start, end in sorted([clock.corrected(t) for t in w] for w in windows):
+        if spans and start - spans[-1][1] <= JOINED_GAP_S:
+            spans[-1][1] = max(spans[-1][1], end)
+        else:
+            spans.append([start, end])
+    return spans
 
 
 def _recalibration_times(

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -265,6 +266,34 @@ def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
     assert found.model.stretches == 2
     for channel in found.model.channels.values():
         assert channel.processes["N"].value == pytest.approx(N, rel=0.1)
+
+
+def test_windows_are_found_behind_a_clock_that_was_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Windows are in the device's times, which jump; samples come in several parts."""
+    rng = np.random.default_rng(26)
+    values = noise(rng, 6000, 0.02, 6, N=N)
+    values[1000:2500] += rng.standard_normal((1500, 6))
+    block = recording(values, 0.02)
+    times = block.t + np.where(block.t >= 70.0, 1.7e9, 0.0)
+    windows = [(0.0, 19.9), (1.7e9 + 71.0, 1.7e9 + 119.0)]
+    tables = {
+        "format": 1,
+        "position": [{"start_s": a, "end_s": b} for a, b in windows],
+    }
+    with Recorder(tmp_path / "set", tables) as recorder:
+        for i in range(0, 6000, 500):
+            part = slice(i, i + 500)
+            recorder.append(replace(block[part], t=times[part]))
+    assert main(["noise", str(tmp_path / "set"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["seconds"] == pytest.approx(67.9, abs=0.5)
+    assert found["channels"]["ax"]["processes"]["N"]["value"] == pytest.approx(
+        N, rel=0.1
+    )
+    assert "the device's clock jumps" in err
 
 
 def test_a_plan_says_how_long_this_device_is_worth_averaging(

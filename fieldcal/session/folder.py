@@ -261,6 +261,24 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
     return replace(about, windows=tuple(windows), excluded_spans=without)
 
 
+def check_writable(path: Path) -> None:
+    """Refuse a file that cannot be written, before long work whose result it takes.
+
+    Raises
+    ------
+    SessionError
+        If it is a folder, or nothing can be written beside it.
+
+    """
+    if path.is_dir():
+        raise SessionError(f"{path}: is a folder: name a file in it")
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+            pass
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
+
+
 def write_atomically(path: Path, content: str | bytes) -> Path:
     """Replace a file atomically: a reader finds the old content or the new one.
 

@@ -19,6 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.navigator.growth import error_dynamics, propagate_errors
 from fieldcal.navigator.large_angles import beyond_first_order
 from fieldcal.navigator.session_runs import calibrate_navigator
+from fieldcal.navigator.solution import read_solution, runs_in_windows
 from fieldcal.session import description
 
 EXACT = Sensors(np.zeros(3), np.ones(3), np.zeros(3))
@@ -205,6 +206,7 @@ def test_the_command_writes_a_result_that_others_take(
     [
         ("solution.csv", "time,vn\n0,0\n", "no heading with t and one of"),
         ("solution.csv", "t,vn\n0,0\n1,x\n", "line 3 is not 2 numbers"),
+        ("solution.csv", "t,vn\n\n0,0\n\n1,x\n", "line 5 is not 2 numbers"),
         ("solution.csv", "t,vn\n0,0\n1,nan\n", "line 3 has a number that is none"),
         ("solution.csv", "t,vn\n1,0\n0,0\n", "t does not ascend"),
         ("solution.csv", "t,vn\n0,0\n5,0\n", "must lie within 0 to 5 s"),
@@ -232,6 +234,17 @@ def test_what_cannot_be_used_is_refused(
         calibrate_navigator(
             tmp_path, description.read_description(tmp_path / "session.toml")
         )
+
+
+def test_a_solution_saved_by_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    """It begins with a byte order mark."""
+    path = tmp_path / "solution.csv"
+    path.write_text("t,vn\n0,0\n20,1\n", encoding="utf-8-sig")
+    solution = read_solution(path)
+    assert solution.t.tolist() == [0.0, 20.0] and solution.recorded_columns == [2]
+    for window in ((0.0, np.nan), (np.nan, 20.0)):
+        with pytest.raises(InputError, match="must lie within 0 to 20 s"):
+            runs_in_windows(solution, [window])
 
 
 def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> None:

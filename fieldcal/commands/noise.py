@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fieldcal.calibration.limits import GradeLimits
     from fieldcal.core.samples import Block
     from fieldcal.history.location import StoreLocation
     from fieldcal.noise import NoiseModel
@@ -59,8 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.session.folder import check_writable
     from fieldcal.session.noise_file import NOISE
 
+    if args.report:
+        check_writable(args.report)
     with TemporaryDirectory(prefix="fieldcal-noise-") as place:
         sessions = [
             _open_session(path, Path(place) / str(i))
@@ -149,18 +153,20 @@ def noise_result(
         If the sessions are of several devices or rates, or not long enough at rest.
 
     """
+    from fieldcal.calibration import limits as bounds
     from fieldcal.noise import estimate_noise, reduce_recording
     from fieldcal.noise.alignment import gyrocompass_heading
     from fieldcal.noise.document import NoiseResult
 
     _check_one_device(sessions)
+    about = sessions[0].about
+    grade = about.grade
+    allowed = bounds.read(grade, limits)
     names = names or [str(s.folder) for s in sessions]
     reduced = [reduce_recording(_blocks_at_rest(s)) for s in sessions]
     model = estimate_noise(reduced, names)
-    about = sessions[0].about
-    grade = about.grade
     serial = str(about.device.get("serial", ""))
-    recalibrate, since = _recalibration_times(model, grade, serial, limits, history)
+    recalibrate, since = _recalibration_times(model, allowed, serial, history)
     gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
     compass = None
     if grade == "navigation" and gyroscopes:
@@ -218,19 +224,16 @@ def _joined_windows(session: Session, clock: ClockStepRemover) -> list[list[floa
 
 def _recalibration_times(
     model: NoiseModel,
-    grade: str,
+    allowed: GradeLimits,
     serial: str,
-    limits: Path | None,
     history: StoreLocation | None,
 ) -> tuple[Mapping[str, Recalibration], str]:
     """When each bias leaves the limit of the grade, and the start of that time."""
-    from fieldcal.calibration import limits as bounds
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.noise.recalibration import recalibration_time
 
     runs = History(history or default_location()).runs(serial) if serial else ()
-    allowed = bounds.read(grade, limits)
     out = {}
     for name, channel in model.channels.items():
         group = "acc_bias" if name[0] == "a" else "gyr_bias"

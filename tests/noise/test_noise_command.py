@@ -166,6 +166,24 @@ def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
     assert "is no session" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--report", "--limits"])
+def test_what_is_needed_at_the_end_is_looked_at_first(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    option: str,
+) -> None:
+    """Before the noise of a night is estimated."""
+
+    def estimate_too_early(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("fieldcal.noise.estimate_noise", estimate_too_early)
+    night, file = str(session(tmp_path / "night", 60)), str(tmp_path / "none" / "x")
+    assert main(["noise", night, option, file]) == 2
+    assert file in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("ending", ["csv", "csv.gz", "parquet"])
 def test_a_recording_of_any_kind_is_read_in_parts(tmp_path: Path, ending: str) -> None:
     """The same samples, whatever file they are in and however it is read."""

@@ -70,11 +70,12 @@ def record(
     azimuth_deg: float = 0.0,
     columns: Sequence[str] = ("vn", "ve", "vd"),
     aligned: str = "entered",
-    out_noise: float = 1e-3,
+    out_noise: float | Array = 1e-3,
 ) -> Path:
     """Write session.toml and solution.csv of a base that is tilted by a little.
 
-    `own_deg`, (r, 3), is what each attitude is off by beyond how well it is set.
+    `own_deg`, (r, 3), is what each attitude is off by beyond how well it is set;
+    `out_noise` that of the outputs, alike (m/s, m) or of each velocity and position.
     """
     a = np.deg2rad(azimuth_deg)
     turned = np.array(

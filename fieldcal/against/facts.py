@@ -30,12 +30,18 @@ def recording_facts(one: DiagnosedRecording, there: WidenedSet) -> Facts:
             if np.isfinite(one.noise[c])
         },
         calibration=_calibration(there),
-        effects={
-            cause.name: causes.cause_quantities(there, (cause, group))
-            for cause, group in there.set.members
-            if cause.kind == "effect"
-        },
+        effects=effects_with_equation(there),
     )
+
+
+def effects_with_equation(there: WidenedSet) -> dict[str, dict[str, Quantity]]:
+    """Parameters of the effects with an equation, by id; its triads are combined."""
+    out: dict[str, dict[str, Quantity]] = {}
+    for cause, group in there.set.members:
+        if cause.kind == "effect":
+            found = causes.cause_quantities(there, (cause, group))
+            out[cause.name] = {**out.get(cause.name, {}), **found}
+    return out
 
 
 def _calibration(there: WidenedSet) -> dict[str, dict[str, Quantity]]:

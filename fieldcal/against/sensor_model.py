@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldcal.against.result import Difference, Facts, Match
 from fieldcal.core.samples import CHANNELS, Array
+from fieldcal.diagnosis.result import Quantity
 from fieldcal.effects import catalogue
 
 CALIBRATION = ("acc_bias", "acc_scale", "gyr_bias", "gyr_scale")
@@ -80,16 +81,17 @@ class SensorModel:
         """Scale factors and cross-coupling of "acc" or "gyr", (3, 3)."""
         out = np.diag(self.group(f"{triad}_scale"))
         for effect in TRIADS[triad]:
-            for name, value in self._values(effect).items():
+            for name, value in self.parameters(effect).items():
                 row, column = int(name[1]) - 1, int(name[-1]) - 1  # k12, s3
                 out[row, column] += float(value)
         return out
 
     def number(self, effect: str, name: str) -> float:
         """A parameter of an effect; 0 where it is absent."""
-        return float(self._values(effect).get(name, 0.0))
+        return float(self.parameters(effect).get(name, 0.0))
 
-    def _values(self, effect: str) -> Values:
+    def parameters(self, effect: str) -> Values:
+        """Parameters of an effect; empty where it is unknown."""
         if effect not in self.effects and self.shown is not None:
             return self.shown.effects.get(effect, {})
         return self.effects.get(effect, {})
@@ -130,7 +132,7 @@ def _model_of_simulator(simulator: Facts) -> SensorModel:
         calibration,
         {channel: _number(q) for channel, q in simulator.noise.items()},
         {
-            name: {n: q.value for n, q in values.items()}
+            name: {n: _value(n, q, simulator) for n, q in values.items()}
             for name, values in simulator.effects.items()
         },
     )
@@ -138,11 +140,10 @@ def _model_of_simulator(simulator: Facts) -> SensorModel:
 
 def _with_calibration(model: SensorModel, one: Difference) -> SensorModel:
     """Change a group of the calibration, axis by axis."""
-    known = model.calibration.get(one.id)
-    value = np.full(3, NEUTRAL[one.id]) if known is None else known.copy()
+    value, patched = model.group(one.id).copy(), one.id in model.calibration
     for axis, pair in one.parameters.items():
         i = "xyz".index(axis)
-        before = value[i] if known is not None else _number(pair.simulator)
+        before = value[i] if patched else _number(pair.simulator)
         value[i] = before + float(pair.difference.value)
     return replace(model, calibration={**model.calibration, one.id: value})
 
@@ -162,22 +163,28 @@ def _with_effect(model: SensorModel, one: Difference, found: Match) -> SensorMod
     """Change an effect; its shapes and words are taken from the recording."""
     shapes = {s.name for s in catalogue()[one.id].shapes}
     known = model.effects.get(one.id)
-    values: dict[str, float | str] = dict(known or {})
+    values: dict[str, float | str] = dict(model.parameters(one.id))
     for name, pair in one.parameters.items():
         there = pair.real or pair.simulator
         if there is None:
             continue
         if name in {*shapes, *INSTANTS} or isinstance(there.value, str):
-            values[name] = there.value
-            if name in INSTANTS and not isinstance(there.value, str):
-                clock = found.real if pair.real else found.simulator
-                values[name] = there.value - clock.start_s
+            values[name] = _value(
+                name, there, found.real if pair.real else found.simulator
+            )
             continue
         before = _number(pair.simulator)
         if known is not None:
             before = float(known.get(name, 0.0))
         values[name] = before + float(pair.difference.value)
     return replace(model, effects={**model.effects, one.id: values})
+
+
+def _value(name: str, quantity: Quantity, recording: Facts) -> float | str:
+    """A parameter's value; an instant counts from the first sample."""
+    if name in INSTANTS and not isinstance(quantity.value, str):
+        return quantity.value - recording.start_s
+    return quantity.value
 
 
 def _number(quantity: object) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from fieldcal.core.documents import load_toml
 from fieldcal.core.errors import InputError
 from fieldcal.core.factory import WARM_UP_TIME_CONSTANT, FactoryErrors
+from fieldcal.core.grade import GRADES
 
 DEFAULTS = "limits.toml"
 
@@ -106,6 +107,19 @@ def read(grade: str, path: Path | None = None) -> GradeLimits:
             f" be below temperature_max_c = {made.temperature_max_c:g} °C"
         )
     return made
+
+
+def check_every_grade(path: Path) -> None:
+    """Refuse a file of limits before work on sessions whose grades are not known yet.
+
+    Raises
+    ------
+    InputError
+        As `read` does, whatever the grade.
+
+    """
+    for grade in GRADES:
+        read(grade, path)
 
 
 def _load(path: Path) -> Mapping[str, Any]:

@@ -62,12 +62,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; 0 if all are good, 1 if some are not or have no result."""
+    from fieldcal.calibration.limits import check_every_grade
     from fieldcal.fleet.batch import SessionBatch
     from fieldcal.fleet.outcome import SessionTask
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.session.folder import check_writable
 
+    check_writable(args.output)
+    if args.limits:
+        check_every_grade(args.limits)
     limits = str(args.limits.resolve()) if args.limits else None
     batch = SessionBatch(
         sessions_in(args.folders),

@@ -57,7 +57,11 @@ def _compare_instances(args: argparse.Namespace) -> int:
     from fieldcal.evaluation.observations import usable_windows
     from fieldcal.session.folder import Session
 
-    sessions = {one.name: Session.open(one) for one in _session_folders(args.paths)}
+    folders = _session_folders(args.paths)
+    sessions = {
+        name: Session.open(one)
+        for name, one in zip(_instance_names(folders), folders, strict=True)
+    }
     means = {
         name: np.array([a.mean[:3] for a in usable_windows(one).averages])
         for name, one in sessions.items()
@@ -71,7 +75,7 @@ def _compare_instances(args: argparse.Namespace) -> int:
 
 
 def _session_folders(paths: list[Path]) -> list[Path]:
-    """Folders that are sessions, and the sessions in those that are not.
+    """Folders that are sessions, and the sessions in those that are not, each once.
 
     Raises
     ------
@@ -86,12 +90,19 @@ def _session_folders(paths: list[Path]) -> list[Path]:
     for path in paths:
         inner = sorted(p.parent for p in path.glob(f"*/{DESCRIPTION}"))
         found += [path] if (path / DESCRIPTION).exists() else inner
+    found = list({path.resolve(): path for path in found}.values())
     if len(found) < len(("one", "other")):
         raise InputError(
             f"{' '.join(map(str, paths))}: holds {len(found)} sessions; name the folder"
             " that fieldcal import wrote for a log of several IMUs, or its sessions"
         )
     return found
+
+
+def _instance_names(folders: list[Path]) -> list[str]:
+    """Names of the folders; their paths if two have the same name."""
+    names = [path.resolve().name for path in folders]
+    return names if len(set(names)) == len(names) else [str(path) for path in folders]
 
 
 def read_calibration(path: Path) -> Calibration:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -200,10 +201,21 @@ def _print_trends(
         say(f"\n{name}, {unit}\n")
         for line in trend_lines(points):
             say(line + "\n")
-        odd = [str(p.run.number) for p in points if p.out_of_family]
-        spread = points[-1].spread
-        say(f"  spread from run to run ± {spread:.2g} {unit}")
-        say(f"; out of family: {', '.join(odd)}\n" if odd else "; all in family\n")
+        say(f"  {_family_text(points)}\n")
+
+
+def _family_text(points: Sequence[TrendPoint]) -> str:
+    """Spread of a parameter from run to run, and which runs are out of family."""
+    last = points[-1]
+    if not math.isfinite(last.spread):
+        return "not judged: the limits of the grade have no spread for it"
+    text = f"spread from run to run ± {last.spread:.2g} {last.unit}"
+    if not any(math.isfinite(p.chance) for p in points):
+        return f"{text}, by the limits of the grade; nothing to compare with"
+    odd = [str(p.run.number) for p in points if p.out_of_family]
+    return (
+        f"{text}; out of family: {', '.join(odd)}" if odd else f"{text}; all in family"
+    )
 
 
 def trend_lines(points: Sequence[TrendPoint]) -> list[str]:

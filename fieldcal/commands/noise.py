@@ -9,18 +9,19 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fieldcal.calibration.limits import GradeLimits
     from fieldcal.core.samples import Block
     from fieldcal.history.location import StoreLocation
     from fieldcal.noise import NoiseModel
     from fieldcal.noise.document import NoiseResult
     from fieldcal.noise.recalibration import HistoryStep, Recalibration
+    from fieldcal.session.clock_steps import ClockStepRemover
     from fieldcal.session.folder import Session
 
 RARE = ("history", "limits")
@@ -59,15 +60,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
+    from fieldcal.session.folder import check_writable
     from fieldcal.session.noise_file import NOISE
 
+    if args.report:
+        check_writable(args.report)
     with TemporaryDirectory(prefix="fieldcal-noise-") as place:
         sessions = [
             _open_session(path, Path(place) / str(i))
             for i, path in enumerate(args.sessions)
         ]
-        found = noise_result(sessions, args.limits, args.history)
-    found = replace(found, sessions=[str(path) for path in args.sessions])
+        found = noise_result(
+            sessions, args.limits, args.history, [str(p) for p in args.sessions]
+        )
     content = found.to_json()
     folder = next((s for s, p in zip(sessions, args.sessions, strict=True)
                    if p.is_dir()), None)  # fmt: skip
@@ -132,32 +137,43 @@ def noise_result(
     sessions: Sequence[Session],
     limits: Path | None = None,
     history: StoreLocation | None = None,
+    names: Sequence[str] = (),
 ) -> NoiseResult:
     """The noise of a device, from its recordings at rest.
+
+    Parameters
+    ----------
+    sessions : recordings of the device
+    limits, history : the user's files instead of the usual ones
+    names : of the sessions, as the user gave them; their folders if there are none
 
     Raises
     ------
     InputError
-        If the sessions are of several devices, or not long enough at rest.
+        If the sessions are of several devices or rates, or not long enough at rest.
 
     """
+    from fieldcal.calibration import limits as bounds
     from fieldcal.noise import estimate_noise, reduce_recording
     from fieldcal.noise.alignment import gyrocompass_heading
     from fieldcal.noise.document import NoiseResult
 
     _check_one_device(sessions)
-    model = estimate_noise([reduce_recording(_blocks_at_rest(s)) for s in sessions])
     about = sessions[0].about
     grade = about.grade
+    allowed = bounds.read(grade, limits)
+    names = names or [str(s.folder) for s in sessions]
+    reduced = [reduce_recording(_blocks_at_rest(s)) for s in sessions]
+    model = estimate_noise(reduced, names)
     serial = str(about.device.get("serial", ""))
-    recalibrate, since = _recalibration_times(model, grade, serial, limits, history)
+    recalibrate, since = _recalibration_times(model, allowed, serial, history)
     gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
     compass = None
     if grade == "navigation" and gyroscopes:
         compass = gyrocompass_heading(gyroscopes, about.latitude)
     device = {k: str(about.device[k]) for k in ("name", "serial") if k in about.device}
     return NoiseResult(
-        [str(s.folder) for s in sessions],
+        names,
         {**device, "grade": grade},
         model,
         recalibrate,
@@ -181,13 +197,11 @@ def _check_one_device(sessions: Sequence[Session]) -> None:
 
 def _blocks_at_rest(session: Session) -> Iterator[Block]:
     """Samples of the windows; all samples if the session has no windows."""
-    spans: list[list[float]] = []
-    for start, end in sorted(w for w in session.windows if w):
-        if spans and start - spans[-1][1] <= JOINED_GAP_S:
-            spans[-1][1] = max(spans[-1][1], end)
-        else:
-            spans.append([start, end])
-    for block in session.blocks():
+    from fieldcal.session.clock_steps import ClockStepRemover
+
+    clock = ClockStepRemover()
+    for block in session.blocks(clock):
+        spans = _joined_windows(session, clock)
         if not spans:
             yield block
         for start, end in spans:
@@ -196,21 +210,30 @@ def _blocks_at_rest(session: Session) -> Iterator[Block]:
                 yield part
 
 
+def _joined_windows(session: Session, clock: ClockStepRemover) -> list[list[float]]:
+    """Windows in corrected times, s; those with a short gap between are joined."""
+    windows = [w for w in session.windows if w]
+    spans: list[list[float]] = []
+    for start, end in sorted([clock.corrected(t) for t in w] for w in windows):
+        if spans and start - spans[-1][1] <= JOINED_GAP_S:
+            spans[-1][1] = max(spans[-1][1], end)
+        else:
+            spans.append([start, end])
+    return spans
+
+
 def _recalibration_times(
     model: NoiseModel,
-    grade: str,
+    allowed: GradeLimits,
     serial: str,
-    limits: Path | None,
     history: StoreLocation | None,
 ) -> tuple[Mapping[str, Recalibration], str]:
     """When each bias leaves the limit of the grade, and the start of that time."""
-    from fieldcal.calibration import limits as bounds
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History
     from fieldcal.noise.recalibration import recalibration_time
 
     runs = History(history or default_location()).runs(serial) if serial else ()
-    allowed = bounds.read(grade, limits)
     out = {}
     for name, channel in model.channels.items():
         group = "acc_bias" if name[0] == "a" else "gyr_bias"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -120,7 +121,11 @@ def run(args: argparse.Namespace) -> int:
     found = planner.expected(places, grade, seconds, gravity)
     paper = planner.expected(FIVE_POSITIONS, grade, seconds, gravity)
     further = planner.extra_position(places, ladder, gravity)
-    with_it = planner.expected((*places, further), grade, seconds, gravity)
+    with_it = (
+        planner.expected((*places, further), grade, seconds, gravity)
+        if further
+        else None
+    )
     confused = find_aliases(places, gravity)
     if args.output:
         write_plan(args.output, tables, places, seconds)
@@ -157,7 +162,7 @@ def _seconds_needed(hz: float, grade: GradeNoise) -> float:
     """
     from fieldcal.planning.swaying_base import window_seconds_needed
 
-    if not hz > 0:
+    if not 0 < hz < math.inf:
         raise PlanError("--sways is a frequency in Hz, above 0")
     return window_seconds_needed(hz, grade)
 
@@ -166,7 +171,10 @@ def _plan_spins(args: argparse.Namespace) -> int:
     """Plan windows on a rate table."""
     from fieldcal.planning.planner import GRADES
 
-    windows = (SPINS if args.positions is None else args.positions) + RESTS
+    spins = SPINS if args.positions is None else args.positions
+    if spins < 1:
+        raise PlanError(f"--positions {spins}: the table must turn once at least")
+    windows = spins + RESTS
     seconds = _seconds_per_position(args.minutes, windows)
     device = _read_device_noise(args.noise_of) if args.noise_of else None
     grade = device.grade(seconds) if device else GRADES[args.noise]
@@ -197,6 +205,8 @@ def _read_device_noise(path: Path) -> DeviceNoise:
 
 def _seconds_per_position(minutes: float, n: int) -> float:
     """Averaging time of each of n positions within some minutes, s."""
+    if not math.isfinite(minutes):
+        raise PlanError(f"--minutes {minutes:g}: give the time for all positions")
     each = 60 * minutes / n - TURN_S
     if each < SHORTEST_S:
         raise PlanError(
@@ -221,16 +231,17 @@ def _plan_document(
     seconds: float,
     found: Mapping[str, float],
     confused: Aliases,
-    further: Position,
-    with_it: Mapping[str, float],
+    further: Position | None,
+    with_it: Mapping[str, float] | None,
 ) -> dict[str, Any]:
+    extra = further and {**position_table(further), "sigma": dict(with_it or {})}
     return {
         "positions": [position_table(p) for p in chosen],
         "seconds": seconds,
         "sigma": dict(found),
         "hidden": list(confused.hidden),
         "aliases": {name: list(others) for name, others in confused.pairs},
-        "extra_position": {**position_table(further), "sigma": dict(with_it)},
+        "extra_position": extra,
     }
 
 
@@ -241,7 +252,7 @@ def _print_plan(
     grade: GradeNoise,
     found: Mapping[str, float],
     paper: Mapping[str, float],
-    with_it: Mapping[str, float],
+    with_it: Mapping[str, float] | None,
 ) -> None:
     from rich.table import Table
 
@@ -253,11 +264,13 @@ def _print_plan(
         console.print(f"  {i}  {position.name}")
     title = f"Expected ± 1σ ({noise}: {1e3 * grade.acc(seconds):.2f} mm/s² a mean)"
     table = Table(title=title, title_justify="left")
-    for column in ("parameter", "this plan", PAPER_COLUMN, "one more", "unit"):
-        side = "left" if column in ("parameter", "unit") else "right"
-        table.add_column(column, justify="right" if side == "right" else "left")
+    plans = {"this plan": found, PAPER_COLUMN: paper}
+    if with_it is not None:
+        plans["one more"] = with_it
+    for column in ("parameter", *plans, "unit"):
+        table.add_column(column, justify="right" if column in plans else "left")
     for name in dict.fromkeys([*found, *paper]):
-        cells = [_sigma_cell(sigmas.get(name)) for sigmas in (found, paper, with_it)]
+        cells = [_sigma_cell(sigmas.get(name)) for sigmas in plans.values()]
         table.add_row(name, *cells, _unit_of_parameter(name))
     console.print(table)
 
@@ -273,9 +286,10 @@ def _unit_of_parameter(name: str) -> str:
     return units.get(group_of(name), "°")
 
 
-def _print_aliases(confused: Aliases, further: Position) -> None:
+def _print_aliases(confused: Aliases, further: Position | None) -> None:
     say = sys.stdout.write
-    say(f"one more position worth most: {further.name}\n")
+    worth = further.name if further else "none within the limits"
+    say(f"one more position worth most: {worth}\n")
     if confused.hidden:
         say(f"goes into the calibration unseen: {', '.join(confused.hidden)}\n")
     for name, others in confused.pairs:

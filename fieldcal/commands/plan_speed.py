@@ -43,7 +43,7 @@ def show_spins(
     Raises
     ------
     PlanError
-        If the table does not turn, or a file is asked for.
+        If the table does not turn, its speed has no ±, or a file is asked for.
 
     """
     import numpy as np

@@ -1,7 +1,8 @@
 """Parse TOML and JSON text; every text that cannot be parsed raises one kind of error.
 
 The parsers raise RecursionError for deep nesting, and a plain ValueError for a number
-with more digits than Python converts. Both become errors of the text.
+with more digits than Python converts. Both become errors of the text. A byte order
+mark, with which some editors begin a text, is skipped.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import json
 import tomllib
 from typing import Any
 
+BYTE_ORDER_MARK = "\ufeff"
 NESTED_TOO_DEEPLY = "it is nested too deeply"
 NUMBER_TOO_LONG = "it has a number of thousands of digits"
 
@@ -22,13 +24,15 @@ def load_toml(text: str) -> dict[str, Any]:
     tomllib.TOMLDecodeError
         If the text is not TOML.
 
+    >>> load_toml(BYTE_ORDER_MARK + "a = 1")
+    {'a': 1}
     >>> load_toml("a = " + "[" * 9999)
     Traceback (most recent call last):
       ...
     tomllib.TOMLDecodeError: it is nested too deeply
     """
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:
@@ -45,9 +49,11 @@ def load_json(text: str) -> Any:
     ValueError
         If the text is not JSON.
 
+    >>> load_json(BYTE_ORDER_MARK + "[1]")
+    [1]
     """
     try:
-        return json.loads(text)
+        return json.loads(text.removeprefix(BYTE_ORDER_MARK))
     except json.JSONDecodeError:
         raise
     except RecursionError:

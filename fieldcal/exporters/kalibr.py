@@ -49,10 +49,11 @@ def split_rotation(matrix: Array) -> tuple[Array, Array]:
 def window_noise_density(session: Session) -> Array:
     """Noise density of the six channels by (3); nan if no window is long enough."""
     squares, many = np.zeros(6), np.zeros(6)
+    block = session.block  # before its windows, which reading corrects
     for window in session.windows:
         if window is None:
             continue
-        means = _means(session.block.between(*window))
+        means = _means(block.between(*window))
         steps = np.diff(means, axis=0) ** 2
         squares += np.nansum(steps, axis=0)
         many += np.isfinite(steps).sum(axis=0)

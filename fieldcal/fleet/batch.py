@@ -9,6 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fieldcal.core.errors import InputError, disk_says
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.fleet.workers import WorkerPool, run_tasks
@@ -70,16 +71,31 @@ class SessionBatch:
             )
 
     def write(self, path: Path) -> None:
-        """Write the results as Parquet, one row per session, complete or not at all."""
+        """Write the results as Parquet, one row per session, complete or not at all.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+
+        """
         names: dict[str, None] = {}
         for rows in self.stored_rows():
             names |= {n: None for one in rows for n in sorted(one.parameters)}
         table = parquet_schema(list(names))
         part = path.with_name(f".{path.name}.part")
-        with pq.ParquetWriter(part, table) as out:
-            for rows in self.stored_rows():
-                out.write_table(pa.Table.from_pylist([*map(_parquet_row, rows)], table))
-        part.replace(path)
+        try:
+            with pq.ParquetWriter(part, table) as out:
+                for rows in self.stored_rows():
+                    some = pa.Table.from_pylist([*map(_parquet_row, rows)], table)
+                    out.write_table(some)
+            part.replace(path)
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot be written: {disk_says(error)}"
+            ) from error
+        finally:
+            part.unlink(missing_ok=True)
 
 
 def parquet_schema(names: Sequence[str]) -> pa.Schema:

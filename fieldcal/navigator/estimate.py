@@ -3,14 +3,15 @@
 The solution of run r, at attitude C (device to base), is
 
     y_r = H (X_phi (phi + phi_r) + X_p p_r + X_e C e + X_a C (a + k f + j_r)) + n   (1)
-    n ~ N(0, N_a^2 K_a + N_g^2 K_g + q^2 I)                                         (2)
+    n ~ N(0, N_a^2 K_a + N_g^2 K_g + q_v^2 I_v + q_p^2 I_p)                         (2)
 
 with X and K of `growth`. H selects the components of velocity and position that were
 recorded. a and e are errors of the biases, k errors of the accelerometers' scale
 factors, f = C^T f_base. phi is the attitude error common to all runs: level and azimuth
 of the base. phi_r is the error of setting each attitude, p_r the error of the first
-position, and j_r an error of the force in each run, of size J. N_a, N_g, q and J
-maximise the evidence. The navigator computes with its own calibration; the result U = b
+position, and j_r an error of the force in each run, of size J. q_v and q_p are
+the output noise of velocity and of position. N_a, N_g, q_v, q_p and J maximise the
+evidence. The navigator computes with its own calibration; the result U = b
 + s f refers to what it takes for its sensors' outputs. Parameters that a run at rest
 hardly shows, such as scale factors of gyroscopes, are not estimated. SI units; base
 axes, device axes.
@@ -22,6 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.frames import specific_force_at_home
@@ -45,7 +47,7 @@ PRIOR_SIGMAS = 3.0 * np.repeat([priors.BIAS_ACC, priors.SCALE, priors.BIAS_GYR],
 """Prior standard deviations: a few times those of consumer grade."""
 
 SEARCH_TOLERANCE = {"fatol": 0.02, "xatol": 0.03}
-"""Tolerances of the search for N_a, N_g, q and J: log evidence, and ln of each."""
+"""Tolerances of the search for the noise of (2): log evidence, and ln of each."""
 
 PASSES = 2
 """Number of times the rows are linearised about the estimate."""
@@ -53,9 +55,10 @@ PASSES = 2
 SLOPE_STEPS = np.repeat([1e-7, 1e-4, 1e-4], 3)
 """Steps of rate, force and angle for numerical derivatives."""
 
-NOISE_LEAST = (1e-6, 1e-8, 1e-6, 1e-6)
-NOISE_MOST = (0.1, 1e-2, 10.0, 0.3)
-"""Bounds of N_a (m/s^2/sqrt(Hz)), N_g (rad/s/sqrt(Hz)), q (m/s, m) and J (m/s^2)."""
+NOISE_LEAST = (1e-6, 1e-8, 1e-6, 1e-6, 1e-6)
+NOISE_MOST = (0.1, 1e-2, 10.0, 10.0, 0.3)
+"""Bounds of N_a (m/s^2/sqrt(Hz)), N_g (rad/s/sqrt(Hz)), q_v (m/s), q_p (m) and J
+(m/s^2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +69,7 @@ class DriftEstimate:
     ----------
     names, values, covariance : parameters that the runs determine, as in a result
     undetermined : names of the parameters that the runs do not determine
-    noise : N_a, N_g, q, J
+    noise : N_a, N_g, q_v, q_p, J; the least q where it was not recorded
     chi2, dof : chi-square of all rows with that noise, and rows less parameters
     tilt : (3,) rad, phi; `tilt_sigma` its ±
     setup_mistakes : statements about the set-up that the runs contradict, by the names
@@ -78,7 +81,7 @@ class DriftEstimate:
     values: Array
     covariance: Array
     undetermined: tuple[str, ...]
-    noise: tuple[float, float, float, float]
+    noise: tuple[float, float, float, float, float]
     chi2: float
     dof: int
     tilt: Array
@@ -95,7 +98,7 @@ class DriftEstimate:
             tuple(UNITS[NAMES.index(n)] for n in self.names),
             self.chi2,
             self.dof,
-            self.noise[3],
+            self.noise[-1],
         )
 
 
@@ -155,8 +158,8 @@ class _SetupFit:
 
 
 def _without_run_scatter(noise: Array) -> Array:
-    """Noise without the scatter J of the runs, (4,)."""
-    return np.append(noise[:3], NOISE_LEAST[3])
+    """Noise without the scatter J of the runs, (5,)."""
+    return np.append(noise[:-1], NOISE_LEAST[-1])
 
 
 def _may_be_likelier(best: _SetupFit, other: RunSetup) -> bool:
@@ -208,19 +211,30 @@ def _fit_setup(
 def _likeliest_noise(
     rows: Sequence[RunRows], sizes: Array, near: Array | None
 ) -> Array:
-    """N_a, N_g, q, J of the greatest evidence, (4,); `near` is the start value."""
+    """Noise of the greatest evidence, (5,) as in (2); `near` is the start value."""
     from scipy.optimize import minimize
 
-    least, most = np.log(NOISE_LEAST), np.log(NOISE_MOST)
+    acts = _noise_that_acts(rows)
+    least, most = np.log(NOISE_LEAST)[acts], np.log(NOISE_MOST)[acts]
+
+    def with_noise(logs: Array) -> Array:
+        out = np.array(NOISE_LEAST)
+        out[acts] = np.exp(np.clip(logs, least, most))
+        return out
 
     def worse(logs: Array) -> float:
-        inside = np.clip(logs, least, most)
-        beyond = float(np.sum((logs - inside) ** 2))
-        return 100.0 * beyond - run_posterior(rows, sizes, np.exp(inside)).score
+        beyond = float(np.sum((logs - np.clip(logs, least, most)) ** 2))
+        return 100.0 * beyond - run_posterior(rows, sizes, with_noise(logs)).score
 
-    start = _coarse_minimum(worse, least, most) if near is None else np.log(near)
+    start = _coarse_minimum(worse, least, most) if near is None else np.log(near[acts])
     found = minimize(worse, start, method="Nelder-Mead", options=SEARCH_TOLERANCE)
-    return np.asarray(np.exp(np.clip(found.x, least, most)))
+    return with_noise(found.x)
+
+
+def _noise_that_acts(rows: Sequence[RunRows]) -> NDArray[np.bool_]:
+    """Which noise of (2) the rows depend on, (5,): q only of what was recorded."""
+    of_position = np.concatenate([one.is_position for one in rows])
+    return np.array([True, True, not of_position.all(), of_position.any(), True])
 
 
 def _linearise_about(
@@ -266,13 +280,13 @@ def _determined_parameters(best: _SetupFit, off: tuple[str, ...]) -> DriftEstima
     variance = np.diag(found.covariance)
     known = np.flatnonzero(variance[:n] < thresholds.DETERMINED * PRIOR_SIGMAS**2)
     values = found.mean[:n] + [name.startswith("acc_scale") for name in NAMES]
-    force, rate, out, jitter = map(float, best.noise)
+    force, rate, velocity, position, jitter = map(float, best.noise)
     return DriftEstimate(
         tuple(NAMES[i] for i in known),
         values[known],
         found.covariance[np.ix_(known, known)],
         tuple(name for i, name in enumerate(NAMES) if i not in known),
-        (force, rate, out, jitter),
+        (force, rate, velocity, position, jitter),
         found.chi2,
         sum(len(one.y) for one in best.rows) - len(known),
         found.mean[n:],

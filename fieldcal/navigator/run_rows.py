@@ -1,9 +1,10 @@
 """Rows of a navigator's runs at rest, and the parameters that they determine.
 
     y_r = H (X_phi (phi + phi_r) + X_p p_r + X_e C e + X_a C (a + k f + j_r)) + n   (1)
-    n ~ N(0, N_a^2 K_a + N_g^2 K_g + q^2 I)                                         (2)
+    n ~ N(0, N_a^2 K_a + N_g^2 K_g + q_v^2 I_v + q_p^2 I_p)                         (2)
 
-Symbols and units as in `estimate`.
+I_v and I_p select the rows of velocity and position. Symbols and units as in
+`estimate`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fieldcal.core.frames import specific_force_at_home
 from fieldcal.core.samples import Array
@@ -52,6 +54,7 @@ class RunRows:
     Attributes
     ----------
     y : (n,) errors of the solution
+    is_position : (n,) whether a row is of position, m, or of velocity, m/s
     design : (n, 12) columns of the parameters in the order of `NAMES`, and of phi
     attitude_sigma : rad, standard deviation of phi_r about any axis
     attitude_design : (n, 3) columns of phi_r
@@ -62,6 +65,7 @@ class RunRows:
     """
 
     y: Array
+    is_position: NDArray[np.bool_]
     design: Array
     attitude_sigma: float
     attitude_design: Array
@@ -71,15 +75,15 @@ class RunRows:
     force_noise: Array
 
     def covariance(self, noise: Array) -> Array:
-        """Covariance of the rows for N_a, N_g, q, J, (n, n)."""
-        force, rate, out, jitter = noise**2
+        """Covariance of the rows for N_a, N_g, q_v, q_p, J, (n, n)."""
+        force, rate, velocity, position, jitter = noise**2
         turned = self.attitude_design @ self.attitude_design.T
         whole = (
             self.attitude_sigma**2 * turned
             + self.start_covariance
             + jitter * self.jitter
         )
-        whole += out * np.eye(len(self.y))
+        whole += np.diag(np.where(self.is_position, position, velocity))
         return np.asarray(whole + force * self.force_noise + rate * self.rate_noise)
 
     def attitude_error(self, noise: Array, mean: Array) -> Array:
@@ -101,10 +105,12 @@ def run_rows(run: NavigatorRun, setup: RunSetup, r: int) -> RunRows:
     c = setup.attitudes[r]
     rate, force = constant[:, :3] @ c, constant[:, 3:] @ c
     f = c.T @ specific_force_at_home(setup.gravity)
-    began = start[:, POSITION] * (START_POSITION_M if used.max() >= len(f) else 0.0)
+    is_position = np.tile(used >= len(f), len(run.values))
+    began = start[:, POSITION] * (START_POSITION_M if is_position.any() else 0.0)
     pick = np.ix_(take, take)
     return RunRows(
         run.values[:, used].ravel(),
+        is_position,
         np.hstack([force, force * f, rate, start[:, PHI]]),
         float(setup.attitude_sigmas[r]),
         start[:, PHI],
@@ -126,7 +132,7 @@ class RunPosterior:
 
 
 def run_posterior(rows: Sequence[RunRows], sizes: Array, noise: Array) -> RunPosterior:
-    """Posterior of all runs with prior `sizes` (12,) and noise N_a, N_g, q, J."""
+    """Posterior of all runs with prior `sizes` (12,) and `noise`, (5,) as in (2)."""
     g, b, square, log_det = np.zeros((len(sizes),) * 2), np.zeros(len(sizes)), 0.0, 0.0
     for one in rows:
         lower = np.linalg.cholesky(one.covariance(noise))

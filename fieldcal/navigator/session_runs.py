@@ -156,7 +156,7 @@ def _contradicted_setup(found: DriftEstimate) -> list[str]:
         )
     if SCATTER in found.setup_mistakes:
         out.append(
-            f"forces are off by {found.noise[3]:.1g} m/s² from run to run: biases"
+            f"forces are off by {found.noise[-1]:.1g} m/s² from run to run: biases"
             " change between runs, or attitudes were not as entered; every ± includes"
             " it"
         )
@@ -169,12 +169,16 @@ def _deg(value: float, sigma: float) -> str:
 
 def drift_document(found: DriftEstimate, placed: RunSetup) -> dict[str, Any]:
     """Noise, tilt and contradictions, as the result file states them."""
-    force, rate, out, jitter = found.noise
+    force, rate, velocity, position, jitter = found.noise
+    recorded = np.array(placed.recorded)
+    has_velocity, has_position = bool((recorded < 3).any()), bool((recorded > 2).any())
     return {
         "runs": len(placed.attitudes),
         "force_noise_m_s2_rthz": force,
         "rate_noise_rad_s_rthz": rate,
-        "output_noise": out,
+        "output_noise": velocity if has_velocity else position,
+        "velocity_noise_m_s": velocity if has_velocity else None,
+        "position_noise_m": position if has_position else None,
         "run_scatter_m_s2": jitter,
         "tilt_deg": np.rad2deg(found.tilt).tolist(),
         "tilt_sigma_deg": np.rad2deg(found.tilt_sigma).tolist(),

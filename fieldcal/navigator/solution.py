@@ -78,11 +78,13 @@ def read_solution(path: Path) -> NavigationSolution:
 
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.reader(file) if row]
+        # Excel begins "CSV UTF-8" with a byte order mark
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
-    heading = [name.strip() for name in rows[0]] if rows else []
+    heading = [name.strip() for name in rows[0][1]] if rows else []
     names = [n for triad in COLUMNS for n in triad]
     if "t" not in heading or not set(names) & set(heading):
         raise InputError(
@@ -100,17 +102,18 @@ def read_solution(path: Path) -> NavigationSolution:
     return NavigationSolution(t, values)
 
 
-def _numbers(path: Path, rows: Sequence[Sequence[str]], width: int) -> Array:
+def _numbers(path: Path, rows: Sequence[tuple[int, list[str]]], width: int) -> Array:
+    """Numbers of rows, each with the number of its line, (n, width)."""
     out = np.empty((len(rows), width))
-    for i, row in enumerate(rows):
+    for i, (line, row) in enumerate(rows):
         try:
             out[i] = [float(cell) for cell in row]
         except ValueError:
             raise InputError(
-                f"{path}: line {i + 2} is not {width} numbers: mend it, or leave it out"
+                f"{path}: line {line} is not {width} numbers: mend it, or leave it out"
             ) from None
         if not np.isfinite(out[i]).all():
-            raise InputError(f"{path}: line {i + 2} has a number that is none")
+            raise InputError(f"{path}: line {line} has a number that is none")
     return out
 
 
@@ -133,7 +136,9 @@ def runs_in_windows(
                 " run began and ended"
             )
         start, end = window
-        if start < solution.t[0] or end > solution.t[-1] or end - start < SHORTEST_S:
+        # a time that is no number is in no range
+        within = solution.t[0] <= start and end <= solution.t[-1]
+        if not (within and end - start >= SHORTEST_S):
             raise InputError(
                 f"[[position]] number {number}: a run of {SHORTEST_S:.0f} s or more"
                 f" must lie within {solution.t[0]:g} to {solution.t[-1]:g} s, not"

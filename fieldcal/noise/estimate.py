@@ -20,6 +20,7 @@ from fieldcal.core.samples import CHANNELS, UNITS, Array
 from fieldcal.noise.averaging import AveragingError, averaging_error
 from fieldcal.noise.covariates import fit_covariates, thermometer_covariate
 from fieldcal.noise.filters import FilterNoisePair, fit_filter_noise
+from fieldcal.noise.levels import ReducedStretch
 from fieldcal.noise.likelihood import NoiseFit
 from fieldcal.noise.measured import MeasuredAllan, measured_allan_deviation
 from fieldcal.noise.prediction import (
@@ -36,6 +37,9 @@ from fieldcal.noise.terms import FILTERED_HZ, choose_processes
 
 MIN_STRETCH_S = 30.0
 """Shortest stretch from which noise is estimated, s."""
+
+SAME_RATE = 0.02
+"""Most by which rates of one device differ because of clocks, each off by 1 %."""
 
 MIN_DRAWS = 5
 """Fewest draws with a process from which a limit for it is stated."""
@@ -131,23 +135,36 @@ class NoiseModel:
     bridged: float
 
 
-def estimate_noise(recordings: Sequence[Reduction]) -> NoiseModel:
+def estimate_noise(
+    recordings: Sequence[Reduction], names: Sequence[str] = ()
+) -> NoiseModel:
     """Estimate the noise of a device from its recordings at rest.
+
+    Parameters
+    ----------
+    recordings : each reduced
+    names : of the recordings, for messages
 
     Raises
     ------
     InputError
-        If no stretch at rest is long enough, or nothing was measured.
+        If no stretch at rest is long enough, their rates differ, or nothing was
+        measured.
 
     """
-    every = [s for r in recordings for s in r.stretches]
-    longest = max((s.samples * s.dt for s in every), default=0.0)
+    names = names or [f"recording {i + 1}" for i in range(len(recordings))]
+    pairs = zip(names, recordings, strict=True)
+    origin = [(name, s) for name, r in pairs for s in r.stretches]
+    longest = max((s.samples * s.dt for _, s in origin), default=0.0)
     if longest < MIN_STRETCH_S:
         raise InputError(
             f"the longest stretch at rest lasts {longest:.0f} s: record"
             f" {MIN_STRETCH_S:.0f} s at least, an hour to see bias instability"
         )
-    kept = [s for s in every if s.samples * s.dt >= min(MIN_STRETCH_S, longest / 4)]
+    least = min(MIN_STRETCH_S, longest / 4)
+    origin = [(name, s) for name, s in origin if s.samples * s.dt >= least]
+    _check_one_rate(origin)
+    kept = [s for _, s in origin]
     spectrum = CosineSpectrum(kept, NOISY)
     warm = all(r.has_temperature for r in recordings)
     channels = {
@@ -166,6 +183,18 @@ def estimate_noise(recordings: Sequence[Reduction]) -> NoiseModel:
         1 / spectrum.dt,
         sum(r.bridged for r in recordings) / samples,
     )
+
+
+def _check_one_rate(origin: Sequence[tuple[str, ReducedStretch]]) -> None:
+    """Refuse stretches of different rates: a coefficient has one frequency only."""
+    (fast, short), (slow, long) = (
+        of(origin, key=lambda pair: pair[1].dt) for of in (min, max)
+    )
+    if long.dt > (1 + SAME_RATE) * short.dt:
+        raise InputError(
+            f"{slow} has {1 / long.dt:.4g} samples a second at rest, and {fast} has"
+            f" {1 / short.dt:.4g}: estimate the noise of each rate by itself"
+        )
 
 
 def _estimate_channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEstimate:

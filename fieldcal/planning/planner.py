@@ -164,9 +164,32 @@ def best_positions(
     """
     if n + len(fixed) < 2:
         raise PlanError(f"{n} positions determine nothing: ask for two or more")
+    within = (
+        f"within |α| ≤ {np.rad2deg(ladder.alpha):g}° and"
+        f" |β| ≤ {np.rad2deg(ladder.beta):g}°"
+    )
+    if n > (most := len(ladder.candidates())):
+        raise PlanError(
+            f"{n} positions: {most} are distinguished {within}; ask for no more"
+        )
+    found = _best_of_candidates(n, ladder, gravity, fixed)
+    if found is None:
+        raise PlanError(
+            f"no {n} positions {within} determine the calibration; allow more positions"
+            " or wider angles"
+        )
+    return found
+
+
+def _best_of_candidates(
+    n: int, ladder: Ladder, gravity: float, fixed: Sequence[Position]
+) -> tuple[Position, ...] | None:
+    """The best n candidates, as `best_positions`; None if they determine too little."""
     names = required_parameters(n + len(fixed))
     held = {p.degrees for p in fixed}
     candidates = [p for p in ladder.candidates() if p.degrees not in held]
+    if len(candidates) < n:
+        return None
     rows = design_matrix(names, candidates, gravity)
     information = np.einsum("nip,niq->npq", rows, rows)
     given = np.zeros(information.shape[1:])
@@ -178,11 +201,7 @@ def best_positions(
     ends = [_exchange(list(start), information, given, gravity) for start in starts]
     cost, chosen = min(ends)
     if not np.isfinite(cost):
-        raise PlanError(
-            f"no {n} positions within |α| ≤ {np.rad2deg(ladder.alpha):g}° and"
-            f" |β| ≤ {np.rad2deg(ladder.beta):g}° determine the calibration; allow more"
-            " positions or wider angles"
-        )
+        return None
     return _shortest_way([candidates[i] for i in chosen])
 
 
@@ -236,6 +255,10 @@ def _shortest_way(positions: list[Position]) -> tuple[Position, ...]:
 
 def extra_position(
     positions: Sequence[Position], ladder: Ladder, gravity: float
-) -> Position:
-    """The further position that reduces the error most."""
-    return best_positions(1, ladder, gravity, positions)[0]
+) -> Position | None:
+    """The further position that reduces the error most.
+
+    None if all within the limits are taken, or none completes the calibration.
+    """
+    found = _best_of_candidates(1, ladder, gravity, positions)
+    return found[0] if found else None

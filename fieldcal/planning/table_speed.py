@@ -83,11 +83,13 @@ def expected_by_speed(
     Raises
     ------
     PlanError
-        If the table does not turn.
+        If the table does not turn, or its speed has no ±.
 
     """
-    if not speed > 0:
+    if not 0 < speed < np.inf:
         raise PlanError("the table must turn: give a speed above 0")
+    if not 0 <= speed_sigma < np.inf:
+        raise PlanError("how well the speed is known cannot be below 0: give its ±")
     spun = np.hstack([axes, speed * axes**2])  # (1)
     common = np.hypot(speed_sigma, ALONG)
     alike = sigma**2 * np.eye(len(axes)) + common**2

@@ -66,6 +66,7 @@ class ClockStepRemover:
 
     def __init__(self) -> None:
         self.steps: list[ClockStep] = []
+        self._pieces: list[tuple[float, float, float]] = []
         self._offset = 0.0
         self._last = self._period = np.nan
         self._held = concat([])
@@ -92,6 +93,14 @@ class ClockStepRemover:
             self._step_to(float(held.t[0]))
         return replace(held, t=held.t + self._offset)
 
+    def corrected(self, t: float) -> float:
+        """Corrected time of a recorded time, s: that of the nearest piece so far."""
+        if not self._pieces:
+            return t
+        first, last, added = np.array(self._pieces).T
+        away = np.maximum(np.maximum(first - t, t - last), 0.0)
+        return t + float(added[int(np.argmin(away))])
+
     def _steadied(self, block: Block, known: Index, times: Array, far: Flags) -> Block:
         steps = np.diff(times)
         usual = steps[(steps > 0) & (steps <= LEAST_STEP)]
@@ -113,6 +122,8 @@ class ClockStepRemover:
                 offsets[known[first] :] = self._offset
             if not abs(began - self._last) > LEAST_STEP or lasts:
                 self._last = float(times[end - 1])
+                first_s = self._pieces.pop()[0] if self._pieces else float(began)
+                self._pieces.append((first_s, self._last, self._offset))
         return replace(block, t=block.t + offsets) if offsets.any() else block
 
     def _step_to(self, began: float) -> None:
@@ -120,32 +131,10 @@ class ClockStepRemover:
         at = self._last + self._offset + self._period
         self.steps.append(ClockStep(at, began - self._last))
         self._offset = at - began
+        self._pieces.append((began, began, self._offset))
 
 
-class StepFreeRecording(NamedTuple):
-    """A recording from which the steps of the clock were removed.
-
-    Attributes
-    ----------
-    block : the samples, with corrected times
-    steps : the steps found
-    pieces : for each part between steps: first and last recorded time, and what was
-        added to them, (k, 3) s
-
-    """
-
-    block: Block
-    steps: list[ClockStep]
-    pieces: Array
-
-    def corrected(self, t: float) -> float:
-        """Corrected time of a recorded time, s."""
-        first, last, added = self.pieces.T
-        away = np.maximum(np.maximum(first - t, t - last), 0.0)
-        return t + float(added[int(np.argmin(away))])
-
-
-def remove_clock_steps(block: Block) -> StepFreeRecording | None:
+def remove_clock_steps(block: Block) -> tuple[Block, ClockStepRemover] | None:
     """Remove the steps of the clock from a whole recording; None if there are none.
 
     If most differences are that large, the times are in another unit than s, and None
@@ -156,10 +145,4 @@ def remove_clock_steps(block: Block) -> StepFreeRecording | None:
         return None
     clock = ClockStepRemover()
     whole = concat([clock.add(block), clock.flush()])
-    if not clock.steps:
-        return None
-    added = whole.t - block.t
-    edges = np.flatnonzero(np.abs(np.diff(added)) > LEAST_STEP / 2) + 1
-    first, last = np.r_[0, edges], np.r_[edges, len(added)] - 1
-    pieces = np.column_stack([block.t[first], block.t[last], added[first]])
-    return StepFreeRecording(whole, clock.steps, pieces)
+    return (whole, clock) if clock.steps else None

@@ -159,15 +159,18 @@ class Session:
         self.warnings += changed
         return self._steadied(_blank_gaps(whole, self.about.excluded_spans))
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self, clock: ClockStepRemover | None = None) -> Iterator[Block]:
         """Samples as in `block`, part by part, with bounded memory.
 
-        If the device changed its own calibration, the whole recording is one part.
+        `windows` remain in recorded times: `clock`, which removes the steps of the
+        device's clock, corrects them as far as the samples have been read. If the
+        device changed its own calibration, or `block` was read before, the whole
+        recording is one part, and the windows are corrected already.
         """
-        if len(installed_stretches(self.marks())) > 1:
+        if "block" in vars(self) or len(installed_stretches(self.marks())) > 1:
             yield self.block
             return
-        clock = ClockStepRemover()
+        clock = clock or ClockStepRemover()
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
@@ -178,23 +181,25 @@ class Session:
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
             yield clock.add(_blank_gaps(part, self.about.excluded_spans))
         yield clock.flush()
+        self.warnings += tuple(step.sentence() for step in clock.steps)
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""
-        steady = remove_clock_steps(raw)
-        if steady is None:
+        found = remove_clock_steps(raw)
+        if found is None:
             return raw
-        self.warnings += tuple(step.sentence() for step in steady.steps)
+        steady, clock = found
+        self.warnings += tuple(step.sentence() for step in clock.steps)
 
         def moved(span: tuple[float, float]) -> tuple[float, float]:
-            return steady.corrected(span[0]), steady.corrected(span[1])
+            return clock.corrected(span[0]), clock.corrected(span[1])
 
         self.about = replace(
             self.about,
             windows=tuple(w and moved(w) for w in self.about.windows),
             excluded_spans=tuple(map(moved, self.about.excluded_spans)),
         )
-        return steady.block
+        return steady
 
     def marks(self) -> Iterator[dict[str, Any]]:
         """Marks in order."""
@@ -254,6 +259,24 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
     ]
     without = tuple(sorted((*about.excluded_spans, *gaps)))
     return replace(about, windows=tuple(windows), excluded_spans=without)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a file that cannot be written, before long work whose result it takes.
+
+    Raises
+    ------
+    SessionError
+        If it is a folder, or nothing can be written beside it.
+
+    """
+    if path.is_dir():
+        raise SessionError(f"{path}: is a folder: name a file in it")
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+            pass
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written: {disk_says(error)}") from error
 
 
 def write_atomically(path: Path, content: str | bytes) -> Path:

@@ -87,7 +87,8 @@ def read_text_table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
 
 
 def _names(data: bytes) -> list[str]:
-    first = data.split(b"\n", 1)[0].decode(errors="replace")
+    # Excel begins "CSV UTF-8" with a byte order mark
+    first = data.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace")
     return [name.strip().strip('"') for name in first.split(",")]
 
 

@@ -19,10 +19,12 @@ from benchmarks.in_motion.driven import Drive, coloured, recorded
 from benchmarks.in_motion.pairs import ABOUT, KINDS, WHITE, block_of, compared, pulls
 from fieldcal.against import Match
 from fieldcal.against.motion import compare_in_motion
+from fieldcal.against.motion.held import holds_positions
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.effects import catalogue as known
+from fieldcal.session.description import parse_description
 from fieldcal.sim_device.effects import catalogue, kind
 from fieldcal.sim_device.profile_file import profile_from_tables
 from fieldcal.sim_device.replay import HeldWindow, simulate
@@ -287,6 +289,31 @@ def test_one_triad_is_compared_where_the_other_is_not_there(
     assert {d.id for d in found.differences} == scaled
     assert all(any(w.startswith(s) for w in found.warnings) for s in says)
     assert 0.9 < found.after.chi2_per_dof < 1.1
+
+
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_few_samples_of_either_side_are_refused(true: Block, count: int) -> None:
+    short = true[:count]
+    with pytest.raises(InputError, match=f"^recording: its channels have {count} sam"):
+        compare_in_motion((short, ABOUT), true, NAMES)
+    with pytest.raises(InputError, match=f"^simulator: its channels have {count} sam"):
+        compare_in_motion((true, ABOUT), short, NAMES)
+
+
+def test_a_window_without_samples_hides_no_position() -> None:
+    """The first of the windows lies before the recording."""
+    forces = np.repeat(9.8 * np.vstack([np.eye(3), -np.eye(3)]), 100, axis=0)
+    t = np.arange(len(forces)) / 50
+    windows = [(2.0 * i, 2.0 * i + 1.9) for i in range(6)]
+    about = parse_description(
+        {
+            "format": 1,
+            "position": [
+                {"start_s": a, "end_s": b} for a, b in [(-9.0, -1.0), *windows]
+            ],
+        }
+    )
+    assert holds_positions(Block.of(t, forces), about)
 
 
 def test_different_triads_are_refused(true: Block) -> None:

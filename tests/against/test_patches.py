@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import yaml
 
-from fieldcal.against import patches
+from fieldcal.against import causes, patches
+from fieldcal.against.facts import effects_with_equation
 from fieldcal.against.result import (
     Difference,
     Facts,
@@ -179,6 +182,64 @@ def test_an_instant_counts_from_the_start_of_the_recording_that_has_it(
     model = patch_model(found)
     assert model.effects["bias_step"] == {"ax": 0.0, "at_s": 50.0}
     assert "bias step" not in written("toml", tmp_path, model)[1]
+
+
+def quantity(value: float, unit: str) -> Quantity:
+    return Quantity(value, 1e-6, unit)
+
+
+def facts(**shown: Any) -> Facts:
+    return Facts(100.0, np.nan, np.nan, 10.0, np.nan, {}, **shown)
+
+
+def resized(name: str, real: Facts, sim: Facts, *names: str) -> Match:
+    """A comparison in which these parameters of something differ."""
+    one, two = ({**f.calibration, **f.effects}[name] for f in (real, sim))
+    pairs = {n: RealAndSimulated.of(one[n], two[n]) for n in names}
+    none = SimulatorPrediction(0.0, 0.0, 1.0)
+    differs = (Difference(name, "resized", 1.0, pairs),)
+    return Match("left_out", 1.0, differs, (), none, none, real, sim, (), "")
+
+
+def test_an_axis_of_which_the_recording_says_nothing_stays_as_it_is() -> None:
+    """A recording without gz, and a simulator with a bias of 0.3 there."""
+    x, y, z = (quantity(v, "rad/s") for v in (0.02, 0.01, 0.3))
+    real = facts(calibration={"gyr_bias": {"x": x, "y": y}})
+    sim = facts(calibration={"gyr_bias": {"x": y, "y": x, "z": z}})
+    first = patch_model(resized("gyr_bias", real, sim, "x", "y"))
+    assert first.group("gyr_bias") == pytest.approx([0.02, 0.01, 0.3])
+    then = patch_model(resized("gyr_bias", real, sim, "x"), first)
+    assert then.group("gyr_bias") == pytest.approx([0.03, 0.01, 0.3])
+
+
+def test_a_parameter_that_does_not_differ_stays_as_the_simulator_has_it() -> None:
+    """Coefficients of one triad differ; instants count from the first sample."""
+    slopes = {"ax": quantity(1e-3, "m/s^2/K"), "gz": quantity(1e-5, "rad/s/K")}
+    real = facts(effects={"temperature_bias": {"ax": quantity(3e-3, "m/s^2/K")}})
+    sim = facts(effects={"temperature_bias": slopes})
+    model = patch_model(resized("temperature_bias", real, sim, "ax"))
+    assert model.effects["temperature_bias"] == pytest.approx({"ax": 3e-3, "gz": 1e-5})
+    steps = {"ax": quantity(0.1, "m/s^2"), "at_s": quantity(60.0, "s")}
+    real = facts(effects={"bias_step": {"ax": quantity(0.2, "m/s^2")}})
+    step = patch_model(
+        resized("bias_step", real, facts(effects={"bias_step": steps}), "ax")
+    )
+    assert step.effects["bias_step"] == pytest.approx({"ax": 0.2, "at_s": 50.0})
+
+
+def test_an_effect_of_two_triads_is_known_with_both(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each triad is a cause of its own, with the same name."""
+    slopes = {"ax": quantity(1e-3, "m/s^2/K"), "gz": quantity(1e-5, "rad/s/K")}
+    triads = {name[0]: {name: slope} for name, slope in slopes.items()}
+    cause = SimpleNamespace(kind="effect", name="temperature_bias")
+    there: Any = SimpleNamespace(
+        set=SimpleNamespace(members=[(cause, triad) for triad in triads])
+    )
+    monkeypatch.setattr(causes, "cause_quantities", lambda _, member: triads[member[1]])
+    found = effects_with_equation(there)
+    assert found == {"temperature_bias": slopes}
 
 
 @pytest.mark.parametrize("name", patches.formats())

@@ -71,3 +71,22 @@ def test_import_says_at_once_which_imu_is_out_and_so_does_compare(
     assert [one["name"] for one in found if one["out"]] == ["low"]
     assert main(["compare", "--instances", str(tmp_path / "s" / "low")]) == 2
     assert main(["compare", str(tmp_path / "s" / "low")]) == 2
+
+
+def test_folders_of_the_same_name_are_different_imus(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(1, 50.0)
+    paths = [tmp_path / one / "imu0" for one in "ab"]
+    for path in paths:
+        path.parent.mkdir()
+        log = write(path.parent, rows, heading="t,ax,ay,az,gx,gy,gz")
+        assert main(["import", str(log), "-o", str(path)]) == 0
+    capsys.readouterr()
+    call = ["compare", "--json", "--instances"]
+    assert main([*call, *map(str, paths)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["name"] for one in found] == [str(path) for path in paths]
+    same = paths[0].parent / ".." / "a" / "imu0"
+    assert main([*call, str(paths[0]), str(same)]) == 2
+    assert "holds 1 sessions" in capsys.readouterr().out

@@ -15,6 +15,7 @@ from session_folders import places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.commands import batch as command
+from fieldcal.core.errors import InputError
 from fieldcal.fleet.batch import SessionBatch
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.reduced import ReducedSession
@@ -140,3 +141,43 @@ def test_wrong_calls_are_refused(tree: Path, tmp_path: Path) -> None:
     ):
         assert main(["batch", *wrong]) == 2
     assert command.DEFAULT_TABLE.endswith(".parquet")
+
+
+@pytest.mark.parametrize(
+    ("option", "content", "says"),
+    [
+        (["-o", "none/t.parquet"], "", "none/t.parquet: cannot be written"),
+        (["-o", "."], "", "is a folder"),
+        (["--limits", "none.toml"], "", "no such file of limits"),
+        (["--limits", "some.toml"], "[navigation]\nsquareness = -1", "above 0"),
+    ],
+)
+@pytest.mark.parametrize("resume", [[], ["--resume"]])
+def test_what_is_needed_at_the_end_is_looked_at_first(
+    tree: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    option: list[str],
+    content: str,
+    says: str,
+    resume: list[str],
+) -> None:
+    """Before any session is processed: there would be a store."""
+    monkeypatch.chdir(tmp_path)
+    Path("some.toml").write_text(content)
+    assert main(["batch", str(tree), *resume, "--history", "h.sqlite", *option]) == 2
+    assert says in capsys.readouterr().err
+    assert not Path("h.sqlite").exists()
+
+
+def test_a_table_that_cannot_be_written_is_said_and_leaves_nothing(
+    tree: Path, tmp_path: Path
+) -> None:
+    batch = SessionBatch(
+        sessions_in([tree]), SessionTask(), Database(str(tmp_path / "h.sqlite"))
+    )
+    (tmp_path / "t.parquet").mkdir()
+    with pytest.raises(InputError, match="t.parquet: cannot be written"):
+        batch.write(tmp_path / "t.parquet")
+    assert not list(tmp_path.glob(".*"))

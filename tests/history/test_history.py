@@ -195,6 +195,28 @@ def test_a_run_out_of_family_is_flagged_and_the_next_is_not(tmp_path: Path) -> N
     assert np.argmax(columns) == 12, "the plot shows it to the right"
 
 
+def test_what_is_compared_with_nothing_is_not_in_family(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A parameter without a limit jumps, and a single run stands alone."""
+    store = tmp_path / "h.sqlite"
+    history = History(store)
+    call = ["history", "A1", "--history", str(store), "--parameter"]
+    for day, offset in enumerate((0.1, 9.0), 1):
+        one = calibration(0.2)
+        names = ("angle_offset.alpha0_deg", *one.names[1:])
+        values = np.array([offset, *one.values[1:]])
+        both = replace(one, names=names, values=values)
+        history.add(f"2026-03-0{day}", Path(f"/s/{day}"), both)
+        if day == 1:
+            assert main([*call, one.names[1]]) == 0
+            out = capsys.readouterr().out
+            assert "nothing to compare with" in out and "in family" not in out
+    assert main([*call, "angle_offset.alpha0_deg"]) == 0
+    out = capsys.readouterr().out
+    assert "not judged" in out and "nan" not in out and "in family" not in out
+
+
 def test_the_command_lists_plots_compares_and_accepts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

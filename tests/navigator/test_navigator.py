@@ -19,6 +19,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.navigator.growth import error_dynamics, propagate_errors
 from fieldcal.navigator.large_angles import beyond_first_order
 from fieldcal.navigator.session_runs import calibrate_navigator
+from fieldcal.navigator.solution import read_solution, runs_in_windows
 from fieldcal.session import description
 
 EXACT = Sensors(np.zeros(3), np.ones(3), np.zeros(3))
@@ -130,6 +131,23 @@ def test_noise_is_found_in_the_drift(tmp_path: Path) -> None:
     assert told["runs"] == 6 and not told["missing"]
 
 
+def test_noise_of_positions_is_not_that_of_velocities(tmp_path: Path) -> None:
+    """Positions of 5 cm say little more than velocities of 2 mm/s, and harm nothing."""
+    noise = np.repeat([2e-3, 5e-2], 3)
+    quiet = Sensors(np.full(3, 0.01), np.ones(3), np.full(3, 1e-5), 1e-5, 1e-7)
+    how: dict[str, Any] = {"sensors": quiet, "faces": FACES[:2], "out_noise": noise}
+    alone, _ = solved(tmp_path / "v", **how)
+    both, _ = solved(
+        tmp_path / "vp", columns=("vn", "ve", "vd", "pn", "pe", "pd"), **how
+    )
+    told = both.info["navigator"]
+    assert 0.7 < told["velocity_noise_m_s"] / 2e-3 < 1.4
+    assert 0.7 < told["position_noise_m"] / 5e-2 < 1.4
+    assert alone.info["navigator"]["position_noise_m"] is None
+    assert both.uncertainty("gyr_bias.x") < 1.2 * alone.uncertainty("gyr_bias.x")
+    assert np.abs(pulls(both, quiet)).max() < 4
+
+
 def test_a_base_that_points_elsewhere(tmp_path: Path) -> None:
     found, sensors = solved(tmp_path, azimuth_deg=70.0)
     assert np.abs(pulls(found, sensors)).max() < 4
@@ -188,6 +206,7 @@ def test_the_command_writes_a_result_that_others_take(
     [
         ("solution.csv", "time,vn\n0,0\n", "no heading with t and one of"),
         ("solution.csv", "t,vn\n0,0\n1,x\n", "line 3 is not 2 numbers"),
+        ("solution.csv", "t,vn\n\n0,0\n\n1,x\n", "line 5 is not 2 numbers"),
         ("solution.csv", "t,vn\n0,0\n1,nan\n", "line 3 has a number that is none"),
         ("solution.csv", "t,vn\n1,0\n0,0\n", "t does not ascend"),
         ("solution.csv", "t,vn\n0,0\n5,0\n", "must lie within 0 to 5 s"),
@@ -215,6 +234,17 @@ def test_what_cannot_be_used_is_refused(
         calibrate_navigator(
             tmp_path, description.read_description(tmp_path / "session.toml")
         )
+
+
+def test_a_solution_saved_by_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    """It begins with a byte order mark."""
+    path = tmp_path / "solution.csv"
+    path.write_text("t,vn\n0,0\n20,1\n", encoding="utf-8-sig")
+    solution = read_solution(path)
+    assert solution.t.tolist() == [0.0, 20.0] and solution.recorded_columns == [2]
+    for window in ((0.0, np.nan), (np.nan, 20.0)):
+        with pytest.raises(InputError, match="must lie within 0 to 20 s"):
+            runs_in_windows(solution, [window])
 
 
 def test_one_level_velocity_does_not_turn_with_the_azimuth(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -138,6 +139,24 @@ def test_sessions_of_two_devices_are_refused(
     assert "is of device B2" in capsys.readouterr().err
 
 
+def test_sessions_of_two_rates_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a clock is off by is no other rate."""
+    rng = np.random.default_rng(25)
+    paths = []
+    for rate in (50.0, 200.0, 50.5):
+        block = recording(noise(rng, int(60 * rate), 1 / rate, 6, N=N), 1 / rate)
+        paths.append(tmp_path / f"{rate:g}")
+        with Recorder(paths[-1], {"format": 1}) as recorder:
+            recorder.append(block)
+    assert main(["noise", *map(str, paths)]) == 2
+    said = capsys.readouterr().err
+    assert f"{paths[0]} has 50 samples a second" in said
+    assert f"{paths[1]} has 200: estimate the noise of each rate by itself" in said
+    assert main(["noise", str(paths[0]), str(paths[2])]) == 0
+
+
 def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -145,6 +164,24 @@ def test_what_is_too_short_or_no_session_is_refused_with_a_remedy(
     assert "record 30 s at least" in capsys.readouterr().err
     assert main(["noise", str(tmp_path / "nothing")]) == 2
     assert "is no session" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--report", "--limits"])
+def test_what_is_needed_at_the_end_is_looked_at_first(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    option: str,
+) -> None:
+    """Before the noise of a night is estimated."""
+
+    def estimate_too_early(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("fieldcal.noise.estimate_noise", estimate_too_early)
+    night, file = str(session(tmp_path / "night", 60)), str(tmp_path / "none" / "x")
+    assert main(["noise", night, option, file]) == 2
+    assert file in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("ending", ["csv", "csv.gz", "parquet"])
@@ -247,6 +284,34 @@ def test_a_turn_between_windows_is_no_noise(tmp_path: Path) -> None:
     assert found.model.stretches == 2
     for channel in found.model.channels.values():
         assert channel.processes["N"].value == pytest.approx(N, rel=0.1)
+
+
+def test_windows_are_found_behind_a_clock_that_was_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Windows are in the device's times, which jump; samples come in several parts."""
+    rng = np.random.default_rng(26)
+    values = noise(rng, 6000, 0.02, 6, N=N)
+    values[1000:2500] += rng.standard_normal((1500, 6))
+    block = recording(values, 0.02)
+    times = block.t + np.where(block.t >= 70.0, 1.7e9, 0.0)
+    windows = [(0.0, 19.9), (1.7e9 + 71.0, 1.7e9 + 119.0)]
+    tables = {
+        "format": 1,
+        "position": [{"start_s": a, "end_s": b} for a, b in windows],
+    }
+    with Recorder(tmp_path / "set", tables) as recorder:
+        for i in range(0, 6000, 500):
+            part = slice(i, i + 500)
+            recorder.append(replace(block[part], t=times[part]))
+    assert main(["noise", str(tmp_path / "set"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["seconds"] == pytest.approx(67.9, abs=0.5)
+    assert found["channels"]["ax"]["processes"]["N"]["value"] == pytest.approx(
+        N, rel=0.1
+    )
+    assert "the device's clock jumps" in err
 
 
 def test_a_plan_says_how_long_this_device_is_worth_averaging(

@@ -90,10 +90,50 @@ def test_positions_that_cannot_determine_anything_are_refused() -> None:
 
 def test_an_extra_position_is_new_and_helps() -> None:
     extra = planner.extra_position(FIVE_POSITIONS, Ladder(), G)
+    assert extra is not None
     assert extra.degrees not in {p.degrees for p in FIVE_POSITIONS}
     before = expected(FIVE_POSITIONS, UNIT, 1.0, G)
     after = expected((*FIVE_POSITIONS, extra), UNIT, 1.0, G)
     assert after["acc_bias.y"] < before["acc_bias.y"] / 2
+
+
+def test_a_plan_of_all_positions_has_no_extra_one(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    every = len(Ladder().candidates())
+    words = ["plan", "--minutes", "60", "--positions"]
+    assert main([*words, str(every)]) == 0
+    out = capsys.readouterr().out
+    assert "worth most: none within the limits" in out and "one more │" not in out
+    assert main([*words, str(every), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["extra_position"] is None and len(said["positions"]) == every
+    assert main([*words, str(every + 1)]) == 2
+    assert f"{every} are distinguished within |α| ≤ 45°" in capsys.readouterr().err
+
+
+def test_no_extra_position_completes_what_the_limits_do_not_allow() -> None:
+    level = Ladder(np.deg2rad(45), 0.0)
+    assert planner.extra_position((Position.deg(0, 0),), level, G) is None
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--minutes nan", "--minutes nan: give the time"),
+        ("--minutes inf", "--minutes inf: give the time"),
+        ("--speed 20 --minutes inf", "--minutes inf: give the time"),
+        ("--speed 20 --positions -2", "must turn once at least"),
+        ("--speed inf", "give a speed above 0"),
+        ("--speed 20 --speed-sd nan", "give its ±"),
+        ("--sways inf", "a frequency in Hz"),
+    ],
+)
+def test_numbers_that_are_none_are_refused(
+    words: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", *words.split()]) == 2
+    assert says in capsys.readouterr().err
 
 
 def test_aliases_that_follow_from_the_geometry() -> None:

@@ -11,6 +11,7 @@ from laid_about import turned
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
+from fieldcal.exporters.kalibr import window_noise_density
 from fieldcal.importing.session.validation import SampleWriter
 from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.folder import Session
@@ -43,6 +44,20 @@ def test_times_and_windows_go_on(tmp_path: Path) -> None:
     truth = np.array([(4.5 * k + 0.3, 4.5 * k + 2.7) for k in range(7)])
     np.testing.assert_allclose(np.array(session.windows), truth, atol=1e-6)
     assert "to 2023-11-14" in session.warnings[-1]
+
+
+def test_noise_densities_are_those_of_windows_behind_the_step_too(
+    tmp_path: Path,
+) -> None:
+    for name, jump in (("set", JUMP), ("even", 0.0)):
+        (tmp_path / name).mkdir()
+        recorded(tmp_path / name, jump, windows=3)
+    found, plain = (
+        window_noise_density(Session.open(tmp_path / name)) for name in ("set", "even")
+    )
+    assert np.isfinite(plain).all()
+    # times of 1.7e9 s are rounded: a window may begin a sample later
+    np.testing.assert_allclose(found, plain, rtol=0.1)
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,17 @@ def test_no_samples_file_or_two_of_them(tmp_path: Path) -> None:
         _ = Session.open(tmp_path).block
 
 
+def test_files_saved_with_a_byte_order_mark_are_read(tmp_path: Path) -> None:
+    plain = Session.open(folder(tmp_path))
+    for name in ("session.toml", "samples.csv"):
+        path = tmp_path / name
+        path.write_text(path.read_text(), encoding="utf-8-sig")
+    marked = Session.open(tmp_path)
+    assert marked.about.raw == plain.about.raw
+    np.testing.assert_array_equal(marked.block.t, plain.block.t)
+    np.testing.assert_array_equal(marked.block.acc, plain.block.acc)
+
+
 def test_a_csv_cut_off_anywhere_keeps_its_whole_rows(tmp_path: Path) -> None:
     text = f"{HEAD}\n{ROWS}0.02,0,-9.82,0,0,0,0\n"
     first_row = text.index("\n", text.index("\n") + 1)

@@ -25,10 +25,11 @@ from fieldcal.against.motion.shown_effects import effect_differences
 from fieldcal.against.motion.wording import alignment_sentence
 from fieldcal.against.result import Difference, Facts, Match, verdict_of
 from fieldcal.against.wording import paragraph
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import ACC, CHANNELS, GYR, UNITS, Array, Block
 from fieldcal.diagnosis.result import Quantity
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.rows.reference import Reference
+from fieldcal.model.rows.reference import MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.recording import grids_of
 from fieldcal.session.description import Description
@@ -52,6 +53,8 @@ def compare_in_motion(
 
     """
     block, about = real
+    for name, side in zip(names, (block, sim), strict=True):
+        _check_samples(name, side)
     found = explain_motion(
         block, about, Reference(sim), align_motion(block, sim, names)
     )
@@ -83,6 +86,16 @@ def compare_in_motion(
         f"{says} {alignment_sentence(where)}",
         where,
     )
+
+
+def _check_samples(name: str, block: Block) -> None:
+    """Refuse a recording that is too short to show any motion."""
+    known = int(np.isfinite(block.six).sum(axis=0).max())
+    if known < MIN_CHANNEL_SAMPLES:
+        raise InputError(
+            f"{name}: its channels have {known} sample{'s' * (known != 1)} at most:"
+            " compare some seconds of a motion"
+        )
 
 
 def _with_sizes(found: MotionExplanation, sizes: Array) -> Eliminated:

@@ -23,7 +23,10 @@ def holds_positions(block: Block, about: Description) -> bool:
         return len(windows) >= MIN_WINDOWS
     seen: list[Array] = []
     for start, end in windows:
-        force = np.nanmean(block.between(start, end).acc, axis=0)
+        acc = block.between(start, end).acc
+        if not np.isfinite(acc).any(axis=0).all():
+            continue
+        force = np.nanmean(acc, axis=0)
         up = force / max(float(np.linalg.norm(force)), 1e-12)
         if all(up @ other < MAX_SAME_FORCE_COSINE for other in seen):
             seen.append(up)

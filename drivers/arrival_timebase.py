@@ -65,6 +65,8 @@ class ArrivalTimebase:
 
     def times(self, stamps: Array, steps: Array, t_host: Array) -> Array:
         """Return times (n,) on the host's clock, nan until the rate is estimated."""
+        self._health.gaps += int(np.sum(steps > 1))
+        self._health.missing += int(np.sum(steps - 1))
         parts = []
         for batch, z in _split_by_arrival(steps, t_host):
             if np.isnan(self._t) or np.isnan(z):

@@ -263,4 +263,8 @@ def _channel(
             f"{place} {says}: state it with {kind}_unit={usual.split(',')[0]}"
             f" ({usual}, also with a factor as in 0.5*{usual.split(',')[0]})"
         ) from None
+    if not layout.scale * scale:
+        raise InputError(
+            f"{place} has the factor 0, so that it never changes: mend it in the DBC"
+        )
     return SignalChannel(layout, scale, -KELVIN if at == "k" else 0.0)

@@ -21,6 +21,7 @@ LONGEST = 1 + 8 + 1 + 128 + 4
 
 _SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 _DIGITS = {"t": 3, "T": 8, "d": 3, "D": 8, "b": 3, "B": 8}
+_HEX_DIGITS = frozenset("0123456789abcdefABCDEF")
 _ANSWERS = ("z", "Z", "V", "N", "F", "r", "R")
 
 
@@ -46,13 +47,15 @@ class LawicelDecoder:
             return b""
         kind = text[0]
         try:
+            if not _HEX_DIGITS.issuperset(text[1:]):
+                raise ValueError
             head = 2 + _DIGITS[kind]
             code = int(text[head - 1], 16)
             if kind in "tT" and code > 8:
                 raise ValueError
             body = bytes.fromhex(text[head:])
             size = _SIZES[code]
-            if len(body) not in (size, size + 2) or " " in text:
+            if len(body) not in (size, size + 2):
                 raise ValueError
             return frame_row(now, int(text[1 : head - 1], 16), head > 5, body[:size])
         except (KeyError, ValueError, IndexError):

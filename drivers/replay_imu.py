@@ -11,6 +11,7 @@ those of its session, m/s^2 and rad/s without one.
 from __future__ import annotations
 
 import gzip
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -166,7 +167,8 @@ def decode_file(place: Path, options: Options) -> tuple[Block, Grain]:
     Raises
     ------
     InputError
-        If nothing says what bytes they are.
+        If nothing says what bytes they are, they cannot be unpacked, or nothing says
+        when they were sampled.
 
     """
     name = options.text("format")
@@ -177,7 +179,20 @@ def decode_file(place: Path, options: Options) -> tuple[Block, Grain]:
     codec = open_codec(name, options)
     opened = gzip.open if place.suffix == ".gz" else open
     blocks = []
-    with opened(place, "rb") as file:
-        while data := file.read(BYTES_AT_ONCE):
-            blocks.append(codec.feed(data))
-    return concat(block for block in blocks if block is not None), codec.grain
+    try:
+        with opened(place, "rb") as file:
+            while data := file.read(BYTES_AT_ONCE):
+                blocks.append(codec.feed(data))
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(
+            f"{place}: its compression is damaged or cut off ({error}); unpack what is"
+            " whole, as by zcat, and replay that"
+        ) from error
+    found = concat(block for block in blocks if block is not None)
+    health = codec.health
+    whole = health.received - health.skipped - codec.waiting_bytes
+    if not len(found) and 2 * whole > health.received:
+        raise InputError(
+            f"{place}: its samples have no time of the device: add rate=, in Hz"
+        )
+    return found, codec.grain

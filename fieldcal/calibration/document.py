@@ -173,16 +173,21 @@ def _float(value: Any, where: str) -> float:
         return float("nan")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"result.json: {where} is {value!r}, not a number")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"result.json: {where} is too large a number") from None
 
 
 def _numbers(value: Any, where: str, shape: tuple[int, ...]) -> Any:
     try:
         table = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"result.json: {where} is not a table of numbers") from None
     if table.shape != shape or not np.isfinite(table).all():
         raise InputError(f"result.json: {where} is not {shape[0]} x {shape[1]} numbers")
+    if (np.diag(table) < 0).any():
+        raise InputError(f"result.json: {where} has a negative variance")
     return table
 
 

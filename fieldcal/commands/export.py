@@ -32,12 +32,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--instance",
-        type=int,
+        type=number_of_sensor,
         default=0,
         metavar="N",
         help="autopilots: number of the sensor, from 0, if the recording does not state"
         " it (default: 0)",
     )
+
+
+def number_of_sensor(text: str) -> int:
+    """Number of a sensor, from 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no number from 0 on")
+    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import write_atomically
@@ -36,17 +37,17 @@ def matrices(bias: Array, matrix: Array) -> tuple[Array, Array, Array]:
 
 def write(source: ExportSource, path: Path) -> list[str]:
     """Write both files; returns notices for the user."""
-    name = path.name.replace("_acc", "_gyro")
-    if name == path.name:
-        name = f"{path.stem}_gyro{path.suffix}"
-    for sensor, file in (("acc", path), ("gyr", path.with_name(name))):
+    second = path.with_name(f"{path.stem.removesuffix('_acc')}_gyro{path.suffix}")
+    if second.exists():
+        raise InputError(f"{second}: is there already; name another file with -o")
+    for sensor, file in (("acc", path), ("gyr", second)):
         parts = matrices(*source.linear(sensor))
         write_atomically(
             file, "\n\n".join(_format_array(part) for part in parts) + "\n"
         )
     return [
         *source.notices,
-        f"the gyroscopes are in {path.with_name(name)}",
+        f"the gyroscopes are in {second}",
         "true = T K (raw - B), m/s^2 and rad/s; T, K and B one after the other",
     ]
 

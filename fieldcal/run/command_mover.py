@@ -54,7 +54,7 @@ class CommandMover:
 
         """
         self.close()
-        self._said = tempfile.TemporaryFile("w+")
+        self._said = tempfile.TemporaryFile("w+", errors="replace")
         command = self._filled_command(position, number)
         self._began, self._done = monotonic(), False
         try:
@@ -146,7 +146,7 @@ class CommandMover:
 
     def _filled_command(self, position: Position, number: int) -> list[str]:
         angles = position.all_degrees or (0.0, 0.0, 0.0)
-        values = (*(f"{a:g}" for a in angles), str(number + 1), position.name)
+        values = (*map(_Angle, angles), number + 1, position.name)
         known = dict(zip(PLACEHOLDERS, values, strict=True))
         for part in self._template:
             try:
@@ -158,7 +158,20 @@ class CommandMover:
                     f"[run.mover] command: {{{unknown[0]}}} is none of"
                     f" {', '.join(PLACEHOLDERS)}; write a brace that is meant as {{{{"
                 )
-        return [part.format(**known) for part in self._template]
+        try:
+            return [part.format(**known) for part in self._template]
+        except (ValueError, KeyError, IndexError, AttributeError) as error:
+            raise PlanError(
+                f"[run.mover] command: {error}: write numbers as in {{alpha:.3f}} or"
+                " {position:02d}"
+            ) from error
+
+
+class _Angle(float):
+    """An angle in degrees that is written briefly unless a format is asked for."""
+
+    def __format__(self, format_spec: str) -> str:
+        return super().__format__(format_spec or "g")
 
 
 def _end_process_group(process: subprocess.Popen[str], name: str) -> None:

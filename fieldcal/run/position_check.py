@@ -82,6 +82,12 @@ def check_position(
 
     """
     norm = float(np.linalg.norm(f))
+    if not np.isfinite(norm):
+        problem = (
+            "an axis of the accelerometers gives no value, so nobody can tell the"
+            " position: check the columns of the wire format, and the device"
+        )
+        return PositionCheck(False, np.nan, np.nan, problem)
     upright = in_axes_turned_about_y(
         _without_offset(f, gravity, held), np.array(-wanted.gamma)
     )

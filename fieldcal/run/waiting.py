@@ -256,7 +256,10 @@ def measured_force(acc: Array, about: Description) -> Array:
     `acc` is (n, 3) m/s^2, device axes.
     """
     nominal = about.nominal
-    f = (np.nanmean(acc, axis=0) - nominal["acc_bias"]) / nominal["acc_scale"]
+    known = np.isfinite(acc).any(axis=0)
+    mean = np.full(3, np.nan)
+    mean[known] = np.nanmean(acc[:, known], axis=0)
+    f = (mean - nominal["acc_bias"]) / nominal["acc_scale"]
     turned: Array = about.mounting @ f
     return turned
 

@@ -241,3 +241,13 @@ def test_a_real_car_turns_as_the_phone_in_it_says(shared: Path) -> None:
 def smooth(x: Array) -> Array:
     """Means over half a second of the phone."""
     return np.convolve(x, np.full(52, 1 / 52), "valid")
+
+
+@pytest.mark.parametrize(
+    "line", ["t-121AA", "t+121AA", "t1_21AA", "t12\u00b31AA", "T 00000121AA"]
+)
+def test_a_frame_has_hex_digits_only(line: str) -> None:
+    health = CanLinkHealth()
+    data = line.encode("latin-1") + b"\r"
+    assert not LawicelDecoder(health).feed(data)
+    assert health.bad == 1

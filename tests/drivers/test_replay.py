@@ -104,6 +104,27 @@ def test_what_cannot_be_replayed(tmp_path: Path) -> None:
         open_driver(f"replay:{tmp_path}/noise.bin?format=mip&speed=0")
 
 
+@pytest.mark.parametrize("damage", ["cut", "changed"])
+def test_a_damaged_compression_is_said(tmp_path: Path, damage: str) -> None:
+    packed = bytearray(gzip.compress(np.random.default_rng(0).bytes(50_000)))
+    if damage == "cut":
+        del packed[len(packed) // 2 :]
+    else:
+        packed[20:40] = b"\xff" * 20
+    (tmp_path / "port.bin.gz").write_bytes(packed)
+    with pytest.raises(InputError, match=r"port.bin.gz: .*damaged or cut off"):
+        open_driver(f"replay:{tmp_path}/port.bin.gz?format=mip")
+
+
+def test_samples_without_a_clock_need_a_rate(tmp_path: Path) -> None:
+    lines = b"0.1,0.2,9.8\r\n" * 40
+    (tmp_path / "port.txt").write_bytes(lines)
+    url = f"replay:{tmp_path}/port.txt?format=text&columns=ax,ay,az&speed=max"
+    with pytest.raises(InputError, match="have no time of the device: add rate="):
+        open_driver(url)
+    assert len(everything(f"{url}&rate=100")) > 30
+
+
 def test_a_log_of_a_can_bus_plays_through_the_same_code(tmp_path: Path) -> None:
     path = tmp_path / "drive.log"
     packed = frames(VirtualDevice(Profile(), seed=2).take(400))

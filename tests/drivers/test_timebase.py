@@ -195,3 +195,18 @@ def test_a_passing_delay_is_no_gap() -> None:
     t = ArrivalTimebase(health).times(sent * np.nan, np.ones(6000, dtype=int), host)
     assert health.gaps == 0
     np.testing.assert_allclose(t[200:], sent[200:] + 0.002, atol=4e-3)
+
+
+def test_samples_that_a_counter_misses_are_counted_by_every_timebase() -> None:
+    steps = np.ones(3000, dtype=int)
+    steps[[1200, 1800]] = 501, 3
+    host = np.cumsum(steps) / 100
+    counts = []
+    for made in (ArrivalTimebase, lambda health: RateTimebase(health, 100.0)):
+        health = LinkHealth()
+        clock = made(health)
+        for i in range(0, 3000, 10):
+            some = slice(i, i + 10)
+            clock.times(np.full(10, np.nan), steps[some], host[some])
+        counts.append((health.gaps, health.missing))
+    assert counts == [(2, 502), (2, 502)]

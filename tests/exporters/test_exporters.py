@@ -188,6 +188,30 @@ def test_imu_tk_corrects_by_t_k_u_minus_b(
         np.testing.assert_allclose((u + -b) @ (t @ k).T, f, atol=1e-9)
 
 
+@pytest.mark.parametrize("stem", ["my_accident", "my_accident_acc", "other"])
+def test_imu_tk_names_both_files_and_overwrites_neither(
+    stem: str, made: tuple[ExportSource, Block, Block], tmp_path: Path
+) -> None:
+    second = tmp_path / f"{stem.removesuffix('_acc')}_gyro.calib"
+    second.write_text("somebody's")
+    module, first = load_exporter("imu_tk"), tmp_path / f"{stem}.calib"
+    with pytest.raises(InputError, match="is there already"):
+        module.write(made[0], first)
+    assert second.read_text() == "somebody's" and not first.exists()
+    second.unlink()
+    module.write(made[0], first)
+    assert {p.name for p in (first, second) if p.exists()} == {first.name, second.name}
+
+
+@pytest.mark.parametrize("number", ["-1", "x", "1.5"])
+def test_sensors_are_counted_from_0(
+    number: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ["export", str(tmp_path), "--format", "px4", f"--instance={number}"]
+    assert main(call) == 2
+    assert "is no number from 0 on" in capsys.readouterr().err
+
+
 def test_kalibr_predicts_what_was_recorded(
     made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:

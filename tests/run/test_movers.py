@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from processes import HANGS, script
 
-from fieldcal.core.errors import MoverFailed, MoverGone
+from fieldcal.core.errors import MoverFailed, MoverGone, PlanError
 from fieldcal.core.positions import FIVE_POSITIONS, Position
 from fieldcal.run import retrying_mover
 from fieldcal.run.command_mover import CommandMover
@@ -63,6 +63,34 @@ def test_a_command_that_fails_is_said(
         mover.turn(Position.deg(1.0, 0.0), 0)
         with pytest.raises(MoverFailed, match=says):
             wait(mover)
+
+
+def test_what_a_command_says_need_not_be_utf_8(tmp_path: Path) -> None:
+    body = r"import sys; sys.stderr.buffer.write(b'T\374r offen\n'); sys.exit(3)"
+    with CommandMover(script(tmp_path, body), 20.0) as mover:
+        mover.turn(Position.deg(1.0, 0.0), 0)
+        with pytest.raises(MoverFailed, match="exit code 3: T.r offen"):
+            wait(mover)
+
+
+@pytest.mark.parametrize(
+    ("form", "argument"),
+    [("{alpha}", "22.5"), ("{beta}", "-5"), ("{alpha:.3f}", "22.500"),
+     ("{position}", "3"), ("p{position:02d}", "p03"), ("{name}", "α = 22.5°, β = -5°")],
+)  # fmt: skip
+def test_numbers_may_be_formatted(form: str, argument: str, tmp_path: Path) -> None:
+    said = tmp_path / "said"
+    body = f"import sys; open({str(said)!r}, 'w').write(sys.argv[-1])"
+    with CommandMover([*script(tmp_path, body), form], 20.0) as mover:
+        mover.turn(Position.deg(22.5, -5.0), 2)
+        wait(mover)
+    assert said.read_text() == argument
+
+
+@pytest.mark.parametrize("form", ["{alpha:{width}}", "{alpha!z}", "{position:.3q}"])
+def test_a_format_that_is_none_is_a_mistake_of_the_command(form: str) -> None:
+    with pytest.raises(PlanError, match=r"^\[run.mover\] command: .*write numbers as"):
+        CommandMover(["turn", form], 1.0)
 
 
 def test_a_command_that_is_not_there_is_said() -> None:

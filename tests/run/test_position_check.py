@@ -61,6 +61,15 @@ def test_a_slip_is_named(alpha: float, beta: float, says: str) -> None:
     assert not arrival.ok and says in arrival.problem
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_missing_axis_is_said_not_an_angle(axis: int) -> None:
+    f = np.array([0.0, -9.81, 0.0])
+    f[axis] = np.nan
+    seen = check_position(Position.deg(0, 0), f, 9.81, None)
+    assert not seen.ok and "gives no value" in seen.problem
+    assert "nan" not in seen.problem
+
+
 def test_a_step_of_two_and_a_half_degrees_is_told_from_none() -> None:
     held = AcceptedPosition(FIVE_POSITIONS[1], measured(22.5, 0))
     assert not check_position(FIVE_POSITIONS[2], measured(22.5, 0), G, held).ok

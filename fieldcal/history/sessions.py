@@ -96,26 +96,17 @@ def _parameters_without_lot(found: Calibration) -> dict[str, tuple[float, float,
 
 
 def store_session(db: Connection, one: StoredSession) -> None:
-    """Store a session; an earlier one of the same folder and device is replaced.
+    """Store a session; an earlier one of the same folder is replaced.
 
-    An error replaces no result: it is stored in addition.
+    A folder is one session, also if its serial number was corrected. An error replaces
+    no result: it is stored in addition.
     """
     here = SESSION.c.folder == one.folder
-    same = and_(here, SESSION.c.serial == one.serial)
     if one.result is None:
         row = {"fingerprint": one.fingerprint, "error": one.error}
         if db.execute(update(SESSION).where(here).values(row)).rowcount:
             return
-    else:
-        db.execute(delete(SESSION).where(here, SESSION.c.result.is_(None)))
-    number = db.execute(select(SESSION.c.id).where(same)).scalar()
-    if number is None:
-        made = db.execute(insert(SESSION).values(**_row(one), accepted=False))
-        (number,) = made.inserted_primary_key or (None,)
-    else:
-        db.execute(update(SESSION).where(same).values(_row(one)))
-        db.execute(delete(PARAMETER).where(PARAMETER.c.session == number))
-        db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == number))
+    number = _replaced_row(db, here, _row(one))
     rows = [
         {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
         for n, (v, s, u) in one.parameters.items()
@@ -124,6 +115,25 @@ def store_session(db: Connection, one: StoredSession) -> None:
         db.execute(insert(PARAMETER), rows)
     if one.reduced is not None:
         db.execute(insert(REDUCED_ROWS).values(session=number, data=one.reduced))
+
+
+def _replaced_row(db: Connection, here: Any, row: Mapping[str, Any]) -> int:
+    """Number of the one row of a folder, made or replaced; it has no parameters yet."""
+    found = db.execute(
+        select(SESSION.c.id, SESSION.c.accepted).where(here).order_by(SESSION.c.id)
+    ).all()
+    if not found:
+        made: Any = db.execute(insert(SESSION).values(**row, accepted=False))
+        return int(made.inserted_primary_key[0])
+    kept: int = found[-1].id
+    accepted = any(r.accepted for r in found)
+    db.execute(delete(SESSION).where(here, SESSION.c.id != kept))
+    db.execute(delete(PARAMETER).where(PARAMETER.c.session == kept))
+    db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == kept))
+    db.execute(
+        update(SESSION).where(SESSION.c.id == kept).values(**row, accepted=accepted)
+    )
+    return kept
 
 
 def _row(one: StoredSession) -> dict[str, Any]:

@@ -95,6 +95,35 @@ def test_a_failure_takes_no_result_away(tmp_path: Path) -> None:
     assert [one.error for one in everything(place)] == [None, None]
 
 
+@pytest.mark.parametrize("error_between", [False, True])
+def test_a_session_whose_serial_number_was_corrected_is_one_unit(
+    tmp_path: Path, error_between: bool
+) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1, serial="A-1"), stored(2))
+    (first,) = History(place).runs("A-1")
+    History(place).accept("A-1", first.number)
+    between = [StoredSession("/s/1", error="no")] if error_between else []
+    put(place, *between, stored(1))
+    assert everything(place) == [stored(1), stored(2)]
+    assert History(place).serials() == [("A1", 2, "")]
+    runs = History(place).runs("A1")
+    assert {r.session: r.accepted for r in runs} == {"/s/1": True, "/s/2": False}
+
+
+def test_a_session_that_is_stored_twice_already_is_one_again(tmp_path: Path) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1), replace(stored(2), serial="A-1"))
+    with closing(sqlite3.connect(place)) as db:
+        db.execute("UPDATE session SET folder = '/s/1'")
+        db.commit()
+    assert len(everything(place)) == 2
+    put(place, stored(1))
+    assert everything(place) == [stored(1)]
+    with closing(sqlite3.connect(place)) as db:
+        assert db.execute("SELECT count(*) FROM reduced").fetchone() == (1,)
+
+
 def test_a_history_of_before_the_store_is_taken_over(tmp_path: Path) -> None:
     place = tmp_path / "h.sqlite"
     result = json.dumps(calibration().to_json())

@@ -10,6 +10,7 @@ from typing import Any
 from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
 from fieldcal.calibration import Calibration, limits
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
@@ -42,16 +43,16 @@ class SessionTask:
 
     def __call__(self, folder: str) -> StoredSession:
         """Process a session; an error is stated in the row that is returned."""
-        mark = None
+        mark, name = None, storable_text(folder)
         try:
             mark = fingerprint(Path(folder), self.options)
             return replace(self._process(Path(folder)), fingerprint=mark)
         except FieldcalError as error:
             said = str(error)
-            said = said if folder in said else f"{folder}: {said}"
+            said = said if name in said else f"{name}: {said}"
         except Exception as error:  # one session costs no other, whatever it is
             said = (
-                f"{folder}: {type(error).__name__}: {error}; see fieldcal verify, or"
+                f"{name}: {type(error).__name__}: {error}; see fieldcal verify, or"
                 " report this with the session"
             )
         return StoredSession(folder, fingerprint=mark, error=said)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Row, and_, delete, insert, or_, select, updat
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
+from fieldcal.core.file_names import storable_text
 from fieldcal.core.samples import Array
 from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
@@ -101,6 +102,8 @@ def store_session(db: Connection, one: StoredSession) -> None:
     A folder is one session, also if its serial number was corrected. An error replaces
     no result: it is stored in addition.
     """
+    error = None if one.error is None else storable_text(one.error)
+    one = replace(one, folder=storable_text(one.folder), error=error)
     here = SESSION.c.folder == one.folder
     if one.result is None:
         row = {"fingerprint": one.fingerprint, "error": one.error}
@@ -204,7 +207,7 @@ def find_sessions(
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
     if folders is not None:
-        some.append(SESSION.c.folder.in_(list(folders)))
+        some.append(SESSION.c.folder.in_([*map(storable_text, folders)]))
     columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
     columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
     query = select(*columns).where(and_(True, *some))

@@ -13,6 +13,7 @@ from time import time
 from typing import Any
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
@@ -74,11 +75,13 @@ def import_stream(
     Raises
     ------
     InputError
-        If the recording cannot be used; names file, row and column.
+        If the recording cannot be used, naming file, row and column; or the folder's
+        path is not UTF-8.
     SessionError
         If the folder cannot be written.
 
     """
+    refuse_undecodable_path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; name another folder with -o")
     try:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
-from fieldcal.calibration import Calibration, limits
+from fieldcal.calibration import limits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
@@ -74,7 +74,7 @@ class SessionTask:
         if explanation is not None and self.diagnose:
             diagnosis = make_diagnosis(session.block, explanation).to_json()
         return replace(
-            session_of_calibration(folder, found, _taken_at(session, found)),
+            session_of_calibration(folder, found, start_time(list(session.marks()))),
             serial=str(session.about.device.get("serial", "")),
             levels=levels_of(session),
             diagnosis=diagnosis,
@@ -82,13 +82,6 @@ class SessionTask:
             if explanation is None
             else reduce_session(explanation).to_bytes(),
         )
-
-
-def _taken_at(session: Session, found: Calibration) -> str | None:
-    """Time of the session, if its marks state one."""
-    marks = list(session.marks())
-    known = any(isinstance(m.get("host_s"), int | float) for m in marks)
-    return start_time(marks) if known else None
 
 
 def levels_of(session: Session) -> dict[str, str]:

@@ -211,7 +211,7 @@ def find_sessions(
     columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
     columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
     query = select(*columns).where(and_(True, *some))
-    query = query.order_by(SESSION.c.taken_at, SESSION.c.folder)
+    query = query.order_by(SESSION.c.taken_at.nulls_first(), SESSION.c.folder)
     rows = db.execute(query).all()
     parameters = _parameters(db, some)
     kept: dict[int, bytes] = {}

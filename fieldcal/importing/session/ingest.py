@@ -24,6 +24,7 @@ from fieldcal.importing.session.validation import (
     SampleWriter,
     file_record,
 )
+from fieldcal.importing.units.time_units import recording_date
 from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
@@ -210,6 +211,7 @@ def _marks(
 ) -> str:
     """Marks that record the origin of the samples."""
     now = round(time(), 3)
+    stamps = (recording.began, facts.start_s, facts.first_arrival_s)
     imported = {
         "event": "imported",
         "files": [file_record(path) for path in recording.files()],
@@ -218,6 +220,7 @@ def _marks(
         **facts.table(),
         "repairs": repairs,
         "says": recording.says,
+        "taken_at": recording_date(stamps, now),
         "host_s": now,
     }
     notes = dict(recording.notes(stream))

@@ -239,6 +239,60 @@ def test_an_address_that_is_none_is_said_without_its_password() -> None:
     assert "secret" not in str(told.value)
 
 
+@pytest.mark.parametrize(
+    "address",
+    [
+        "mysql://lab:secret@db/imu",
+        "nothing://lab:secret@x/y",
+        "postgresql://lab:se@cret@db:port/imu",
+        "://lab:secret@db",
+        "mysql://db/imu?user=lab&password=secret",
+    ],
+)
+def test_no_password_of_an_address_that_is_not_understood_is_said(address: str) -> None:
+    with pytest.raises(InputError, match="is no address of a store") as told:
+        everything(address)
+    assert "cret" not in str(told.value) and "***" in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["what?x=1.sqlite", "a#b", "100%25.sqlite", "a b&c"])
+def test_a_file_of_any_name_is_written_and_read(tmp_path: Path, name: str) -> None:
+    put(tmp_path / name, stored(1))
+    assert (tmp_path / name).is_file() and everything(tmp_path / name) == [stored(1)]
+
+
+def test_a_first_write_that_was_killed_leaves_an_empty_store(tmp_path: Path) -> None:
+    killed = (
+        "import os, signal, sys\nfrom fieldcal.history.database import Database\n"
+        "Database(sys.argv[1]).run("
+        "lambda db: os.kill(os.getpid(), signal.SIGKILL), write=True)"
+    )
+    subprocess.run([sys.executable, "-c", killed, str(tmp_path / "h")], check=False)
+    assert (tmp_path / "h").exists()
+    assert everything(tmp_path / "h") == [] and History(tmp_path / "h").serials() == []
+    put(tmp_path / "h", stored(1))
+    assert everything(tmp_path / "h") == [stored(1)]
+
+
+def test_a_first_write_that_fails_leaves_an_empty_store(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError):
+        Database(tmp_path / "h").run(lambda _: 1 // 0, write=True)
+    assert everything(tmp_path / "h") == []
+
+
+@pytest.mark.parametrize("write", [False, True])
+def test_a_database_of_another_program_is_left_alone(
+    tmp_path: Path, write: bool
+) -> None:
+    with closing(sqlite3.connect(tmp_path / "other")) as db:
+        db.execute("CREATE TABLE urls (url TEXT)")
+        db.commit()
+    before = (tmp_path / "other").read_bytes()
+    with pytest.raises(InputError, match="is no history of this version"):
+        Database(tmp_path / "other").run(lambda _: None, write)
+    assert (tmp_path / "other").read_bytes() == before
+
+
 # -- a real PostgreSQL
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Row, and_, delete, insert, or_, select, update
+from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, update
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
@@ -22,6 +24,13 @@ LEVELS = ("model", "lot", "station", "operator")
 
 FILTERS = ("serial", *LEVELS, "since", "until")
 """Names of the conditions for finding sessions."""
+
+
+TIMES = ("since", "until")
+"""Those of them that are dates."""
+
+DATE = re.compile(r"(\d{4})(?:-(\d{1,2}))?(?:-(\d{1,2}))?")
+"""A date, a month or a year."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +181,7 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a word is no condition.
+        If a word is no condition, or has no date where one belongs.
 
     """
     found = {}
@@ -183,8 +192,25 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
                 f"{word}: is no condition; write one of {', '.join(FILTERS)} and a"
                 " value, as in lot=7 or since=2026-03-01"
             )
-        found[name] = value
+        found[name] = _parse_date(word, value) if name in TIMES else value
     return found
+
+
+def _parse_date(word: str, value: str) -> str:
+    """Text of a date, month, year or time, which compares with `taken_at` as text."""
+    parts = DATE.fullmatch(value)
+    try:
+        if parts is None:
+            at = datetime.fromisoformat(value)
+            at = at if at.tzinfo else at.replace(tzinfo=UTC)
+            return at.astimezone(UTC).isoformat(timespec="seconds")
+        numbers = [int(part) for part in parts.groups() if part]
+        date(*[*numbers, 1, 1][:3])
+    except ValueError as error:
+        raise InputError(
+            f"{word}: is no date ({error}); write it as in since=2026-03-01"
+        ) from error
+    return "-".join(f"{number:02d}" for number in numbers)
 
 
 def find_sessions(
@@ -219,6 +245,16 @@ def find_sessions(
         blobs = select(REDUCED_ROWS).join(SESSION).where(and_(True, *some))
         kept = {r.session: r.data for r in db.execute(blobs)}
     return [_session_of_row(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
+
+
+def untimed_sentence(db: Connection, wanted: Mapping[str, str]) -> str:
+    """Sentence about sessions of unknown time that `since` and `until` leave out."""
+    others = [_condition(n, value) for n, value in wanted.items() if n not in TIMES]
+    if len(others) == len(wanted):
+        return ""
+    query = select(func.count()).where(SESSION.c.taken_at.is_(None), *others)
+    count = db.execute(query).scalar_one()
+    return f"sessions of unknown time that are left out: {count}" if count else ""
 
 
 def _condition(name: str, value: str) -> Any:

@@ -231,6 +231,41 @@ def test_a_word_that_is_no_condition_is_refused() -> None:
             sessions.parse_filters([wrong])
 
 
+@pytest.mark.parametrize(
+    ("word", "found"),
+    [
+        ("until=2026-9-30", [1, 2]),
+        ("since=2026-9-30", [2, 3]),
+        ("since=2026-10", [3]),
+        ("until=2026-9", [1, 2]),
+        ("until=2025", []),
+        ("since=2026-09-30T14:00:00+02:00", [2, 3]),
+        ("since=2026-09-30T12:00:01", [3]),
+        ("until=2026-09-30T12:00", [1, 2]),
+    ],
+)
+def test_dates_are_dates_however_they_are_written(
+    tmp_path: Path, word: str, found: list[int]
+) -> None:
+    days = ("2026-02-01", "2026-09-30", "2026-11-01")
+    some = [
+        stored(i, taken_at=f"{day}T12:00:00+00:00") for i, day in enumerate(days, 1)
+    ]
+    put(tmp_path / "h", *some, stored(4))
+    wanted = sessions.parse_filters([word])
+    assert [int(s.folder[3:]) for s in everything(tmp_path / "h", **wanted)] == found
+    data = Database(tmp_path / "h")
+    said = data.run(lambda db: sessions.untimed_sentence(db, wanted))
+    assert said == "sessions of unknown time that are left out: 1"
+    assert data.run(lambda db: sessions.untimed_sentence(db, {"serial": "A1"})) == ""
+
+
+@pytest.mark.parametrize("value", ["November", "", "30.9.2026", "2026-13-01", "1-2-3"])
+def test_what_is_no_date_is_said_to_be_none(value: str) -> None:
+    with pytest.raises(InputError, match=f"since={value}: is no date .*write it as"):
+        sessions.parse_filters([f"since={value}"])
+
+
 def test_an_address_that_is_none_is_said_without_its_password() -> None:
     with pytest.raises(InputError, match="is no address of a store"):
         everything("nothing://x/y")

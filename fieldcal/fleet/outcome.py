@@ -20,6 +20,8 @@ from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
 from fieldcal.session.folder import Session
 
+OUT_OF_MEMORY = "it needs more memory than there is"
+
 
 @dataclass(frozen=True, slots=True)
 class SessionTask:
@@ -50,6 +52,9 @@ class SessionTask:
         except FieldcalError as error:
             said = str(error)
             said = said if name in said else f"{name}: {said}"
+        except MemoryError:
+            said = f"{name}: {OUT_OF_MEMORY}; process fewer sessions at once, or"
+            said += " shorten the recording"
         except Exception as error:  # one session costs no other, whatever it is
             said = (
                 f"{name}: {type(error).__name__}: {error}; see fieldcal verify, or"

@@ -7,10 +7,12 @@ the last update,
     t_k = u + k T,  u = min(max(u, s_k - k T), s_k + q - k T)               (1)
 
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
-counter is unwrapped first: where it falls by more than half its span, a span is added.
-A clock that falls by more than `RESTART_BACKWARD`, or leaps by more than
-`RESTART_FORWARD` while hardly any time passed on the host, was restarted: time goes on
-from the last sample by the time that passed on the host.
+counter is unwrapped first, by as many spans as the time tells that passed on the host,
+at the device's rate so far. Until that is known, a span is added where the counter
+falls by more than half of it. A clock that falls by more than `RESTART_BACKWARD`
+without such a wrap, or leaps by more than `RESTART_FORWARD` and by more than passed on
+the host, was restarted: time goes on from the last sample by the time that passed on
+the host.
 
 All in s. Symbols: k sample number, T period, q resolution, u phase.
 """
@@ -29,7 +31,17 @@ RESTART_FORWARD = 60.0
 """Step forward of the stamps beyond which the host's time is compared, s."""
 
 LEAST_HOST_SHARE = 0.005
-"""Least share of that step that must pass on the host: devices run up to 200 x fast."""
+"""Least share of that step that must pass on the host while the device's rate is not
+known: devices run up to 200 x fast."""
+
+LEAST_RATE_TIME = 3.0
+"""Time on the host from which the device's rate against the host is known, s."""
+
+LATEST_ARRIVAL = 2.0
+"""Usual differences between arrivals, s of the host."""
+
+RATE_ERROR = 0.1
+"""Usual error of the rate of a device's time against the host's."""
 
 FIRST_INTERVALS = 16
 """Intervals from which the period is first estimated."""
@@ -40,7 +52,7 @@ RENEWAL_SAMPLES = 1024
 CREEP_SHARE = 0.01
 """Share of the resolution by which times increase where samples share a stamp."""
 
-_NAN = float("nan")
+_NAN, _INF = float("nan"), float("inf")
 
 
 class StampTimebase:
@@ -62,6 +74,7 @@ class StampTimebase:
         self._offset = 0.0
         self._t = self._stamp = self._host = self._period = _NAN
         self._first, self._count = 0.0, 0
+        self._first_host = _NAN
         self._early: list[float] = []
         self._phase, self._k0, self._renewal = _NAN, 0, FIRST_INTERVALS
 
@@ -133,8 +146,8 @@ class StampTimebase:
         if self._t != self._t:
             self._begin(stamp, host)
             return self._t
-        if stamp < self._stamp - self._span / 2:
-            self._offset += self._span
+        if wraps := self._wraps(stamp, host):
+            self._offset += wraps * self._span
         s = stamp + self._offset
         if self._restarted(s, host):
             return self._restart(stamp, host)
@@ -149,7 +162,33 @@ class StampTimebase:
         self._t = self._first = stamp + self._offset
         self._count, self._renewal, self._early = 0, FIRST_INTERVALS, []
         self._stamp, self._host = stamp, host
+        self._first_host = host
         self._anchor()
+
+    def _passed(self, host: float) -> tuple[float, float]:
+        """Device time since the last sample by the host, and its error; nan if unknown.
+
+        A device that is simulated may run faster than the host's clock.
+        """
+        seen = self._host - self._first_host
+        if not seen >= LEAST_RATE_TIME:
+            return _NAN, _NAN
+        rate = (self._t - self._first) / seen
+        passed = rate * (host - self._host)
+        return passed, rate * LATEST_ARRIVAL + RATE_ERROR * abs(passed)
+
+    def _wraps(self, stamp: float, host: float) -> int:
+        """How many times the counter wrapped since the last sample."""
+        if self._span == _INF:
+            return 0
+        moved, (passed, error) = stamp - self._stamp, self._passed(host)
+        if passed != passed:
+            return int(moved < -self._span / 2)
+        wraps = max(round((passed - moved) / self._span), int(moved < 0))
+        told = moved + wraps * self._span
+        if moved < 0:  # samples that waited in a buffer come after less time
+            return wraps if told <= passed + error else 0
+        return wraps if abs(told - passed) <= error else 0
 
     def _place(self, s: float) -> float:
         """Time of a sample stamped `s`, (1)."""
@@ -196,8 +235,10 @@ class StampTimebase:
         self._phase, self._k0 = self._t, self._count
 
     def _restarted(self, s: float, host: float) -> bool:
-        leap = s - self._t
+        leap, (passed, error) = s - self._t, self._passed(host)
         witnessed = not host - self._host < LEAST_HOST_SHARE * leap
+        if passed == passed:
+            witnessed = leap <= passed + error
         return leap < -RESTART_BACKWARD or (leap > RESTART_FORWARD and not witnessed)
 
     def _restart(self, stamp: float, host: float) -> float:

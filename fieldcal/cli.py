@@ -159,7 +159,10 @@ def _write_crash_file(name: str, arguments: list[str], error: Exception) -> str:
     said = f"broke on {type(error).__name__}, a fault of its own and no verdict"
     try:
         handle, path = tempfile.mkstemp(prefix="fieldcal-broke-", suffix=".txt")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
+        # names of files in it may be no UTF-8
+        with os.fdopen(
+            handle, "w", encoding="utf-8", errors="backslashreplace"
+        ) as file:
             file.write(text)
     except OSError:
         return f"{said}: send in what follows\n{text.rstrip()}"

@@ -31,11 +31,16 @@ from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.observations import UsableWindows, angle_setting
-from fieldcal.history.store import History, HistoryRun, family_runs
+from fieldcal.history.store import History, HistoryRun, earlier_runs, family_runs
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
 from fieldcal.windows import Average, average
 from fieldcal.windows.dead_axis import broken_axis_messages
+
+TIME_UNKNOWN = (
+    "the time of this recording is unknown, so it is compared with all calibrations of"
+    " the device, as if it were the newest"
+)
 
 
 def assess(
@@ -57,15 +62,17 @@ def assess(
 
     """
     marks = list(session.marks())
+    taken_at = start_time(marks)
     warnings = list(calibration.warnings)
     earlier: FamilyAtTemperature | None = None
     usual: Sequence[HistoryRun] = ()
     serial = str(session.about.device.get("serial", ""))
     if history is not None and serial:
         try:
-            here = str(session.folder.resolve())
-            runs = [run for run in history.runs(serial) if run.session != here]
-            usual = family_runs(runs)
+            runs = history.runs(serial)
+            usual = family_runs(earlier_runs(runs, session.folder, taken_at))
+            if runs and taken_at is None:
+                warnings.append(TIME_UNKNOWN)
             earlier = family_at_temperature(calibration, usual, limits)
         except FieldcalError as error:
             warnings.append(str(error))
@@ -85,7 +92,7 @@ def assess(
     made = decide(calibration, session.about, limits, circumstances)
     site = {"latitude_deg": session.about.latitude_deg}
     site |= {"height_m": session.about.height_m, "gravity": session.about.gravity}
-    info = {**calibration.info, "site": site, "taken_at": start_time(marks)}
+    info = {**calibration.info, "site": site, "taken_at": taken_at}
     if (costs := effect_of_temperature_change(calibration, usual, limits)) is not None:
         info["temperature_change"] = costs
     return with_decision(
@@ -171,19 +178,25 @@ def store_in_history(
     """Store a calibration in the history; returns a sentence for the operator."""
     if not session.about.device.get("serial"):
         return ""
-    at = str(calibration.info.get("taken_at") or start_time([]))
     try:
-        history.add(at, session.folder, calibration)
+        history.add(calibration.info.get("taken_at"), session.folder, calibration)
     except FieldcalError as error:
         return f"the calibration is not stored in the history: {error}"
     return ""
 
 
-def start_time(marks: Sequence[Mapping[str, Any]]) -> str:
-    """Time of the first mark, ISO 8601 in UTC; the present time without marks."""
+def start_time(marks: Sequence[Mapping[str, Any]]) -> str | None:
+    """Time of the recording, ISO 8601 in UTC; None if unknown.
+
+    Of an imported recording it is by its own stamps, else that of the first mark.
+    """
+    for mark in marks:
+        if mark.get("event") == "imported":
+            return mark.get("taken_at")
     times = [m["host_s"] for m in marks if isinstance(m.get("host_s"), int | float)]
-    at = datetime.fromtimestamp(times[0], UTC) if times else datetime.now(UTC)
-    return at.isoformat(timespec="seconds")
+    if not times:
+        return None
+    return datetime.fromtimestamp(times[0], UTC).isoformat(timespec="seconds")
 
 
 def verification_window(

@@ -28,6 +28,10 @@ STRIP_WIDTH = 20
 """Width of the plot beside the numbers, characters."""
 
 
+UNKNOWN_TIME = "at an unknown time"
+"""Instead of the time of a recording whose stamps do not tell it."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     add = parser.add_argument
@@ -100,7 +104,7 @@ def _list_devices(args: argparse.Namespace, history: History) -> int:
     for serial, count, last in devices:
         sys.stdout.write(
             f"{escape_line(serial)}: {count} calibrations,"
-            f" the last {escape_line(last)}\n"
+            f" the last {escape_line(last) or UNKNOWN_TIME}\n"
         )
     return 0
 
@@ -124,7 +128,8 @@ def _compare_runs(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
         return 0
     for run_ in (first, second):
         sys.stdout.write(
-            f"{run_.number}: {run_.taken_at}, {_format_temperature(run_)}\n"
+            f"{run_.number}: {run_.taken_at or UNKNOWN_TIME},"
+            f" {_format_temperature(run_)}\n"
         )
     sys.stdout.write(comparison_table(found))
     return 0
@@ -141,8 +146,8 @@ def _show_trends(args: argparse.Namespace, runs: Sequence[HistoryRun]) -> int:
     if args.png:
         from fieldcal.commands.history_plot import plot_trends
 
-        plot_trends(args.png, args.serial, trends)
-        sys.stderr.write(f"written: {args.png}\n")
+        left_out = plot_trends(args.png, args.serial, trends)
+        sys.stderr.write(f"written: {args.png}{left_out}\n")
     if args.json:
         document = {
             "serial": args.serial,
@@ -239,7 +244,8 @@ def trend_lines(points: Sequence[TrendPoint]) -> list[str]:
         word = "OUT" if p.out_of_family else "no-go" if p.run.go is False else ""
         word = "accepted" if p.run.accepted else word
         out.append(
-            f"  {p.run.number:3d} {p.run.taken_at[:10]} {_format_temperature(p.run):>8}"
+            f"  {p.run.number:3d} {p.run.taken_at[:10] or '?':10}"
+            f" {_format_temperature(p.run):>8}"
             f" {value:>10} ± {sigma:<8} |{''.join(cells)}| {word}".rstrip()
         )
     return out

@@ -65,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
     wanted = sessions.parse_filters(args.query)
     database = Database(args.history or default_location())
     some = database.run(lambda db: sessions.find_sessions(db, wanted))
+    if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
+        sys.stderr.write(f"fieldcal lot: {lost}\n")
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)
     if args.report:
         from fieldcal.report.lot_page import render_lot_page
@@ -108,6 +110,7 @@ def _print_lot(found: LotAnalysis) -> None:
 def lot_findings(found: LotAnalysis) -> list[str]:
     """Lines about odd units, shifts, and charts beyond their limits."""
     from fieldcal.calibration.wording import format_unit, format_with_sigma
+    from fieldcal.fleet.lot import untimed_sentence
 
     out = []
     for odd in found.odd[:ODD_UNITS_SHOWN]:
@@ -139,6 +142,8 @@ def lot_findings(found: LotAnalysis) -> list[str]:
             f"drift: {alarm.parameter} leaves the {alarm.chart} chart at"
             f" {escape_line(alarm.at)}{since}"
         )
+    if found.untimed:
+        out.append(untimed_sentence(found))
     if found.in_control:
         out.append("in control: no odd unit, no shift, no drift")
     return out

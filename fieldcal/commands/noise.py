@@ -251,16 +251,18 @@ def _recalibration_times(
 
 def _history_steps(runs: Sequence[Any], name: str) -> list[HistoryStep]:
     """Changes of a bias between calibrations that count as its family."""
-    from fieldcal.history.store import family_runs
+    from fieldcal.history.store import family_runs, recording_time
     from fieldcal.noise.recalibration import HistoryStep
 
     values = []
     for one in family_runs(runs):
         found = one.calibration
-        if name in found.names and one.taken_at:
+        when = recording_time(one.taken_at)
+        if name in found.names and when is not None:
             i = found.names.index(name)
-            when = datetime.fromisoformat(one.taken_at).timestamp()
-            values.append((when, float(found.values[i]), float(found.sigma[i])))
+            values.append(
+                (when.timestamp(), float(found.values[i]), float(found.sigma[i]))
+            )
     return [
         HistoryStep(then - when, after - before, one**2 + two**2)
         for (when, before, one), (then, after, two) in zip(

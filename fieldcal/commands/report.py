@@ -99,17 +99,17 @@ def write_report(
 def _earlier_calibrations(
     folder: Path, history: StoreLocation | None
 ) -> list[EarlierCalibration]:
-    """Calibrations of the device in the history, without this session."""
+    """Calibrations of the device in the history that are earlier than this session."""
+    from fieldcal.acceptance.assessment import start_time
     from fieldcal.history.location import default_location
-    from fieldcal.history.store import History
+    from fieldcal.history.store import History, earlier_runs
     from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
 
-    serial = Session.open(folder).about.device.get("serial")
+    session = Session.open(folder)
+    serial = session.about.device.get("serial")
     if not serial:
         return []
-    return [
-        EarlierCalibration(run.taken_at[:10], run.calibration)
-        for run in History(history or default_location()).runs(str(serial))
-        if Path(run.session).resolve() != folder.resolve()
-    ]
+    runs = History(history or default_location()).runs(str(serial))
+    before = earlier_runs(runs, folder, start_time(list(session.marks())))
+    return [EarlierCalibration(run.taken_at[:10], run.calibration) for run in before]

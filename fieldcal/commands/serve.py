@@ -10,7 +10,16 @@ from pathlib import Path
 
 from fieldcal.core.errors import InputError
 
-RARE = ("history", "scheduler", "upload_mib", "jobs", "kept", "minutes", "known_as")
+RARE = (
+    "history",
+    "scheduler",
+    "upload_mib",
+    "jobs",
+    "kept",
+    "minutes",
+    "memory_mib",
+    "known_as",
+)
 
 EXAMPLE = """\
   fieldcal serve
@@ -50,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--jobs", 32, "recordings that may wait"),
         ("--kept", 1000, "sessions that are kept; the oldest go first"),
         ("--minutes", 30, "processor time of one session, min"),
+        ("--memory-mib", 4096, "memory of one session, MiB"),
     ):
         add(option, type=int, default=default, metavar="N", help=f"{what} ({default})")
 
@@ -70,12 +80,13 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.service.jobs import JobStore
     from fieldcal.service.queue import JobQueue
 
-    few = ("upload_mib", "jobs", "kept", "minutes")
+    few = ("upload_mib", "jobs", "kept", "minutes", "memory_mib")
     if wrong := next((n for n in few if getattr(args, n) < 1), None):
         raise InputError(f"--{wrong.replace('_', '-')}: one at least is wanted")
     bounds = ServiceBounds(
         upload=args.upload_mib * MIB, unpacked=8 * args.upload_mib * MIB,
         jobs=args.jobs, kept=args.kept, seconds=60 * args.minutes,
+        memory=args.memory_mib * MIB,
     )  # fmt: skip
     tokens = read_tokens(args.tokens) if args.tokens else []
     host, port = parse_address(args.listen, "--listen")

@@ -179,6 +179,8 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     wanted = sessions.parse_filters(args.lot)
     database = Database(args.history or default_location())
     some = database.run(lambda db: sessions.find_sessions(db, wanted, documents=True))
+    if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
+        sys.stderr.write(f"fieldcal solve: {lost}\n")
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
     return estimate_lot_prior(" ".join(args.lot), some, serial, folder)

@@ -1,4 +1,6 @@
-"""Parse TOML and JSON text; every text that cannot be parsed raises one kind of error.
+"""Parse TOML and JSON text, and make values that JSON can represent.
+
+Every text that cannot be parsed raises one kind of error.
 
 The parsers raise RecursionError for deep nesting, and a plain ValueError for a number
 with more digits than Python converts. Both become errors of the text. A byte order
@@ -8,7 +10,10 @@ mark, with which some editors begin a text, is skipped.
 from __future__ import annotations
 
 import json
+import math
 import tomllib
+from collections.abc import Mapping
+from datetime import date, time
 from typing import Any
 
 BYTE_ORDER_MARK = "\ufeff"
@@ -60,3 +65,20 @@ def load_json(text: str) -> Any:
         raise ValueError(NESTED_TOO_DEEPLY) from None
     except ValueError:
         raise ValueError(NUMBER_TOO_LONG) from None
+
+
+def json_values(value: Any) -> Any:
+    """Value that JSON can represent: dates become text, nan and infinity null.
+
+    >>> json_values({"bought": date(2026, 1, 2), "range": [2.0, math.inf]})
+    {'bought': '2026-01-02', 'range': [2.0, None]}
+    """
+    if isinstance(value, Mapping):
+        return {key: json_values(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_values(each) for each in value]
+    if isinstance(value, date | time):  # a datetime is a date
+        return value.isoformat()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fieldcal.core.errors import InputError, disk_says
+from fieldcal.core.file_names import storable_text
 from fieldcal.fleet.outcome import SessionTask
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.fleet.workers import WorkerPool, run_tasks
@@ -44,7 +45,8 @@ class SessionBatch:
         return [
             str(folder)
             for folder in self.folders
-            if known.get(str(folder)) != fingerprint(folder, options)
+            if (mark := known.get(storable_text(str(folder)))) is None
+            or mark != _fingerprint(folder, options)
         ]
 
     def process(
@@ -52,12 +54,28 @@ class SessionBatch:
     ) -> Generator[StoredSession, None, None]:
         """Process folders; each result is in the store before it is yielded."""
         for made in run_tasks(folders, self.task, pool):
-            one = made.value or StoredSession(made.item, error=made.error)
+            yield self._store(made.value or StoredSession(made.item, error=made.error))
+
+    def _store(self, one: StoredSession) -> StoredSession:
+        """Store a result, or why it cannot be stored; returns what is stored.
+
+        Raises
+        ------
+        InputError
+            If the store takes no row at all.
+
+        """
+        try:
+            self.database.run(lambda db: sessions.store_session(db, one), write=True)
+        except Exception as error:  # one session costs no other, whatever it is
+            said = f"{one.folder}: its result cannot be stored ({error}); see"
+            said += " fieldcal verify, or report this with the session"
+            refused = StoredSession(one.folder, error=said)
             self.database.run(
-                lambda db, one=one: sessions.store_session(db, one),  # type: ignore[misc]
-                write=True,
+                lambda db: sessions.store_session(db, refused), write=True
             )
-            yield one
+            return refused
+        return one
 
     def stored_rows(self) -> Iterator[list[StoredSession]]:
         """Yield the stored results of all folders, `CHUNK` at a time."""
@@ -96,6 +114,14 @@ class SessionBatch:
             ) from error
         finally:
             part.unlink(missing_ok=True)
+
+
+def _fingerprint(folder: Path, options: str) -> str | None:
+    """Fingerprint of a session; None if its files cannot be read."""
+    try:
+        return fingerprint(folder, options)
+    except OSError:
+        return None
 
 
 def parquet_schema(names: Sequence[str]) -> pa.Schema:

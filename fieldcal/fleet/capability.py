@@ -43,7 +43,8 @@ class LotParameter:
     distribution : mean and spread over the units
     cp, cp_sigma, cpk, cpk_sigma : (1), (2); None without a tolerance
     tolerance : T, largest accepted deviation from the nominal value
-    charts : control charts
+    untimed : number of the first units, whose time is unknown
+    charts : control charts of the other units
 
     """
 
@@ -58,6 +59,7 @@ class LotParameter:
     cp_sigma: float | None
     cpk: float | None
     cpk_sigma: float | None
+    untimed: int
     charts: tuple[ControlChart, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -86,6 +88,7 @@ def lot_parameter(
     sigma: Array,
     limits: GradeLimits,
     together: int,
+    untimed: int = 0,
 ) -> LotParameter:
     """Calculate spread, process capability and control charts of one parameter.
 
@@ -96,6 +99,7 @@ def lot_parameter(
     x, sigma : (n,) value and standard uncertainty, in the order of time
     limits : limits of the grade, which contain the tolerance
     together : number of parameters of the lot; they share `FALSE_ALARM`
+    untimed : number of the first units, whose time is unknown; charts exclude them
 
     """
     about = estimate_distribution(x, sigma)
@@ -109,10 +113,10 @@ def lot_parameter(
         part = about.spread_sigma / about.spread
         cp_sigma = cp * part  # (2)
         cpk_sigma = float(np.hypot(about.mean_sigma / (3 * about.spread), cpk * part))
-    quiet = len(x) * together * CHARTS / FALSE_ALARM
-    z = (x - about.mean) / about.sigma
-    charts = (ewma(z, quiet), cusum(z, quiet))
+    z = ((x - about.mean) / about.sigma)[untimed:]
+    quiet = len(z) * together * CHARTS / FALSE_ALARM
+    charts = (ewma(z, quiet), cusum(z, quiet)) if len(z) else ()
     return LotParameter(
         name, unit, units, x, sigma, about, tolerance, cp, cp_sigma, cpk, cpk_sigma,
-        charts,
+        untimed, charts,
     )  # fmt: skip

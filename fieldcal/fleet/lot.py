@@ -86,6 +86,11 @@ class LotAnalysis:
         """Whether there is no odd unit, no shift and no alarm."""
         return not (self.odd or self.shifts or self.alarms)
 
+    @property
+    def untimed(self) -> int:
+        """Number of units whose time is unknown; control charts exclude them."""
+        return sum(one.taken_at is None for one in self.units)
+
     def to_json(self) -> dict[str, Any]:
         """Return it as an object."""
         share, low, high = self.yield_share
@@ -93,6 +98,7 @@ class LotAnalysis:
             "sessions": self.sessions,
             "without_result": self.failed,
             "units": len(self.units),
+            "units_of_unknown_time": self.untimed,
             "yield": {
                 "good": self.good,
                 "of": self.judged,
@@ -167,7 +173,12 @@ def analyse_lot(
             found[name] = (np.flatnonzero(known), x[known], sigma[known])
     parameters = {
         name: lot_parameter(
-            name, useful[told[0][0]].parameters[name][2], *told, limits, len(found)
+            name,
+            useful[told[0][0]].parameters[name][2],
+            *told,
+            limits,
+            len(found),
+            sum(useful[i].taken_at is None for i in told[0].tolist()),
         )
         for name, told in found.items()
     }
@@ -179,7 +190,7 @@ def analyse_lot(
     judged = [one.go if one.go is not None else bool(one.good) for one in units]
     return LotAnalysis(
         len(sessions),
-        sum(one.error is not None for one in sessions),
+        sum(one.good is None for one in sessions),
         tuple(useful),
         sum(judged),
         len(judged),
@@ -190,6 +201,12 @@ def analyse_lot(
         tuple(s for p in parameters.values() for s in _find_shifts(p, levels)),
         tuple(a for p in parameters.values() for a in _find_alarms(p, useful)),
     )
+
+
+def untimed_sentence(found: LotAnalysis) -> str:
+    """Sentence about units whose time is unknown."""
+    which = "1 unit" if found.untimed == 1 else f"{found.untimed} units"
+    return f"{which} of unknown time: not in the control charts"
 
 
 def latest_session_per_unit(sessions: Sequence[StoredSession]) -> list[StoredSession]:
@@ -257,7 +274,7 @@ def _find_shifts(one: LotParameter, levels: Sequence[Grouping]) -> list[Shift]:
 
 def _find_alarms(one: LotParameter, useful: Sequence[StoredSession]) -> list[Alarm]:
     def named(number: int) -> str:
-        unit = useful[int(one.unit_numbers[number])]
+        unit = useful[int(one.unit_numbers[one.untimed + number])]
         return unit.serial or unit.folder
 
     return [

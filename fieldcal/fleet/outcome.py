@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from fieldcal.acceptance.assessment import assess, limits_path, start_time, with_faults
-from fieldcal.calibration import Calibration, limits
+from fieldcal.calibration import limits
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.file_names import storable_text
 from fieldcal.diagnosis.verdict import make_diagnosis
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.omitted_effects import with_repaired_bytes
@@ -18,6 +19,8 @@ from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
 from fieldcal.session.folder import Session
+
+OUT_OF_MEMORY = "it needs more memory than there is"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +45,19 @@ class SessionTask:
 
     def __call__(self, folder: str) -> StoredSession:
         """Process a session; an error is stated in the row that is returned."""
-        mark = None
+        mark, name = None, storable_text(folder)
         try:
             mark = fingerprint(Path(folder), self.options)
             return replace(self._process(Path(folder)), fingerprint=mark)
         except FieldcalError as error:
             said = str(error)
-            said = said if folder in said else f"{folder}: {said}"
+            said = said if name in said else f"{name}: {said}"
+        except MemoryError:
+            said = f"{name}: {OUT_OF_MEMORY}; process fewer sessions at once, or"
+            said += " shorten the recording"
         except Exception as error:  # one session costs no other, whatever it is
             said = (
-                f"{folder}: {type(error).__name__}: {error}; see fieldcal verify, or"
+                f"{name}: {type(error).__name__}: {error}; see fieldcal verify, or"
                 " report this with the session"
             )
         return StoredSession(folder, fingerprint=mark, error=said)
@@ -73,7 +79,7 @@ class SessionTask:
         if explanation is not None and self.diagnose:
             diagnosis = make_diagnosis(session.block, explanation).to_json()
         return replace(
-            session_of_calibration(folder, found, _taken_at(session, found)),
+            session_of_calibration(folder, found, start_time(list(session.marks()))),
             serial=str(session.about.device.get("serial", "")),
             levels=levels_of(session),
             diagnosis=diagnosis,
@@ -81,13 +87,6 @@ class SessionTask:
             if explanation is None
             else reduce_session(explanation).to_bytes(),
         )
-
-
-def _taken_at(session: Session, found: Calibration) -> str | None:
-    """Time of the session, if its marks state one."""
-    marks = list(session.marks())
-    known = any(isinstance(m.get("host_s"), int | float) for m in marks)
-    return start_time(marks) if known else None
 
 
 def levels_of(session: Session) -> dict[str, str]:

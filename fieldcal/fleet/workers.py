@@ -31,7 +31,9 @@ T = TypeVar("T")
 AHEAD = 2
 """Items submitted per worker, so that no worker waits for the next item."""
 
-DIED = "its process was killed, by the system for want of memory perhaps"
+DIED = (
+    "its process was killed, by the system for want of memory or processor time perhaps"
+)
 
 
 @dataclass(frozen=True, slots=True)

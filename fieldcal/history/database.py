@@ -6,13 +6,14 @@ transaction is repeated until it is available again, or `LONGEST_ABSENCE` has pa
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
@@ -44,8 +45,16 @@ T = TypeVar("T")
 Transaction = Callable[[Connection], T]
 
 
+PASSWORD = re.compile(r"(?<=://)([^:/@\s]*):\S*@|(?<=password=)[^&\s]*")
+"""Password in an address, also in one that is not understood."""
+
+
 class _Outdated(Exception):
-    """Tables must be created or migrated before they are read."""
+    """Tables must be migrated before they are read."""
+
+
+class _Empty(Exception):
+    """Nothing was ever stored: the first write was killed, or failed."""
 
 
 class Database:
@@ -64,9 +73,7 @@ class Database:
     @property
     def location_text(self) -> str:
         """Location of the store, without a password."""
-        if not is_address(self.place):
-            return str(self.place)
-        return make_url(str(self.place)).render_as_string(hide_password=True)
+        return _without_password(str(self.place))
 
     def run(self, work: Transaction[T], write: bool = False) -> T:
         """Result of `work`, carried out in one transaction.
@@ -81,7 +88,8 @@ class Database:
             return self._while_away(work, write)
         except (NoSuchModuleError, ArgumentError, ImportError) as error:
             raise InputError(
-                f"{self.place}: is no address of a store ({error}); write"
+                f"{self.location_text}: is no address of a store"
+                f" ({_without_password(str(error))}); write"
                 " postgresql://user:password@host/name, which needs pip install"
                 " 'fieldcal[fleet]', or name a file"
             ) from error
@@ -111,12 +119,13 @@ class Database:
 
     def _once(self, work: Transaction[T], write: bool) -> T:
         try:
-            return self._transaction(work, write)
+            return self._transaction(self._engine(write), work, write)
         except _Outdated:
-            return self._transaction(work, True)
+            return self._transaction(self._engine(True), work, True)
+        except _Empty:
+            return self._transaction(_sqlite_engine(None), work, False)
 
-    def _transaction(self, work: Transaction[T], write: bool) -> T:
-        engine = self._engine(write)
+    def _transaction(self, engine: Engine, work: Transaction[T], write: bool) -> T:
         try:
             with engine.connect() as db:
                 db = db.execution_options(writes=write)
@@ -128,7 +137,10 @@ class Database:
 
     def _engine(self, write: bool) -> Engine:
         if is_address(self.place):
-            url = make_url(str(self.place))
+            try:
+                url = make_url(str(self.place))
+            except ValueError as error:  # a port that is no number
+                raise ArgumentError(str(error)) from error
             if url.drivername == "postgresql":
                 url = url.set(drivername="postgresql+psycopg")
             more = {} if url.get_backend_name() == "sqlite" else ENCODING
@@ -136,29 +148,20 @@ class Database:
         path = Path(self.place)
         if write:
             path.parent.mkdir(parents=True, exist_ok=True)
-        there = write or path.exists()
-        name = f"sqlite:///{path}" if there else "sqlite://"
-        made = create_engine(
-            name, poolclass=NullPool, connect_args={"timeout": LOCK_TIMEOUT}
-        )
-        event.listen(made, "connect", _configure_connection)
-        event.listen(made, "begin", _begin)
-        return made
+        return _sqlite_engine(path if write or path.exists() else None)
 
     def _prepare(self, db: Connection, may_make: bool) -> None:
         """Create the tables, or migrate them."""
         lite = db.dialect.name == "sqlite"
         if lite:
             version = db.exec_driver_sql("PRAGMA user_version").scalar_one()
-            memory = not db.engine.url.database
             if version == NEWEST_VERSION:
                 return
-            if version not in (0, OLDEST_VERSION) or not (
-                version or may_make or memory
-            ):
+            foreign = version == 0 and inspect(db).get_table_names()
+            if foreign or version not in (0, OLDEST_VERSION):
                 self._refuse(f"version {version}")
-            if not may_make and not memory:
-                raise _Outdated
+            if not may_make and db.engine.url.database:
+                raise _Outdated if version else _Empty
         else:
             if may_make:
                 db.execute(text(f"SELECT pg_advisory_xact_lock({LOCK})"))
@@ -178,6 +181,27 @@ class Database:
             f"{self.location_text}: is no history of this version (found {found}); name"
             " another with --history"
         )
+
+
+def _without_password(text: str) -> str:
+    """Text with the passwords of addresses hidden.
+
+    >>> _without_password("mysql://lab:s3c@ret@db/imu?password=x&a=b")
+    'mysql://lab:***@db/imu?password=***&a=b'
+    """
+    return PASSWORD.sub(lambda m: f"{m[1]}:***@" if m[1] is not None else "***", text)
+
+
+def _sqlite_engine(path: Path | None) -> Engine:
+    """Engine of a SQLite file; None is an empty store in memory."""
+    made = create_engine(
+        URL.create("sqlite", database=None if path is None else str(path)),
+        poolclass=NullPool,
+        connect_args={"timeout": LOCK_TIMEOUT},
+    )
+    event.listen(made, "connect", _configure_connection)
+    event.listen(made, "begin", _begin)
+    return made
 
 
 def _configure_connection(connection: object, _record: object) -> None:

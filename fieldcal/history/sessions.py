@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Row, and_, delete, insert, or_, select, update
+from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, update
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
+from fieldcal.core.file_names import storable_text
 from fieldcal.core.samples import Array
 from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
@@ -21,6 +24,13 @@ LEVELS = ("model", "lot", "station", "operator")
 
 FILTERS = ("serial", *LEVELS, "since", "until")
 """Names of the conditions for finding sessions."""
+
+
+TIMES = ("since", "until")
+"""Those of them that are dates."""
+
+DATE = re.compile(r"(\d{4})(?:-(\d{1,2}))?(?:-(\d{1,2}))?")
+"""A date, a month or a year."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,26 +106,19 @@ def _parameters_without_lot(found: Calibration) -> dict[str, tuple[float, float,
 
 
 def store_session(db: Connection, one: StoredSession) -> None:
-    """Store a session; an earlier one of the same folder and device is replaced.
+    """Store a session; an earlier one of the same folder is replaced.
 
-    An error replaces no result: it is stored in addition.
+    A folder is one session, also if its serial number was corrected. An error replaces
+    no result: it is stored in addition.
     """
+    error = None if one.error is None else storable_text(one.error)
+    one = replace(one, folder=storable_text(one.folder), error=error)
     here = SESSION.c.folder == one.folder
-    same = and_(here, SESSION.c.serial == one.serial)
     if one.result is None:
         row = {"fingerprint": one.fingerprint, "error": one.error}
         if db.execute(update(SESSION).where(here).values(row)).rowcount:
             return
-    else:
-        db.execute(delete(SESSION).where(here, SESSION.c.result.is_(None)))
-    number = db.execute(select(SESSION.c.id).where(same)).scalar()
-    if number is None:
-        made = db.execute(insert(SESSION).values(**_row(one), accepted=False))
-        (number,) = made.inserted_primary_key or (None,)
-    else:
-        db.execute(update(SESSION).where(same).values(_row(one)))
-        db.execute(delete(PARAMETER).where(PARAMETER.c.session == number))
-        db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == number))
+    number = _replaced_row(db, here, _row(one))
     rows = [
         {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
         for n, (v, s, u) in one.parameters.items()
@@ -124,6 +127,25 @@ def store_session(db: Connection, one: StoredSession) -> None:
         db.execute(insert(PARAMETER), rows)
     if one.reduced is not None:
         db.execute(insert(REDUCED_ROWS).values(session=number, data=one.reduced))
+
+
+def _replaced_row(db: Connection, here: Any, row: Mapping[str, Any]) -> int:
+    """Number of the one row of a folder, made or replaced; it has no parameters yet."""
+    found = db.execute(
+        select(SESSION.c.id, SESSION.c.accepted).where(here).order_by(SESSION.c.id)
+    ).all()
+    if not found:
+        made: Any = db.execute(insert(SESSION).values(**row, accepted=False))
+        return int(made.inserted_primary_key[0])
+    kept: int = found[-1].id
+    accepted = any(r.accepted for r in found)
+    db.execute(delete(SESSION).where(here, SESSION.c.id != kept))
+    db.execute(delete(PARAMETER).where(PARAMETER.c.session == kept))
+    db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == kept))
+    db.execute(
+        update(SESSION).where(SESSION.c.id == kept).values(**row, accepted=accepted)
+    )
+    return kept
 
 
 def _row(one: StoredSession) -> dict[str, Any]:
@@ -159,7 +181,7 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a word is no condition.
+        If a word is no condition, or has no date where one belongs.
 
     """
     found = {}
@@ -170,8 +192,25 @@ def parse_filters(words: Iterable[str]) -> dict[str, str]:
                 f"{word}: is no condition; write one of {', '.join(FILTERS)} and a"
                 " value, as in lot=7 or since=2026-03-01"
             )
-        found[name] = value
+        found[name] = _parse_date(word, value) if name in TIMES else value
     return found
+
+
+def _parse_date(word: str, value: str) -> str:
+    """Text of a date, month, year or time, which compares with `taken_at` as text."""
+    parts = DATE.fullmatch(value)
+    try:
+        if parts is None:
+            at = datetime.fromisoformat(value)
+            at = at if at.tzinfo else at.replace(tzinfo=UTC)
+            return at.astimezone(UTC).isoformat(timespec="seconds")
+        numbers = [int(part) for part in parts.groups() if part]
+        date(*[*numbers, 1, 1][:3])
+    except ValueError as error:
+        raise InputError(
+            f"{word}: is no date ({error}); write it as in since=2026-03-01"
+        ) from error
+    return "-".join(f"{number:02d}" for number in numbers)
 
 
 def find_sessions(
@@ -194,11 +233,11 @@ def find_sessions(
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
     if folders is not None:
-        some.append(SESSION.c.folder.in_(list(folders)))
+        some.append(SESSION.c.folder.in_([*map(storable_text, folders)]))
     columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
     columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
     query = select(*columns).where(and_(True, *some))
-    query = query.order_by(SESSION.c.taken_at, SESSION.c.folder)
+    query = query.order_by(SESSION.c.taken_at.nulls_first(), SESSION.c.folder)
     rows = db.execute(query).all()
     parameters = _parameters(db, some)
     kept: dict[int, bytes] = {}
@@ -206,6 +245,16 @@ def find_sessions(
         blobs = select(REDUCED_ROWS).join(SESSION).where(and_(True, *some))
         kept = {r.session: r.data for r in db.execute(blobs)}
     return [_session_of_row(r, parameters.get(r.id, {}), kept.get(r.id)) for r in rows]
+
+
+def untimed_sentence(db: Connection, wanted: Mapping[str, str]) -> str:
+    """Sentence about sessions of unknown time that `since` and `until` leave out."""
+    others = [_condition(n, value) for n, value in wanted.items() if n not in TIMES]
+    if len(others) == len(wanted):
+        return ""
+    query = select(func.count()).where(SESSION.c.taken_at.is_(None), *others)
+    count = db.execute(query).scalar_one()
+    return f"sessions of unknown time that are left out: {count}" if count else ""
 
 
 def _condition(name: str, value: str) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,6 +62,41 @@ def family_runs(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
     return tuple(run for run in runs[begins:] if run.go or run.accepted)
 
 
+def recording_time(taken_at: str | None) -> datetime | None:
+    """Time of a recording as the store has it; UTC unless it states its zone.
+
+    >>> recording_time("2026-03-01"), recording_time("")
+    (datetime.datetime(2026, 3, 1, 0, 0, tzinfo=datetime.timezone.utc), None)
+    """
+    try:
+        at = datetime.fromisoformat(taken_at or "")
+    except ValueError:
+        return None
+    return at if at.tzinfo else at.replace(tzinfo=UTC)
+
+
+def earlier_runs(
+    runs: Sequence[HistoryRun], folder: Path, taken_at: str | None
+) -> list[HistoryRun]:
+    """Runs of other sessions that are known to be earlier than a session, in order.
+
+    A session of unknown time counts as the newest: to compare it with too many runs may
+    cost a GO, to compare it with none may give a wrong one.
+
+    Parameters
+    ----------
+    runs : calibrations of the device
+    folder, taken_at : of the session; None if its time is unknown
+
+    """
+    here, now = str(folder.resolve()), recording_time(taken_at)
+    others = [run for run in runs if run.session != here]
+    if now is None:
+        return others
+    known = [(recording_time(run.taken_at), run) for run in others]
+    return [run for at, run in known if at and at < now]
+
+
 class History:
     """The calibrations in the store.
 
@@ -80,8 +116,14 @@ class History:
 
         return Database(self.place)
 
-    def add(self, taken_at: str, session: Path, found: Calibration) -> None:
+    def add(self, taken_at: str | None, session: Path, found: Calibration) -> None:
         """Store a calibration; one of the same session is replaced.
+
+        Parameters
+        ----------
+        taken_at : time of the recording, ISO 8601; None if unknown
+        session : its folder
+        found : its calibration
 
         Raises
         ------
@@ -129,7 +171,7 @@ class History:
         query = (
             select(SESSION)
             .where(SESSION.c.serial == serial, SESSION.c.result.is_not(None))
-            .order_by(SESSION.c.taken_at, SESSION.c.id)
+            .order_by(SESSION.c.taken_at.nulls_first(), SESSION.c.id)
         )
         rows = self.database.run(lambda db: db.execute(query).all())
         return tuple(self._run(row) for row in rows)

@@ -14,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from fieldcal.core.errors import InputError
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.plugins import module_names, plugin_class
 from fieldcal.drivers import codec
 from fieldcal.importing.files.gzip_stream import first_bytes
@@ -50,7 +51,7 @@ def open_recording(
     Raises
     ------
     InputError
-        If it cannot be read, or nothing knows its format.
+        If it cannot be read, its path is not UTF-8, or nothing knows its format.
 
     """
     if name in codec.wire_formats():
@@ -71,6 +72,7 @@ def open_recording(
             f"{path}: is a pipe, and a recording is read more than once; write what"
             " comes through it to a file"
         )
+    refuse_undecodable_path(path)
     first = first_bytes(path)
     if not first:
         raise InputError(f"{path}: is empty; copy it again from where it came")

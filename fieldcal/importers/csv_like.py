@@ -242,7 +242,8 @@ class TextColumns(ColumnRecording):
             )
             if not n:
                 continue
-            t0 = block.t[0] if t0 is None else t0
+            if t0 is None:
+                t0 = self.began = float(block.t[0])
             with np.errstate(invalid="ignore"):  # a time beyond all is no time
                 since = block.t - t0 if self.from_first else block.t
             yield replace(block, t=since)

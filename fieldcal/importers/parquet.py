@@ -108,6 +108,11 @@ class ParquetFile(ColumnRecording):
                 else:
                     stream = pa.ipc.open_stream(file)
                     yield stream.schema, iter(stream)
+            except MemoryError as error:  # also of a damaged size
+                raise InputError(
+                    f"{self.path}: needs more memory than there is, or is damaged; copy"
+                    " it again, or shorten the recording"
+                ) from error
             except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
                 raise InputError(
                     f"{self.path}: is not whole: {error}; copy it again from where it"

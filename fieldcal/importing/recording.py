@@ -191,10 +191,12 @@ class Recording(ABC):
     mended : what was left out because it was damaged, grows likewise
     guessed : what was taken for what nobody said, and why, by what it is
     ends_early : whether it was cut off, as far as it was read
+    began : stamp of the first row, s, where times count from that row; nan if unknown
 
     """
 
     ends_early = False
+    began = float("nan")
     from_first = True
     """Whether times count from the first row, of formats whose zero says nothing."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from fieldcal.calibration.wording import format_unit, format_with_sigma
 from fieldcal.fleet.capability import LotParameter
 from fieldcal.fleet.control import ControlChart
-from fieldcal.fleet.lot import LotAnalysis
+from fieldcal.fleet.lot import LotAnalysis, untimed_sentence
 from fieldcal.report.blocks import (
     Cell,
     Figure,
@@ -155,9 +155,10 @@ def _values(found: LotAnalysis, one: LotParameter) -> Figure:
     return Figure(chart, "Bars are each unit's own ± 1σ.")
 
 
-def _units(found: LotAnalysis, one: LotParameter) -> Axis:
-    """Serial numbers of the units that have a parameter."""
-    serials = tuple(found.units[i].serial for i in one.unit_numbers.tolist())
+def _units(found: LotAnalysis, one: LotParameter, first: int = 0) -> Axis:
+    """Serial numbers of the units that have a parameter, from the `first` one."""
+    numbers = one.unit_numbers.tolist()[first:]
+    serials = tuple(found.units[i].serial for i in numbers)
     return Axis("unit, in order of time", names=serials)
 
 
@@ -168,6 +169,8 @@ def _control(found: LotAnalysis) -> list[ReportBlock]:
             " have an alarm on any chart."
         )
     ]
+    if found.untimed:
+        out.append(Paragraph(untimed_sentence(found)))
     for one in found.parameters.values():
         for chart in one.charts:
             out.append(Figure(_chart(found, one, chart), ""))
@@ -189,5 +192,5 @@ def _chart(found: LotAnalysis, one: LotParameter, chart: ControlChart) -> Chart:
     name = f"{chart.name}, {one.name}"
     return Chart(
         f"{chart.name}-{one.name}", name, f"{name}: {said}.",
-        _units(found, one), Axis(chart.name, "σ"), (seen, *limits),
+        _units(found, one, one.untimed), Axis(chart.name, "σ"), (seen, *limits),
     )  # fmt: skip

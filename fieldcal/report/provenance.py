@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fieldcal.core.file_names import storable_text
 from fieldcal.core.version import __version__
 from fieldcal.report.blocks import (
     Collapsible,
@@ -65,7 +66,7 @@ def _files(folder: Path) -> ReportBlock:
         if path.is_file() and path.name not in OWN and not path.name.startswith("."):
             with path.open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
-            rows.append([path.name, f"{path.stat().st_size:,}", digest])
+            rows.append([storable_text(path.name), f"{path.stat().st_size:,}", digest])
     return table("Files of the session", ("file", ">bytes", "SHA-256"), rows)
 
 

@@ -19,6 +19,7 @@ class ServiceBounds:
     jobs : number of unfinished jobs
     kept : number of finished jobs that are kept; the oldest are deleted first
     seconds : processor time of one job, s
+    memory : what one job may add to the memory of its process, bytes
 
     """
 
@@ -28,3 +29,4 @@ class ServiceBounds:
     jobs: int = 32
     kept: int = 1000
     seconds: int = 1800
+    memory: int = 4096 * MIB

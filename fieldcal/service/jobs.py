@@ -12,6 +12,7 @@ import secrets
 import shutil
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -151,20 +152,25 @@ class JobStore:
 
     def remove(self, number: str) -> bool:
         """Delete a job with all its files; returns whether there was one."""
-        if self.get(number) is None:
-            return False
         gone = self.root / f".{number}.part"
-        with self._lock:
+        with self._lock:  # two may delete it at the same time
+            if self.get(number) is None:
+                return False
             self.folder(number).rename(gone)
         shutil.rmtree(gone, ignore_errors=True)
         return True
 
     def documents(self, number: str) -> list[str]:
         """Names of the documents of a job."""
-        folder = self.folder(number) / RESULTS_FOLDER
-        return sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
+        try:
+            folder = self.folder(number) / RESULTS_FOLDER
+            return sorted(path.name for path in folder.iterdir())
+        except OSError:  # none yet, or deleted
+            return []
 
     def _make_room(self) -> None:
+        """Delete the oldest jobs that are over, unless the disk refuses."""
         over = [j for j in self.all() if j.state in ("done", "failed")]
         for job in over[self.bounds.kept :]:
-            self.remove(job.id)
+            with suppress(OSError):
+                self.remove(job.id)

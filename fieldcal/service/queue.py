@@ -7,13 +7,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from sqlalchemy.exc import DataError
+
 from fieldcal.core.errors import FieldcalError
 from fieldcal.fleet.workers import WorkerPool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
 from fieldcal.service.jobs import Job, JobStore
-from fieldcal.service.work import JobTask
+from fieldcal.service.work import JobTask, without_paths
 
 RETRY_INTERVAL = 10.0
 """Time after which a job is repeated whose result could not be stored, s."""
@@ -63,33 +65,47 @@ class JobQueue:
                 continue
             try:
                 self._process(waiting[0])
-            except (FieldcalError, OSError):
-                self._come.wait(
-                    RETRY_INTERVAL
-                )  # until the disk or the store can be written
+            except Exception:  # until the disk or the store can be written
+                self._come.wait(RETRY_INTERVAL)
 
     def _process(self, job: Job) -> None:
         job = self.jobs.update(job, state="working")
         folder = self.jobs.folder(job.id)
         for made in run_tasks([str(folder)], self.task, self.pool):
             one = made.value or StoredSession(made.item, error=made.error)
-            said = one.error
-            if said is None:
-                try:
-                    self.database.run(
-                        lambda db, one=one: sessions.store_session(db, one),  # type: ignore[misc]
-                        True,
-                    )
-                except FieldcalError as error:
-                    said = str(error)
+            said = one.error if one.error is not None else self._store(job, one)
             log = Path(folder / "import.log")
             with suppress(OSError):
                 job = self.jobs.update(job, log=log.read_text("utf-8"))
             self.jobs.update(
                 job,
                 state="done" if said is None else "failed",
-                error=said and said.replace(f"{folder}: ", ""),
+                error=said and without_paths(folder, said),
                 go=one.go,
                 good=one.good,
                 verdict=(one.diagnosis or {}).get("verdict"),
             )
+
+    def _store(self, job: Job, one: StoredSession) -> str | None:
+        """Store a result; returns why it can never be stored, or None.
+
+        Raises
+        ------
+        FieldcalError
+            If the store cannot be written now; the job states it.
+
+        """
+        try:
+            self.database.run(lambda db: sessions.store_session(db, one), write=True)
+        except Exception as error:
+            if isinstance(error, FieldcalError) and not isinstance(
+                error.__cause__, DataError
+            ):
+                later = "its result cannot be stored now and is tried again"
+                self.jobs.update(job, state="waiting", error=later)
+                raise
+            return (
+                f"its result cannot be stored ({type(error).__name__}); have whoever"
+                " keeps this service report it with the session"
+            )
+        return None

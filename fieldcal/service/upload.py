@@ -20,6 +20,9 @@ from fieldcal.session.folder import DESCRIPTION
 
 BYTES_AT_ONCE = MIB
 
+LONGEST_NAME = 100
+"""Largest length of the name of a file in an archive, characters."""
+
 
 def archive_members(path: Path, bounds: ServiceBounds) -> list[zipfile.ZipInfo]:
     """Files in an archive; empty if the file is no archive.
@@ -70,7 +73,7 @@ def session_members(
     Raises
     ------
     InputError
-        If a file is in another folder.
+        If a file is in another folder, or a name is too long.
 
     """
     named = [one for one in found if PurePosixPath(one.filename).name == DESCRIPTION]
@@ -87,6 +90,11 @@ def session_members(
             raise InputError(
                 f"{escape_line(one.filename)}: does not lie beside {DESCRIPTION}: pack"
                 " the files of the session's folder and nothing else"
+            )
+        if len(path.name) > LONGEST_NAME:
+            raise InputError(
+                f"{escape_line(path.name[:LONGEST_NAME])}…: the name is longer than"
+                f" {LONGEST_NAME} characters: rename that file"
             )
         if path.name.startswith("."):
             continue  # files of the operating system
@@ -126,6 +134,10 @@ def unpack(
                         out.write(piece)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
         raise InputError(f"the archive is damaged: {error}; send it again") from error
+    except OSError as error:
+        raise InputError(
+            f"the archive cannot be unpacked: {error.strerror}; send it again later"
+        ) from error
     about = description.read_description(folder / DESCRIPTION)
     run = about.raw.get("run")
     if isinstance(run, Mapping) and "limits" in run:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-import resource
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -13,17 +13,18 @@ from pathlib import Path
 
 from fieldcal.core.errors import FieldcalError, InputError
 from fieldcal.core.escaping import escape_invisible
-from fieldcal.fleet.outcome import SessionTask
+from fieldcal.fleet.outcome import OUT_OF_MEMORY, SessionTask
 from fieldcal.history.sessions import StoredSession
 from fieldcal.report import gather, render
 from fieldcal.run import junit
-from fieldcal.service.bounds import ServiceBounds
+from fieldcal.service.bounds import MIB, ServiceBounds
 from fieldcal.service.jobs import (
     JOB_FILE,
     RESULTS_FOLDER,
     SESSION_FOLDER,
     UPLOAD_FOLDER,
 )
+from fieldcal.service.limits import TimeUsedUp, resource_limits
 from fieldcal.service.records import station_record
 from fieldcal.service.upload import archive_members, session_members, unpack
 from fieldcal.session.folder import RESULT, Session, write_atomically
@@ -61,28 +62,43 @@ class JobTask:
         """Process a job; a failure is stated in ``error`` of the result."""
         place = Path(folder)
         try:
-            self._limit()
-            session = self._session(place)
+            with resource_limits(self.bounds):
+                one = self._processed(place)
         except FieldcalError as error:
-            return StoredSession(folder, error=_without_paths(place, str(error)))
-        one = SessionTask(diagnose=True)(str(session))
-        if one.error is not None:
-            return replace(one, error=_without_paths(place, one.error))
-        self._write(place, session, one)
-        return one
+            one = StoredSession(folder, error=str(error))
+        except MemoryError:
+            one = StoredSession(folder, error=self._memory_text)
+        except OSError as error:
+            said = f"a file cannot be written: {error.strerror}; send it again later"
+            one = StoredSession(folder, error=said)
+        except TimeUsedUp:
+            one = StoredSession(folder, error=self._time_text)
+        if one.error is None:
+            return one
+        return replace(one, error=without_paths(place, one.error))
 
-    def _limit(self) -> None:
-        """Set resource limits of this process, which carries out one job only."""
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        spent = int(used.ru_utime + used.ru_stime)
-        for what, most in (
-            (resource.RLIMIT_CPU, spent + self.bounds.seconds),
-            (resource.RLIMIT_FSIZE, 2 * self.bounds.unpacked),
-            (resource.RLIMIT_CORE, 0),
-        ):
-            _, hard = resource.getrlimit(what)
-            least = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            resource.setrlimit(what, (least, hard))
+    @property
+    def _time_text(self) -> str:
+        return (
+            f"took more than {self.bounds.seconds / 60:g} min of processor time: send a"
+            " shorter recording, or have the service started with more --minutes"
+        )
+
+    @property
+    def _memory_text(self) -> str:
+        return (
+            f"needs more than {self.bounds.memory // MIB} MiB of memory: send a shorter"
+            " recording, or have the service started with more --memory-mib"
+        )
+
+    def _processed(self, place: Path) -> StoredSession:
+        session = self._session(place)
+        one = SessionTask(diagnose=True)(str(session))
+        if one.error is None:
+            self._write(place, session, one)
+        elif OUT_OF_MEMORY in one.error:
+            raise MemoryError
+        return one
 
     def _session(self, place: Path) -> Path:
         """Folder of the job's session; made unless it exists.
@@ -119,9 +135,14 @@ class JobTask:
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
         text = escape_invisible(done.stderr.decode("utf-8", "replace"))[-LONGEST_LOG:]
+        text = without_paths(sent.parent.parent, text)
         write_atomically(sent.parent.parent / "import.log", text)
         if done.returncode:
             shutil.rmtree(part, ignore_errors=True)
+            if done.returncode == -signal.SIGXCPU:
+                raise InputError(self._time_text)
+            if "MemoryError" in text:
+                raise InputError(self._memory_text)
             last = text.strip().splitlines()[-1:] or ["import was killed"]
             raise InputError(last[0].removeprefix("fieldcal import: "))
         if not (part / "session.toml").is_file():
@@ -151,9 +172,14 @@ class JobTask:
         part.rename(there)
 
 
-def _without_paths(place: Path, text: str) -> str:
-    """Text without the paths of this computer."""
+def without_paths(place: Path, text: str) -> str:
+    """Text without the paths of this computer, of the folder of a job and of crashes.
+
+    >>> without_paths(Path("/srv/1"), "/srv/1/upload/x: is bad; send in /tmp/a/b.txt")
+    'x: is bad; send in b.txt'
+    """
     inside = (
         rf"{re.escape(str(place))}/?(\.?{SESSION_FOLDER}(\.part)?/?|{UPLOAD_FOLDER}/)?"
     )
-    return re.sub(inside, "", text).removeprefix(": ")
+    text = re.sub(inside, "", text).removeprefix(": ")
+    return re.sub(r"(?<![\w.^/)])/(?:[^/\s]+/)+(?=[^/\s])", "", text)

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldcal.calibration import Gauge
 from fieldcal.core.base_motion import BaseMotion
-from fieldcal.core.documents import load_toml
+from fieldcal.core.documents import json_values, load_toml
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.frames import (
@@ -44,7 +44,7 @@ class Description:
 
     Attributes
     ----------
-    device : table [device]: name, serial, …
+    device : table [device]: name, serial, …; values that JSON can represent
     grade : "consumer", "tactical", or "navigation" if the gyroscopes measure the
         Earth's rate
     rate_hz : nominal sampling rate, None where unknown
@@ -268,7 +268,7 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
     if grade != "navigation" and level is not None:
         level = float(np.hypot(level, np.rad2deg(moving.force_tilt)))
     return Description(
-        device=device,
+        device=json_values(device),
         grade=grade,
         rate_hz=_optional_float(raw.get("sampling", {}).get("rate_hz")),
         units=units,

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.session import description, sample_files
@@ -65,10 +66,12 @@ class Session:
         Raises
         ------
         SessionError
-            If it is no session folder, or session.toml or marks.jsonl cannot be used.
+            If it is no session folder, its path is not UTF-8, or session.toml or
+            marks.jsonl cannot be used.
 
         """
         folder = Path(folder)
+        refuse_undecodable_path(folder)
         about = description.read_description(folder / DESCRIPTION)
         says: list[str] = []
         marks = list(read_marks(folder / MARKS, says))

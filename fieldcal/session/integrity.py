@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError, SessionError
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.session import description, sample_files
 from fieldcal.session.folder import DESCRIPTION, RESULT
 from fieldcal.session.marks import MARKS, read_marks
@@ -44,9 +45,10 @@ def file_faults(folder: Path) -> Iterator[FileFault]:
     Raises
     ------
     SessionError
-        If there is no session.toml.
+        If there is no session.toml, or the path is not UTF-8.
 
     """
+    refuse_undecodable_path(folder)
     yield from _description(folder)
     yield from _samples(folder)
     yield from _marks(folder / MARKS)

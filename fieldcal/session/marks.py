@@ -12,9 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from fieldcal.core.documents import load_json
+from fieldcal.core.documents import json_values, load_json
 from fieldcal.core.errors import SessionError
 
 MARKS = "marks.jsonl"
@@ -31,19 +29,8 @@ def mark_line(mark: Mapping[str, Any]) -> str:
 
     nan and infinity become null, so that each line is JSON.
     """
-    text = json.dumps(_valid(mark), allow_nan=False)
+    text = json.dumps(json_values(mark), allow_nan=False)
     return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
-
-
-def _valid(value: Any) -> Any:
-    """Value that JSON can represent: nan and infinity become null."""
-    if isinstance(value, Mapping):
-        return {key: _valid(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_valid(each) for each in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:

@@ -23,6 +23,7 @@ from typing import Any, Self
 import numpy as np
 
 from fieldcal.core.errors import SessionError, disk_says
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Block, concat
 from fieldcal.session.folder import DESCRIPTION, write_atomically
 from fieldcal.session.lock import SessionLock
@@ -88,8 +89,9 @@ class Recorder:
     Raises
     ------
     SessionError
-        If the folder holds a session already: nothing is ever overwritten. If another
-        process records into it. From any method, if the disk cannot be written.
+        If the folder holds a session already: nothing is ever overwritten. If its path
+        is not UTF-8, or another process records into it. From any method, if the disk
+        cannot be written.
 
     """
 
@@ -118,6 +120,7 @@ class Recorder:
 
     def _open(self, about: Mapping[str, Any] | None) -> None:
         """Lock the folder and open its files; if that fails, leave it as it was."""
+        refuse_undecodable_path(self.folder)
         new = not self.folder.exists()
         if about is not None:
             self.folder.mkdir(parents=True, exist_ok=True)

@@ -181,6 +181,11 @@ def _read_parquet(path: Path) -> pa.Table:
             )
         # no checksum covers the names: what was changed there may be no text
         return table.select([n for n in table.column_names if n in SAMPLE_COLUMNS])
+    except MemoryError as error:  # also of a damaged size, which nothing checks
+        raise SessionError(
+            f"{path}: needs more memory than there is, or is damaged; copy it again, or"
+            " shorten the recording"
+        ) from error
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
             raise

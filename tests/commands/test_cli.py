@@ -151,7 +151,9 @@ def test_a_wrong_plan_is_refused_before_anything_moves(
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("error", [MemoryError(), ValueError("odd"), KeyError("x")])
+@pytest.mark.parametrize(
+    "error", [MemoryError(), ValueError("odd"), KeyError("x"), OSError("caf\udce9")]
+)
 def test_what_nobody_foresaw_is_no_verdict(
     error: Exception,
     tmp_path: Path,

@@ -155,10 +155,10 @@ def test_a_link_that_stumbles_costs_nothing_but_time(
     several: dict[str, Future[Ended]], request: pytest.FixtureRequest, link: str
 ) -> None:
     run, code, result, said = several[request.node.name].result()
-    # the numbers are right, and a link like this is no link to launch with
-    assert code == 1 and result["verdict"] == "good", said
+    # the numbers are right, and if too many frames were refused, it is no link to use
     failed = [c["name"] for c in result["decision"]["checks"] if c["ok"] is False]
-    assert failed and all(name.startswith("link: ") for name in failed), failed
+    assert code == bool(failed) and result["verdict"] == "good", said
+    assert all(name.startswith("link: ") for name in failed), failed
     for group in ("acc_bias", "acc_scale", "gyr_bias"):
         found, truth = result["parameters"][group], run.truth[group]
         if "installed" in result and group == "gyr_bias":

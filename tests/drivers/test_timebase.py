@@ -210,3 +210,63 @@ def test_samples_that_a_counter_misses_are_counted_by_every_timebase() -> None:
             clock.times(np.full(10, np.nan), steps[some], host[some])
         counts.append((health.gaps, health.missing))
     assert counts == [(2, 502), (2, 502)]
+
+
+SPANS = {"text, 32 bit of us": 2**32 * 1e-6, "u-blox, 24 bit": 655.36, "CAN": 65.536}
+"""Times after which counters of devices wrap, s."""
+
+
+def away(
+    span: float, uptime: float, seconds: float, restarts: bool, speed: float = 1.0
+) -> tuple[LinkHealth, float]:
+    """The link's health, and the time that passed while a device was away.
+
+    Before, it ran for 20 s of the host; its clock may run faster than the host's.
+    """
+    health, shift = LinkHealth(), 1e-3
+    clock = StampTimebase(health, 0.0, span)
+    n, each = 2000, 0.01 * speed
+    t = uptime - n * each + each * np.arange(n)
+    host = 1000.0 + (t - t[0]) / speed
+    jitter = np.sort(np.random.default_rng(1).uniform(0.0, 0.05, n))
+    first = clock.times(t % span, np.ones(n), host + jitter)
+    begins = shift if restarts else uptime - each + seconds
+    t = begins + each * np.arange(n)
+    host = host[-1] + seconds / speed + (t - t[0]) / speed
+    second = clock.times(t % span, np.ones(n), host + jitter[-1])
+    assert (np.diff(np.concatenate([first, second])) > 0).all()
+    return health, float(second[0] - first[-1])
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "speed"),
+    [(name, share, 1.0) for name in SPANS for share in (0.35, 0.6, 0.8, 0.9)]
+    + [("text, 32 bit of us", share, 10.0) for share in (0.35, 0.6, 0.9)],
+)
+def test_a_restart_is_one_wherever_the_counter_is(
+    name: str, share: float, speed: float
+) -> None:
+    span = SPANS[name]
+    health, passed = away(span, share * span, 3.0, restarts=True, speed=speed)
+    assert health.restarts == 1
+    assert passed == pytest.approx(3.0 / speed, abs=0.1)
+
+
+@pytest.mark.parametrize("span", SPANS.values(), ids=SPANS)
+@pytest.mark.parametrize("spans", [0.1, 0.45, 0.6, 0.93, 1.001, 1.07, 2.5, 3.02])
+def test_as_many_spans_pass_as_the_host_saw(span: float, spans: float) -> None:
+    health, passed = away(span, 0.7 * span, spans * span, restarts=False)
+    assert health.restarts == 0
+    assert passed == pytest.approx(spans * span, rel=1e-3)
+
+
+def test_what_waited_in_a_buffer_did_not_wrap() -> None:
+    """Samples that come late, all at once, are those that were due before."""
+    health = LinkHealth()
+    clock = StampTimebase(health, 0.0, 65.536)
+    t = np.arange(12_000) * 0.01
+    host = 500.0 + t
+    host[2000:5000] = host[5000]  # half a span, and more
+    made = clock.times(t % 65.536, np.ones(len(t)), host)
+    np.testing.assert_allclose(np.diff(made), 0.01, rtol=1e-6)
+    assert (health.restarts, health.gaps, health.missing) == (0, 0, 0)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +132,73 @@ def test_it_goes_on_where_it_stopped_and_does_what_has_changed(
     assert batch.unprocessed() == []
     with (found[0] / "session.toml").open("a") as file:
         file.write("# mended\n")
+    assert batch.unprocessed() == [str(found[0])]
+
+
+class Unstorable(SessionTask):
+    """A task of which one result is none that JSON can represent."""
+
+    @property
+    def options(self) -> str:
+        return ""
+
+    def __call__(self, folder: str) -> sessions.StoredSession:
+        made = quick(folder)
+        return replace(made, result={"x": {1}}) if "station 1" in folder else made
+
+
+def test_a_result_that_cannot_be_stored_costs_no_other(
+    tree: Path, tmp_path: Path
+) -> None:
+    batch = SessionBatch(sessions_in([tree]), Unstorable(), Database(tmp_path / "h"))
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    done = list(batch.process(batch.unprocessed(), pool))
+    (odd,) = [one for one in done if one.error]
+    assert "station 1/session: its result cannot be stored" in (odd.error or "")
+    assert batch.unprocessed() == [odd.folder], "it is tried again"
+    (rows,) = batch.stored_rows()
+    assert len(rows) == len(batch.folders)
+
+
+def test_a_store_that_takes_nothing_ends_the_batch(tree: Path, tmp_path: Path) -> None:
+    (tmp_path / "h").write_bytes(b"no database at all" * 100)
+    batch = SessionBatch(sessions_in([tree]), Quick(), Database(tmp_path / "h"))
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    with pytest.raises(InputError, match="the history cannot be used"):
+        list(batch.process([str(folder) for folder in batch.folders], pool))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="every name is Unicode elsewhere")
+def test_a_folder_whose_name_is_not_utf_8_has_a_row(tree: Path, tmp_path: Path) -> None:
+    for name in (b"caf\xe9", b"caf"):
+        inner = tmp_path / os.fsdecode(name)
+        shutil.copytree(tree / "station 1" / "session", inner)
+    batch = SessionBatch(
+        sessions_in([tmp_path]), SessionTask(), Database(tmp_path / "h")
+    )
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    list(batch.process(batch.unprocessed(), pool))
+    assert batch.unprocessed() == []
+    batch.write(tmp_path / "t.parquet")
+    good, bad = pq.read_table(tmp_path / "t.parquet").to_pylist()
+    assert good["serial"] == "A1" and not good["error"]
+    assert bad["folder"].endswith(r"caf\udce9")
+    said = (
+        rf"{bad['folder']}: the name caf\udce9 is not UTF-8; rename that file or folder"
+    )
+    assert bad["error"] == said
+
+
+@pytest.mark.skipif(os.name != "posix", reason="every file can be read elsewhere")
+def test_a_session_that_cannot_be_looked_at_stops_no_resumed_batch(
+    tree: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(tree, tmp_path / "tree")
+    found = sessions_in([tmp_path / "tree"])
+    batch = SessionBatch(found, Quick(), Database(tmp_path / "h"))
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    list(batch.process(batch.unprocessed(), pool))
+    (found[0] / "samples.csv").symlink_to("nowhere")
     assert batch.unprocessed() == [str(found[0])]
 
 

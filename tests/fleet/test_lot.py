@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.stats import norm
 
 from fieldcal.calibration import limits
 from fieldcal.cli import main
+from fieldcal.commands.lot import lot_findings
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.capability import lot_parameter
 from fieldcal.fleet.control import cusum, cusum_limit, ewma, ewma_limit
@@ -21,6 +23,7 @@ from fieldcal.fleet.spread import estimate_distribution
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
+from fieldcal.report.lot_page import render_lot_page
 
 BOUNDS = limits.read("tactical")
 
@@ -227,6 +230,31 @@ def test_the_last_good_session_of_a_unit_counts() -> None:
     assert found.units[0].folder == "/s/0"
     with pytest.raises(InputError, match="a lot needs 5"):
         of(some[:4])
+
+
+def test_a_result_with_a_newer_error_is_a_result() -> None:
+    some = units(8)
+    some[3] = replace(some[3], error="its samples have changed and cannot be read")
+    assert of(some).failed == 0
+
+
+def test_units_of_unknown_time_are_in_no_chart() -> None:
+    drifting = units(drift=1.5)
+    unknown = [
+        replace(s, taken_at=None, serial=f"U{i}", folder=f"/u/{i}")
+        for i, s in enumerate(units(5, seed=9))
+    ]
+    found = of([*unknown, *drifting])
+    assert found.untimed == found.to_json()["units_of_unknown_time"] == 5
+    (since,) = {a.since for a in found.alarms if a.since}
+    assert since[0] == "A" and 70 <= int(since[1:]) <= 95
+    assert all(
+        len(c.values) == 150 for p in found.parameters.values() for c in p.charts
+    )
+    assert "5 units of unknown time: not in the control charts" in lot_findings(found)
+    assert "5 units of unknown time" in render_lot_page(found, "everything")
+    alone = of(unknown)
+    assert not alone.alarms and render_lot_page(alone, "everything")
 
 
 def test_the_command_reads_the_store_and_writes_a_page(

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ from fieldcal.cli import main
 from fieldcal.commands.history import trend_lines
 from fieldcal.commands.report import write_report
 from fieldcal.core.errors import InputError
-from fieldcal.evaluation.observations import observe, usable_windows
+from fieldcal.evaluation.observations import observe, usable_windows, with_provenance
 from fieldcal.history.location import default_location
 from fieldcal.history.store import History, family_runs
 from fieldcal.history.trend import parameter_trend
 from fieldcal.session.folder import Session
+from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.sim_device.profile import Profile
 from fieldcal.sim_device.replay import simulate
 from fieldcal.solve import solve
@@ -134,8 +136,11 @@ def test_the_place_is_that_of_the_user_unless_told(
     assert default_location() == Path("/data/fieldcal/history.sqlite")
 
 
-def bench(folder: Path) -> Session:
-    """A session of a virtual device with a serial number, two positions."""
+def bench(folder: Path, taken_at: str = "2026-06-01T10:00:00Z") -> Session:
+    """A session of a virtual device with a serial number, two positions.
+
+    Its time is unknown if `taken_at` is empty.
+    """
     import pyarrow as pa
     import pyarrow.parquet
 
@@ -151,6 +156,9 @@ def bench(folder: Path) -> Session:
         angles = f"alpha_deg = {np.rad2deg(alpha)}\nbeta_deg = {np.rad2deg(beta)}"
         lines_.append(f"[[position]]\n{angles}\nstart_s = {start}\nend_s = {end}")
     (folder / "session.toml").write_text("\n".join(lines_) + "\n")
+    if taken_at:
+        began = datetime.fromisoformat(taken_at).timestamp()
+        (folder / MARKS).write_text(mark_line({"event": "told", "host_s": began}))
     return Session.open(folder)
 
 
@@ -166,6 +174,62 @@ def test_old_values_do_not_enter_a_new_calibration(tmp_path: Path) -> None:
     go, no_go = clean.info["decision"], with_it.info["decision"]
     assert go["go"] and not no_go["go"]
     assert "acc_bias x differs from 9 earlier" in no_go["reasons"][0]
+
+
+def test_later_runs_are_no_earlier_ones(tmp_path: Path) -> None:
+    session = bench(tmp_path / "s", "2026-03-03T12:00:00Z")
+    found = solve(observe(session)[0], level_sigma_deg=0.001)
+    found = with_provenance(found, session.about)
+    still = usable_windows(session)
+    near = [float(found.value("acc_bias.x"))] * 3
+    history = filled(tmp_path / "h.sqlite", *near, *[1e6] * 9)
+    made = assess(found, session, still, BOUNDS, history)
+    assert made.info["decision"]["go"]
+    assert made.info["taken_at"] == "2026-03-03T12:00:00+00:00"
+    assert main(["solve", str(session.folder)]) in (0, 1)
+    page = write_report(session.folder, history=tmp_path / "h.sqlite").read_text()
+    assert "2026-03-03" in page and "2026-03-04" not in page
+    moved = session.folder.rename(tmp_path / "moved")
+    history.add("2026-03-03T12:00:00+00:00", session.folder, found)
+    page = write_report(moved, history=tmp_path / "h.sqlite").read_text()
+    assert "4 calibrations;" in page, "it is no earlier one of itself"
+
+
+def test_a_session_of_unknown_time_counts_as_the_newest_and_says_so(
+    tmp_path: Path,
+) -> None:
+    session = bench(tmp_path / "s", "")
+    found = solve(observe(session)[0], level_sigma_deg=0.001)
+    found = with_provenance(found, session.about)
+    still = usable_windows(session)
+    alone = assess(found, session, still, BOUNDS, History(tmp_path / "none"))
+    assert not any("is unknown" in w for w in alone.warnings)
+    history = filled(tmp_path / "h.sqlite", *[1e6] * 9)
+    made = assess(found, session, still, BOUNDS, history)
+    assert any("as if it were the newest" in w for w in made.warnings)
+    assert not made.info["decision"]["go"] and made.info["taken_at"] is None
+    assert store_in_history(history, session, made) == ""
+    assert history.runs("A1")[0].taken_at == ""
+
+
+def test_calibrations_of_unknown_time_are_listed_and_left_out_of_the_plot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("matplotlib")
+    history, picture = History(tmp_path / "h.sqlite"), tmp_path / "p.png"
+    own = ["history", "A1", "--history", str(tmp_path / "h.sqlite")]
+    history.add(None, Path("/s/unknown"), calibration(0.2))
+    assert main(own[:1] + own[2:]) == 0
+    assert "the last at an unknown time" in capsys.readouterr().out
+    assert main([*own, "--png", str(picture)]) == 2
+    assert "no calibration has a time" in capsys.readouterr().err
+    filled(tmp_path / "h.sqlite", 0.2, 0.21)
+    assert main([*own, "--png", str(picture)]) == 0
+    said = capsys.readouterr()
+    assert "1 of unknown time left out" in said.err and picture.exists()
+    assert "  1 ?          " in said.out
+    assert main([*own, "--compare", "1", "2"]) == 0
+    assert "1: at an unknown time," in capsys.readouterr().out
 
 
 def test_only_runs_that_were_go_or_accepted_are_the_family(tmp_path: Path) -> None:

@@ -95,6 +95,35 @@ def test_a_failure_takes_no_result_away(tmp_path: Path) -> None:
     assert [one.error for one in everything(place)] == [None, None]
 
 
+@pytest.mark.parametrize("error_between", [False, True])
+def test_a_session_whose_serial_number_was_corrected_is_one_unit(
+    tmp_path: Path, error_between: bool
+) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1, serial="A-1"), stored(2))
+    (first,) = History(place).runs("A-1")
+    History(place).accept("A-1", first.number)
+    between = [StoredSession("/s/1", error="no")] if error_between else []
+    put(place, *between, stored(1))
+    assert everything(place) == [stored(1), stored(2)]
+    assert History(place).serials() == [("A1", 2, "")]
+    runs = History(place).runs("A1")
+    assert {r.session: r.accepted for r in runs} == {"/s/1": True, "/s/2": False}
+
+
+def test_a_session_that_is_stored_twice_already_is_one_again(tmp_path: Path) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1), replace(stored(2), serial="A-1"))
+    with closing(sqlite3.connect(place)) as db:
+        db.execute("UPDATE session SET folder = '/s/1'")
+        db.commit()
+    assert len(everything(place)) == 2
+    put(place, stored(1))
+    assert everything(place) == [stored(1)]
+    with closing(sqlite3.connect(place)) as db:
+        assert db.execute("SELECT count(*) FROM reduced").fetchone() == (1,)
+
+
 def test_a_history_of_before_the_store_is_taken_over(tmp_path: Path) -> None:
     place = tmp_path / "h.sqlite"
     result = json.dumps(calibration().to_json())
@@ -202,12 +231,101 @@ def test_a_word_that_is_no_condition_is_refused() -> None:
             sessions.parse_filters([wrong])
 
 
+@pytest.mark.parametrize(
+    ("word", "found"),
+    [
+        ("until=2026-9-30", [1, 2]),
+        ("since=2026-9-30", [2, 3]),
+        ("since=2026-10", [3]),
+        ("until=2026-9", [1, 2]),
+        ("until=2025", []),
+        ("since=2026-09-30T14:00:00+02:00", [2, 3]),
+        ("since=2026-09-30T12:00:01", [3]),
+        ("until=2026-09-30T12:00", [1, 2]),
+    ],
+)
+def test_dates_are_dates_however_they_are_written(
+    tmp_path: Path, word: str, found: list[int]
+) -> None:
+    days = ("2026-02-01", "2026-09-30", "2026-11-01")
+    some = [
+        stored(i, taken_at=f"{day}T12:00:00+00:00") for i, day in enumerate(days, 1)
+    ]
+    put(tmp_path / "h", *some, stored(4))
+    wanted = sessions.parse_filters([word])
+    assert [int(s.folder[3:]) for s in everything(tmp_path / "h", **wanted)] == found
+    data = Database(tmp_path / "h")
+    said = data.run(lambda db: sessions.untimed_sentence(db, wanted))
+    assert said == "sessions of unknown time that are left out: 1"
+    assert data.run(lambda db: sessions.untimed_sentence(db, {"serial": "A1"})) == ""
+
+
+@pytest.mark.parametrize("value", ["November", "", "30.9.2026", "2026-13-01", "1-2-3"])
+def test_what_is_no_date_is_said_to_be_none(value: str) -> None:
+    with pytest.raises(InputError, match=f"since={value}: is no date .*write it as"):
+        sessions.parse_filters([f"since={value}"])
+
+
 def test_an_address_that_is_none_is_said_without_its_password() -> None:
     with pytest.raises(InputError, match="is no address of a store"):
         everything("nothing://x/y")
     with pytest.raises(InputError, match="cannot be used") as told:
         everything("postgresql://lab:secret@127.0.0.1:1/imus")
     assert "secret" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "mysql://lab:secret@db/imu",
+        "nothing://lab:secret@x/y",
+        "postgresql://lab:se@cret@db:port/imu",
+        "://lab:secret@db",
+        "mysql://db/imu?user=lab&password=secret",
+    ],
+)
+def test_no_password_of_an_address_that_is_not_understood_is_said(address: str) -> None:
+    with pytest.raises(InputError, match="is no address of a store") as told:
+        everything(address)
+    assert "cret" not in str(told.value) and "***" in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["what?x=1.sqlite", "a#b", "100%25.sqlite", "a b&c"])
+def test_a_file_of_any_name_is_written_and_read(tmp_path: Path, name: str) -> None:
+    put(tmp_path / name, stored(1))
+    assert (tmp_path / name).is_file() and everything(tmp_path / name) == [stored(1)]
+
+
+def test_a_first_write_that_was_killed_leaves_an_empty_store(tmp_path: Path) -> None:
+    killed = (
+        "import os, signal, sys\nfrom fieldcal.history.database import Database\n"
+        "Database(sys.argv[1]).run("
+        "lambda db: os.kill(os.getpid(), signal.SIGKILL), write=True)"
+    )
+    subprocess.run([sys.executable, "-c", killed, str(tmp_path / "h")], check=False)
+    assert (tmp_path / "h").exists()
+    assert everything(tmp_path / "h") == [] and History(tmp_path / "h").serials() == []
+    put(tmp_path / "h", stored(1))
+    assert everything(tmp_path / "h") == [stored(1)]
+
+
+def test_a_first_write_that_fails_leaves_an_empty_store(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError):
+        Database(tmp_path / "h").run(lambda _: 1 // 0, write=True)
+    assert everything(tmp_path / "h") == []
+
+
+@pytest.mark.parametrize("write", [False, True])
+def test_a_database_of_another_program_is_left_alone(
+    tmp_path: Path, write: bool
+) -> None:
+    with closing(sqlite3.connect(tmp_path / "other")) as db:
+        db.execute("CREATE TABLE urls (url TEXT)")
+        db.commit()
+    before = (tmp_path / "other").read_bytes()
+    with pytest.raises(InputError, match="is no history of this version"):
+        Database(tmp_path / "other").run(lambda _: None, write)
+    assert (tmp_path / "other").read_bytes() == before
 
 
 # -- a real PostgreSQL

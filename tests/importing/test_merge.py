@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from laid_about import G, turned, write
 
+from fieldcal.acceptance.assessment import start_time
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
+from fieldcal.fleet.outcome import SessionTask
 from fieldcal.session.folder import Session
 
 FACES = [*np.eye(3), *-np.eye(3)]
@@ -41,6 +43,37 @@ def brought(folder: Path, files: list[str]) -> Session:
     call = ["import", *files, "--in-order", "-o", str(out), "--gravity", str(G)]
     assert main(call) == 0
     return Session.open(out)
+
+
+def stamped(path: Path, rows: Array, columns: list[int]) -> Path:
+    """A file of some columns with stamps to the microsecond."""
+    names = [HEADING.split(",")[i] for i in columns]
+    lines = [",".join(f"{row[i]:.6f}" for i in columns) for row in rows]
+    path.write_text("\n".join([",".join(names), *lines]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("how", ["--in-order", "--join", ""])
+@pytest.mark.parametrize(
+    ("starts", "time"),
+    [(1714564800.0, "2024-05-01T12:00:00+00:00"), (0.4, None), (3.9e9, None)],
+)
+def test_a_recording_is_of_the_time_that_its_stamps_tell(
+    tmp_path: Path, how: str, starts: float, time: str | None
+) -> None:
+    rows = [face(i, starts + 9.0 * i) for i in range(2)]
+    every = list(range(7))
+    parts = {
+        "--in-order": [(rows[0], every), (rows[1], every)],
+        "--join": [(rows[0], [0, 1, 2, 3]), (rows[0], [0, 4, 5, 6])],
+        "": [(np.concatenate(rows), every)],
+    }[how]
+    files = [str(stamped(tmp_path / f"{i}.csv", *p)) for i, p in enumerate(parts)]
+    out = tmp_path / "out"
+    call = ["import", *files, *filter(None, [how]), "-o", str(out), "--gravity", str(G)]
+    assert main(call) == 0
+    assert start_time(list(Session.open(out).marks())) == time
+    assert SessionTask()(str(out)).taken_at == time
 
 
 def test_a_file_for_each_position_is_one_session(

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,11 @@ from hypothesis import strategies as st
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Block
+from fieldcal.importers import open_recording
+from fieldcal.importing.recording import ReadOptions
 from fieldcal.session import description, sample_files
 from fieldcal.session.folder import Session
+from fieldcal.session.integrity import file_faults
 from fieldcal.session.recorder import Recorder
 
 HEAD = "t,ax,ay,az,gx,gy,gz"
@@ -46,6 +50,31 @@ def test_units_become_si_and_missing_values_stay_missing(tmp_path: Path) -> None
     np.testing.assert_allclose(got.gyr[0], [np.pi, 0, 0])
     assert np.isnan(got.acc[1, :2]).all() and np.isnan(got.temperature[1])
     assert np.isnan(got.seq).all()
+
+
+def test_what_else_is_said_of_a_device_can_be_stored(tmp_path: Path) -> None:
+    toml = "[device]\nbought = 2026-01-02\nat = 2026-01-02T03:04:05Z\n"
+    toml += "limits = [1.5, inf, {worst = nan}]\n"
+    device = Session.open(folder(tmp_path, toml)).about.device
+    assert json.loads(json.dumps(device, allow_nan=False)) == {
+        "bought": "2026-01-02",
+        "at": "2026-01-02T03:04:05+00:00",
+        "limits": [1.5, None, {"worst": None}],
+    }
+
+
+@pytest.mark.skipif(os.name != "posix", reason="every name is Unicode elsewhere")
+def test_a_name_that_is_not_utf_8_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    inner = folder(tmp_path / os.fsdecode(b"caf\xe9")) / "a"
+    says = r"a: the name caf\\udce9 is not UTF-8; rename"
+    with pytest.raises(SessionError, match=says):
+        Session.open(folder(inner))
+    with pytest.raises(SessionError, match=says):
+        Recorder(inner, {"format": 1})
+    with pytest.raises(SessionError, match=says):
+        list(file_faults(inner))
+    with pytest.raises(InputError, match="is not UTF-8; rename"):
+        open_recording(inner / "samples.csv", ReadOptions())
 
 
 def test_every_file_kind_gives_the_same_samples(tmp_path: Path) -> None:

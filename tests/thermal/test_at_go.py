@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from fieldcal.evaluation.observations import observe, usable_windows, with_prove
 from fieldcal.history.store import History, HistoryRun
 from fieldcal.history.trend import parameter_trend
 from fieldcal.session.folder import Session
+from fieldcal.session.marks import MARKS, mark_line
 from fieldcal.sim_device.profile import Climate, NoiseFigures, Profile, Truth
 from fieldcal.sim_device.replay import simulate
 from fieldcal.solve import solve
@@ -57,6 +59,8 @@ def assessed(folder: Path, temperature: float, seed: int) -> Calibration:
     site = {"latitude_deg": 50.45, "height_m": 170.0, "angle_setting_deg": 0.02}
     block = simulate(profile, windows, seed=seed)
     write_session(folder, block, positions, site=site, device={"serial": "SIM-1"})
+    days = (datetime(2026, 3, 1, tzinfo=UTC) + timedelta(days=seed)).timestamp()
+    (folder / MARKS).write_text(mark_line({"event": "told", "host_s": days}))
     recorded, history = Session.open(folder), History(folder.parent / "h.db")
     means = with_provenance(solve(observe(recorded)[0]), recorded.about)
     found = assess(means, recorded, usable_windows(recorded), BOUNDS, history)

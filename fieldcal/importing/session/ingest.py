@@ -13,6 +13,7 @@ from time import time
 from typing import Any
 
 from fieldcal.core.errors import InputError, SessionError, disk_says
+from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
@@ -23,6 +24,7 @@ from fieldcal.importing.session.validation import (
     SampleWriter,
     file_record,
 )
+from fieldcal.importing.units.time_units import recording_date
 from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
@@ -74,11 +76,13 @@ def import_stream(
     Raises
     ------
     InputError
-        If the recording cannot be used; names file, row and column.
+        If the recording cannot be used, naming file, row and column; or the folder's
+        path is not UTF-8.
     SessionError
         If the folder cannot be written.
 
     """
+    refuse_undecodable_path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; name another folder with -o")
     try:
@@ -207,6 +211,7 @@ def _marks(
 ) -> str:
     """Marks that record the origin of the samples."""
     now = round(time(), 3)
+    stamps = (recording.began, facts.start_s, facts.first_arrival_s)
     imported = {
         "event": "imported",
         "files": [file_record(path) for path in recording.files()],
@@ -215,6 +220,7 @@ def _marks(
         **facts.table(),
         "repairs": repairs,
         "says": recording.says,
+        "taken_at": recording_date(stamps, now),
         "host_s": now,
     }
     notes = dict(recording.notes(stream))

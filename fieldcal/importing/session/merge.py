@@ -129,6 +129,7 @@ class FilesInOrder(SeveralFiles):
         Behind a file that ended at `last`, to whose times `before` was added.
         """
         if np.isnan(last):
+            self.began = begins
             return -begins
         if begins + before > last:
             return before
@@ -176,11 +177,12 @@ class MergedFiles(SeveralFiles):
         return None
 
     def _aligned(self, acc: Recording, gyr: Recording) -> Iterator[Block]:
-        pair, begin = AlignedPair(), np.nan
+        pair, begin = AlignedPair(), float("nan")
         flows = [_with_clock_times(p).blocks(_name(p)) for p in (acc, gyr)]
         together = False
         for block in pair.through(*flows):
-            begin = float(block.t[0]) if np.isnan(begin) and len(block) else begin
+            if np.isnan(begin) and len(block):
+                begin = self.began = float(block.t[0])
             together = together or bool(np.isfinite(block.gyr).any())
             yield replace(block, t=block.t - begin)
         if not together:
@@ -208,6 +210,7 @@ class MergedFiles(SeveralFiles):
             yield self._merged([block[:n] for block in waiting], row)
             waiting = [block[n:] for block in waiting]
             row += n
+        self.began = self.parts[0].began
         for part, block in zip(self.parts, waiting, strict=True):
             if len(block):
                 raise InputError(

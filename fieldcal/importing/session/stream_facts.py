@@ -45,6 +45,7 @@ class StreamFacts:
     pauses, paused_s : those of them that last a second, and the duration of all these
     coldest, warmest : deg C, None where there is no temperature
     left_out : rows that were left out, where that was asked for
+    first_arrival_s : of the first sample by the host's clock, s; nan if unknown
     measured : "a" if any accelerometer has a number, and "g" if any gyroscope has
 
     """
@@ -59,6 +60,7 @@ class StreamFacts:
     coldest: float | None = None
     warmest: float | None = None
     left_out: int = 0
+    first_arrival_s: float = float("nan")
     measured: str = ""
     _period: float = float("nan")
 
@@ -66,6 +68,7 @@ class StreamFacts:
         """Take in the block that follows."""
         if not self.rows:
             self.start_s = float(block.t[0])
+            self.first_arrival_s = float(block.t_host[0])
             self._period = mean_period(block.t)
         pause = float(block.t[0]) - self.end_s if self.rows else 0.0
         steps = block.t[1:] - block.t[:-1]

@@ -6,6 +6,8 @@ spreadsheet apart. Where the file says the rate, that tells its ticks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from datetime import UTC, datetime
 from typing import NamedTuple
 
 import numpy as np
@@ -207,3 +209,23 @@ def _step(t: Array) -> float:
     steps = np.diff(t[np.isfinite(t)])
     steps = steps[steps > 0]
     return float(np.median(steps)) if len(steps) else 0.0
+
+
+def recording_date(stamps: Iterable[float], now: float) -> str | None:
+    """Time of a recording by the stamps of its first sample, ISO 8601 in UTC.
+
+    None if no stamp counts from 1970. A later time than the present is that of a clock
+    that was never set.
+
+    Parameters
+    ----------
+    stamps : of the first sample by several clocks, s; nan where there is none
+    now : the present time since 1970, s
+
+    >>> recording_date([12.5, 1714564800.5], now=1.8e9), recording_date([12.5], 1.8e9)
+    ('2024-05-01T12:00:00+00:00', None)
+    """
+    for stamp in stamps:
+        if UNIX[0] <= stamp <= min(now, UNIX[1]):
+            return datetime.fromtimestamp(stamp, UTC).isoformat(timespec="seconds")
+    return None

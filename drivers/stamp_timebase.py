@@ -7,9 +7,9 @@ the last update,
     t_k = u + k T,  u = min(max(u, s_k - k T), s_k + q - k T)               (1)
 
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
-counter is unwrapped first, by as many spans as the time tells that passed on the host,
-at the device's rate so far. Until that is known, a span is added where the counter
-falls by more than half of it. A clock that falls by more than `RESTART_BACKWARD`
+counter is unwrapped first: a span is added where it falls by more than half of it. If
+that contradicts the time that passed on the host, at the device's rate so far, as many
+spans are added as that time tells. A clock that falls by more than `RESTART_BACKWARD`
 without such a wrap, or leaps by more than `RESTART_FORWARD` and by more than passed on
 the host, was restarted: time goes on from the last sample by the time that passed on
 the host.
@@ -182,8 +182,10 @@ class StampTimebase:
         if self._span == _INF:
             return 0
         moved, (passed, error) = stamp - self._stamp, self._passed(host)
-        if passed != passed:
-            return int(moved < -self._span / 2)
+        fewest = int(moved < -self._span / 2)
+        # a span may be shorter than what is usual between arrivals
+        if passed != passed or abs(moved + fewest * self._span - passed) <= error:
+            return fewest
         wraps = max(round((passed - moved) / self._span), int(moved < 0))
         told = moved + wraps * self._span
         if moved < 0:  # samples that waited in a buffer come after less time

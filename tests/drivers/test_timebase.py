@@ -270,3 +270,32 @@ def test_what_waited_in_a_buffer_did_not_wrap() -> None:
     made = clock.times(t % 65.536, np.ones(len(t)), host)
     np.testing.assert_allclose(np.diff(made), 0.01, rtol=1e-6)
     assert (health.restarts, health.gaps, health.missing) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("span", [2**16 * 1e-6, 0.65536])
+@pytest.mark.parametrize("stall", [0.1, 0.5, 1.5])
+def test_short_spans_are_not_counted_by_late_arrivals(
+    span: float, stall: float
+) -> None:
+    """A counter of 16 bits may wrap several times between two arrivals."""
+    health = LinkHealth()
+    t = np.arange(6000) * 0.01
+    host = 500.0 + t
+    for at in range(1000, 5000, 97):
+        late = slice(at, at + round(100 * stall))
+        host[late] = np.maximum(host[late], 500.0 + t[late.stop])
+    made = StampTimebase(health, span=span).times(t % span, np.ones(len(t)), host)
+    np.testing.assert_allclose(made, t, atol=1e-6)
+    assert (health.restarts, health.gaps, health.missing) == (0, 0, 0)
+
+
+def test_samples_that_overtake_each_other_are_no_wrap() -> None:
+    health = LinkHealth()
+    t = np.arange(6000) * 0.01
+    stamps = t % 0.65536
+    before = 2010  # in the middle of a span
+    assert 0.1 < stamps[before] < 0.5
+    stamps[[before, before + 1]] = stamps[[before + 1, before]]
+    made = StampTimebase(health, span=0.65536).times(stamps, np.ones(len(t)), 500.0 + t)
+    assert made[-1] == pytest.approx(t[-1])
+    assert health.repeated == 1

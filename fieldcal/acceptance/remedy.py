@@ -112,7 +112,7 @@ def cheapest_remedy(
         return None
     of_gyr = {name for name in over if sensor_of(group_of(name)) == "gyr"}
     if len(of_gyr) == len(over):
-        return _hold_longer(calibration, about, had, over, seconds, others)
+        return _hold_longer(calibration, about, numbers, over, seconds, others)
     # further positions determine the accelerometers, gyroscopes have to be held longer
     groups = dict.fromkeys(group_of(name) for name in of_gyr)
     left = [*others, *(group + UNCERTAINTY for group in groups)]
@@ -150,15 +150,16 @@ def _limit_ratios(
 def _hold_longer(
     calibration: Calibration,
     about: Description,
-    had: Sequence[Position],
+    numbers: Sequence[int],
     over: dict[str, float],
     seconds: float,
     left: Sequence[str],
 ) -> Remedy | None:
-    """Remedy for gyroscopes: a longer mean in the present position.
+    """Remedy for gyroscopes: a longer mean in the last position that was held.
 
     The part of the uncertainty from g-sensitivity and the mean force does not change.
     """
+    had = [about.positions[i] for i in numbers]
     force = specific_forces(had, about.gravity).mean(axis=0)
     stays = factory_errors_used(calibration).g_sensitivity * float(
         np.linalg.norm(force)
@@ -169,13 +170,14 @@ def _hold_longer(
         kept = stays if group_of(name) == "gyr_bias" else 0.0
         room = (LIMIT_SHARE * sigma / part) ** 2 - kept**2
         times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
-    whole = seconds * len(about.positions)
-    last = about.positions[-1].degrees
+    whole = seconds * len(had)
+    last = had[-1].degrees
     if not whole * (times - 1) <= MAX_HOLD_S or last is None:
         return None
     more = float(np.ceil(whole * (times - 1) / 5) * 5)
-    number = len(about.positions)
-    says = f"hold position {number} for {more:.0f} s more: {_expectation(left)}"
+    says = (
+        f"hold position {numbers[-1] + 1} for {more:.0f} s more: {_expectation(left)}"
+    )
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
 
 

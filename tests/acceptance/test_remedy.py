@@ -100,6 +100,17 @@ def test_gyroscopes_need_time_and_no_turn(tmp_path: Path) -> None:
     assert remedy.seconds == pytest.approx(150 * ((1.1 / 0.9) ** 2 - 1), abs=5.0)
 
 
+def test_what_was_left_out_gave_the_gyroscopes_no_time(tmp_path: Path) -> None:
+    names = tuple(f"gyr_bias.{a}" for a in "xyz")
+    found = found_with(names, [1e-4, 1e-4, 1.1 * LIMITS.gyr_bias_sigma])
+    session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS])
+    args = LIMITS, ["gyr_bias"], 1e-3, 30.0
+    remedy = cheapest_remedy(found, session.about, [0, 1, 3], *args)
+    assert remedy is not None and remedy.says.startswith("hold position 4 for ")
+    assert remedy.positions == (session.about.positions[3].degrees,)
+    assert remedy.seconds == pytest.approx(90 * ((1.1 / 0.9) ** 2 - 1), abs=5.0)
+
+
 def test_what_gyroscopes_feel_of_gravity_no_time_takes_away(tmp_path: Path) -> None:
     """Six faces have none of it in their mean; home alone has all of it."""
     limit = LIMITS.gyr_bias_sigma

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fieldcal.acceptance.check import MENDABLE_CHECKS
 from fieldcal.acceptance.factory import factory_errors_used
 from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
@@ -124,10 +125,14 @@ def cheapest_remedy(
 
 def _expectation(left: Sequence[str]) -> str:
     """What a remedy leads to, if some failed checks are left as they are."""
-    if not left:
-        return "then GO is expected"
-    verb, more = ("fails", "has") if len(left) == 1 else ("fail", "have")
-    return f"then {join_words(left)} still {verb}, and {more} to be mended as well"
+    stays = [name for name in left if name not in MENDABLE_CHECKS]
+    if stays:
+        verb, more = ("fails", "has") if len(stays) == 1 else ("fail", "have")
+        return f"then {join_words(stays)} still {verb}, and {more} to be mended as well"
+    if left:
+        verb = "passes" if len(left) == 1 else "pass"
+        return f"then GO is expected if {join_words(left)} {verb} as well"
+    return "then GO is expected"
 
 
 def _limit_ratios(

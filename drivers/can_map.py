@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -257,6 +258,8 @@ def _channel(
     at = unit if unit in known else unit.lower()
     try:
         scale = float(factor or 1.0) * known[at]
+        if not (scale and isfinite(scale)):
+            raise ValueError
     except (ValueError, KeyError):
         says = f"has the unit {written!r}" if written else "has no unit"
         raise InputError(

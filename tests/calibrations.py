@@ -27,7 +27,7 @@ def calibration(
     if cross:
         flat |= {f"cross_coupling.k{p}": rng.normal(0, cross) for p in PAIRS}
         if gyr_scale:
-            flat |= {f"gyro_cross_coupling.e{p}": rng.normal(0, cross) for p in PAIRS}
+            flat |= {f"gyro_cross_coupling.s{p}": rng.normal(0, cross) for p in PAIRS}
     k = len(flat)
     return Calibration(
         "joint", tuple(flat), np.array(list(flat.values())), 1e-8 * np.eye(k),

@@ -39,6 +39,7 @@ BO_ 34 Climate: 8 A
  SG_ warmth : 0|16@1- (0.01,0) [0|0] "K" A
  SG_ level : 16|8@1+ (1,0) [0|0] "furlong" A
  SG_ bare : 24|8@1+ (1,0) [0|0] "" A
+ SG_ frozen : 32|16@1+ (0,0) [0|0] "us" A
 
 VAL_ 32 ax -32768 "not available" ;
 """

@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+MENDABLE_CHECKS = ("fit", "positions", "witnesses", "turns", "level")
+"""Checks, beside those of uncertainties, that further positions may change. Checks of
+site, temperature, link, insisted positions and earlier calibrations are unaffected."""
+
 
 @dataclass(frozen=True, slots=True)
 class Check:

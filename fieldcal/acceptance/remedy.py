@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fieldcal.acceptance.check import MENDABLE_CHECKS
 from fieldcal.acceptance.factory import factory_errors_used
 from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
@@ -112,7 +113,7 @@ def cheapest_remedy(
         return None
     of_gyr = {name for name in over if sensor_of(group_of(name)) == "gyr"}
     if len(of_gyr) == len(over):
-        return _hold_longer(calibration, about, had, over, seconds, others)
+        return _hold_longer(calibration, about, numbers, over, seconds, others)
     # further positions determine the accelerometers, gyroscopes have to be held longer
     groups = dict.fromkeys(group_of(name) for name in of_gyr)
     left = [*others, *(group + UNCERTAINTY for group in groups)]
@@ -124,10 +125,14 @@ def cheapest_remedy(
 
 def _expectation(left: Sequence[str]) -> str:
     """What a remedy leads to, if some failed checks are left as they are."""
-    if not left:
-        return "then GO is expected"
-    verb, more = ("fails", "has") if len(left) == 1 else ("fail", "have")
-    return f"then {join_words(left)} still {verb}, and {more} to be mended as well"
+    stays = [name for name in left if name not in MENDABLE_CHECKS]
+    if stays:
+        verb, more = ("fails", "has") if len(stays) == 1 else ("fail", "have")
+        return f"then {join_words(stays)} still {verb}, and {more} to be mended as well"
+    if left:
+        verb = "passes" if len(left) == 1 else "pass"
+        return f"then GO is expected if {join_words(left)} {verb} as well"
+    return "then GO is expected"
 
 
 def _limit_ratios(
@@ -150,15 +155,16 @@ def _limit_ratios(
 def _hold_longer(
     calibration: Calibration,
     about: Description,
-    had: Sequence[Position],
+    numbers: Sequence[int],
     over: dict[str, float],
     seconds: float,
     left: Sequence[str],
 ) -> Remedy | None:
-    """Remedy for gyroscopes: a longer mean in the present position.
+    """Remedy for gyroscopes: a longer mean in the last position that was held.
 
     The part of the uncertainty from g-sensitivity and the mean force does not change.
     """
+    had = [about.positions[i] for i in numbers]
     force = specific_forces(had, about.gravity).mean(axis=0)
     stays = factory_errors_used(calibration).g_sensitivity * float(
         np.linalg.norm(force)
@@ -169,13 +175,14 @@ def _hold_longer(
         kept = stays if group_of(name) == "gyr_bias" else 0.0
         room = (LIMIT_SHARE * sigma / part) ** 2 - kept**2
         times = max(times, (sigma**2 - kept**2) / room if room > 0 else np.inf)
-    whole = seconds * len(about.positions)
-    last = about.positions[-1].degrees
+    whole = seconds * len(had)
+    last = had[-1].degrees
     if not whole * (times - 1) <= MAX_HOLD_S or last is None:
         return None
     more = float(np.ceil(whole * (times - 1) / 5) * 5)
-    number = len(about.positions)
-    says = f"hold position {number} for {more:.0f} s more: {_expectation(left)}"
+    says = (
+        f"hold position {numbers[-1] + 1} for {more:.0f} s more: {_expectation(left)}"
+    )
     return Remedy(says, positions=(last,), seconds=max(more, seconds))
 
 

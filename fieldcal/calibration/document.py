@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 
 from fieldcal.calibration.gauge import in_sample_units, in_si_units
-from fieldcal.calibration.names import group_of
+from fieldcal.calibration.names import group_of, possible_components
 from fieldcal.calibration.parameters import COMPONENTS, Calibration, Method
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
@@ -119,6 +119,12 @@ def _parameters(
         entry = _mapping(entry, where)
         usual = list(COMPONENTS[group][0]) if group in COMPONENTS else None
         parts = _texts(entry.get("names", usual), f"{where}.names")
+        possible = possible_components(group)
+        if possible and (odd := [p for p in parts if p not in possible]):
+            raise InputError(
+                f"result.json: {where} has no component {odd[0]!r}: it may have"
+                f" {', '.join(possible)}"
+            )
         numbers = entry.get("value")
         if not isinstance(numbers, list) or len(numbers) != len(parts):
             raise InputError(
@@ -133,9 +139,9 @@ def _parameters(
             value = _float(numbers[parts.index(part)], f"{where}.value")
             found[f"{group}.{part}"] = (value, u)
     if set(found) != set(names):
-        odd = sorted(set(found) ^ set(names))[0]
+        alone = sorted(set(found) ^ set(names))[0]
         raise InputError(
-            f"result.json: {odd} stands in parameters or in covariance.names, not in"
+            f"result.json: {alone} stands in parameters or in covariance.names, not in"
             " both"
         )
     return np.array([found[n][0] for n in names]), tuple(found[n][1] for n in names)
@@ -174,9 +180,12 @@ def _float(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"result.json: {where} is {value!r}, not a number")
     try:
-        return float(value)
+        number = float(value)
     except OverflowError:
-        raise InputError(f"result.json: {where} is too large a number") from None
+        number = float("inf")
+    if not np.isfinite(number):
+        raise InputError(f"result.json: {where} is too large a number, or none")
+    return number
 
 
 def _numbers(value: Any, where: str, shape: tuple[int, ...]) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Literal
 
 AXES = "xyz"
@@ -17,6 +18,9 @@ SENSORS = {
 
 SCALES = frozenset({"acc_scale", "gyr_scale"})
 """Groups of scale factors."""
+
+COUPLINGS = {"cross_coupling": "k", "gyro_cross_coupling": "s"}
+"""First letter of the components of the cross-couplings, such as ``k12``."""
 
 Tilt = Literal["none", "angle_offset", "base_tilt"]
 
@@ -79,6 +83,20 @@ class ParameterName:
     def entry(self) -> tuple[int, int]:
         """Row and column, from 0, of a cross-coupling such as ``k12``."""
         return int(self.component[1]) - 1, int(self.component[2]) - 1
+
+
+def possible_components(group: str) -> tuple[str, ...]:
+    """Components of a group of the linear model; empty for others, which have any.
+
+    >>> possible_components("cross_coupling")
+    ('k12', 'k13', 'k21', 'k23', 'k31', 'k32')
+    """
+    if group in SENSORS:
+        return tuple(AXES)
+    if group in COUPLINGS:
+        pairs = permutations("123", 2)
+        return tuple(f"{COUPLINGS[group]}{i}{j}" for i, j in pairs)
+    return ()
 
 
 def sensor_of(group: str) -> str:

@@ -24,6 +24,9 @@ ENDING = ".mcap"
 
 FRAME = "imu"
 
+LAST_STAMP = 2.0**31
+"""Time that a message's stamp no longer holds, s."""
+
 _HEADER = "std_msgs/Header header\n"
 _THREE = "geometry_msgs/Vector3"
 _PARTS = {
@@ -58,7 +61,8 @@ def write(source: ExportSource, path: Path) -> list[str]:
     Raises
     ------
     InputError
-        If what writes it is not installed, or the file cannot be written.
+        If what writes it is not installed, a time is too large for a stamp, or the file
+        cannot be written.
 
     """
     if not all(find_spec(module) for module in ("mcap", "mcap_ros2")):
@@ -69,6 +73,12 @@ def write(source: ExportSource, path: Path) -> list[str]:
 
     raw = source.session.block
     calibrated = source.calibration.apply(raw, source.nominal)
+    shift = max(0.0, -float(raw.t[0]))
+    if not (last := float(raw.t[-1]) + shift) < LAST_STAMP:
+        raise InputError(
+            f"the session's times reach {last:.3g} s, and a stamp of ROS ends at"
+            f" {LAST_STAMP:.3g} s: record or import it again with the unit of its time"
+        )
     part = path.with_name(f".{path.name}.part")
     try:
         with part.open("wb") as file:
@@ -79,7 +89,6 @@ def write(source: ExportSource, path: Path) -> list[str]:
             degrees = writer.register_msgdef(
                 "sensor_msgs/msg/Temperature", _message_definition(_TEMPERATURE, _PARTS)
             )
-            shift = max(0.0, -float(raw.t[0]))
             for i, t in enumerate((raw.t + shift).tolist()):
                 if np.isfinite(raw.temperature[i]):
                     said = {

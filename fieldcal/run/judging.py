@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldcal.acceptance.assessment import assess
+from fieldcal.acceptance.check import MENDABLE_CHECKS
 from fieldcal.acceptance.uncertainty import UNCERTAINTY
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
@@ -13,10 +14,6 @@ from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import PreparedSession, solve_prepared
 from fieldcal.session.folder import Session
-
-MENDABLE_CHECKS = ("fit", "positions", "witnesses", "turns", "level")
-"""Checks, beside those of uncertainties, that further positions may change. Checks of
-site, temperature, link, insisted positions and earlier calibrations are unaffected."""
 
 
 def judge_session(

@@ -9,8 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.positions import Position, specific_forces
-from fieldcal.core.samples import Array, Block, concat
+from fieldcal.core.samples import CHANNELS, Array, Block, concat
+from fieldcal.core.sentences import join_words
 from fieldcal.planning.steps import Hold
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import MAX_GAP_S
@@ -114,6 +116,12 @@ class PositionWait:
         """Take in the block that follows; time without samples is not counted.
 
         `host` is the time by the host's clock, s.
+
+        Raises
+        ------
+        InputError
+            If an axis of the accelerometers gives no value, also at rest.
+
         """
         if self._last_host < host:
             self.waited_host += min(MAX_GAP_S, host - self._last_host)
@@ -130,7 +138,10 @@ class PositionWait:
         if self._stillness.since is not None or np.isnan(self._stirred):
             self._stirred = self._last
         if self._resting.seconds > 0:
-            self.f = measured_force(self._resting.block.acc, self._about)
+            acc = self._resting.block.acc
+            if self._resting.seconds > REPORT_AFTER_S:
+                self._check_axes(acc)
+            self.f = measured_force(acc, self._about)
             self.where = self.arrival = self._check_position(self.f)
             self._first = self.f if self._first is None else self._first
             self._turned |= self._has_moved_from(self._first)
@@ -142,6 +153,18 @@ class PositionWait:
             self._there = np.nan
         elif np.isnan(self._there):
             self._there = self._last
+
+    def _check_axes(self, acc: Array) -> None:
+        """Refuse accelerometers without an axis: no wait would show the position."""
+        lacks = np.flatnonzero(~np.isfinite(acc).any(axis=0))
+        if len(lacks):
+            names = join_words([CHANNELS[axis] for axis in lacks])
+            give = "give" if len(lacks) > 1 else "gives"
+            raise InputError(
+                f"{self._hold.position.name}: {names} {give} no value, so nobody can"
+                " tell the position: name the columns of all three accelerometers, or"
+                " repair the device"
+            )
 
     def _check_position(self, f: Array) -> PositionCheck:
         wanted, g = self._hold.position, self._about.gravity

@@ -182,6 +182,8 @@ def test_a_calibration_of_mixed_units_comes_back() -> None:
         (["covariance", "matrix"], (-np.eye(15)).tolist(), "a negative variance"),
         (["covariance", "matrix"], [[10**400] * 15] * 15, "is not a table of numbers"),
         (["parameters", "acc_bias", "value"], [10**400, 1.0, 2.0], "too large"),
+        (["parameters", "acc_bias", "value"], [np.inf, 1.0, 2.0], "too large"),
+        (["parameters", "acc_bias", "names"], ["q", "y", "z"], "no component 'q'"),
         (["covariance", "names"], ["acc_bias.x"], "covariance.matrix"),
         (["fit", "dof"], 1.5, "fit.dof"),
         (["fit", "chi2"], True, "fit.chi2"),
@@ -197,6 +199,15 @@ def test_a_broken_document_is_refused_by_key(
         place = place[key]
     place[path[-1]] = value
     with pytest.raises(InputError, match=text):
+        Calibration.from_json(document)
+
+
+@pytest.mark.parametrize("part", ["k19", "k11", "k1", "x", "s12"])
+def test_a_matrix_has_the_entries_that_it_has(part: str) -> None:
+    document = made().to_json()
+    coupling = {"value": [1.0], "unit": "1", "names": [part]}
+    document["parameters"]["cross_coupling"] = coupling
+    with pytest.raises(InputError, match=f"no component '{part}': it may have k12,"):
         Calibration.from_json(document)
 
 

@@ -292,6 +292,22 @@ def test_mcap_is_read_by_ros_and_by_ourselves(
     assert found[7].orientation_covariance[0] == -1
 
 
+def test_mcap_refuses_times_beyond_its_stamps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    raw = samples(rng, 20)
+    cal = calibration(rng, 0.004, 0.01)
+    for first, fits in ((2.0**31 - 10.0, True), (2.0**31 - 0.1, False)):
+        late = replace(raw, t=raw.t - raw.t[0] + first)
+        folder = tmp_path / str(fits)
+        made = source(folder / "s", cal, late)
+        if fits:
+            assert written(made, "mcap", folder).exists()
+            continue
+        with pytest.raises(InputError, match=r"a stamp of ROS ends at 2.15e\+09 s"):
+            written(made, "mcap", folder)
+        assert [p.name for p in folder.iterdir()] == ["s"]
+
+
 def test_what_was_not_determined_is_said_not_filled_in_silence(
     made: tuple[ExportSource, Block, Block], tmp_path: Path
 ) -> None:

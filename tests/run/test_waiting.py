@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.planning.steps import Hold
@@ -83,3 +84,32 @@ def test_a_gust_is_no_turn_and_calls_nobody_anew(
             called.append(float(t[first]))
     assert len(called) == len(calls)
     assert all(0.0 <= c - w < 8.0 for c, w in zip(called, calls, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("lacks", "says"),
+    [
+        ([2], r"^α = 0°, β = 0°: az gives no value"),
+        ([0, 1, 2], r"^α = 0°, β = 0°: ax, ay and az give no value"),
+    ],
+)
+def test_nobody_waits_for_an_axis_that_is_missing(lacks: list[int], says: str) -> None:
+    """The mounting exchanges axes; those of the device are named."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 10.0, 1 / RATE)
+    acc = [-G, 0.0, 0.0] + 5e-3 * rng.standard_normal((len(t), 3))
+    acc[:, lacks] = np.nan
+    block = Block.of(t, acc, 1e-3 * rng.standard_normal(acc.shape))
+    about = description.parse_description(
+        {
+            "format": 1,
+            "site": {"gravity": G},
+            "frame": {"mounting": ["+y", "+x", "-z"]},
+            "position": [{"alpha_deg": 0.0, "beta_deg": 0.0}],
+        }
+    )
+    waiting = PositionWait(Hold(0, Position.deg(0.0, 0.0), 10.0), about, None)
+    with pytest.raises(InputError, match=says):
+        for first in range(0, len(t), 10):
+            waiting.add(block[first : first + 10], float(t[first]))
+    assert waiting.waited < 6.0

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fieldcal.core.samples import Block, Grain
+from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.drivers.driver import Driver
 
 MARK_EVERY_S = 1.0
@@ -21,6 +21,9 @@ MARK_EVERY_S = 1.0
 
 LONG_GAP_S = 0.5
 """Gap that is marked at once, s of device time."""
+
+GAP_INTERVALS = 3.0
+"""Usual intervals of a device that are no gap."""
 
 CLOCK_EVERY_S = 30.0
 """Time between two marks of the clock, s of the host's clock."""
@@ -59,7 +62,7 @@ class LinkMarks:
         self._driver, self._recorder = driver, recorder
         self._before = self._counts()
         self._last = self._from = self._to = float("nan")
-        self._longest = 0.0
+        self._longest, self._usual = 0.0, float("nan")
         self._marked = -MARK_EVERY_S
         self._clocked = monotonic()
         self._grain = Grain()
@@ -81,7 +84,8 @@ class LinkMarks:
             self._facts = self._device_facts()
             until = {"until_s": self._sure} if np.isfinite(self._sure) else {}
             self._recorder.mark("device", **self._driver.notes, **until)
-        if self._counts() == self._before:
+        # whoever reads the link may have counted a gap before its samples come here
+        if self._counts() == self._before and not self._has_long_gap(steps):
             self._clock()
             return
         if np.isfinite(steps).any():
@@ -91,6 +95,15 @@ class LinkMarks:
                 self._from, self._to = edges[widest], edges[widest + 1]
         if self._longest >= LONG_GAP_S or monotonic() - self._marked >= MARK_EVERY_S:
             self._mark()
+
+    def _has_long_gap(self, steps: Array) -> bool:
+        """Whether time passed that is long, also for a slow device."""
+        known = steps[np.isfinite(steps)]
+        usual = self._usual
+        if len(known) > 1:
+            self._usual = float(np.median(known))
+        longest = float(known.max(initial=0.0))
+        return longest >= LONG_GAP_S and longest > GAP_INTERVALS * usual
 
     def end(self) -> None:
         """Mark everything that has not been marked yet."""

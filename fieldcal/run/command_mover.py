@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from string import Formatter
 from time import monotonic, sleep
@@ -150,7 +150,7 @@ class CommandMover:
         known = dict(zip(PLACEHOLDERS, values, strict=True))
         for part in self._template:
             try:
-                odd = [n for _, n, _, _ in Formatter().parse(part) if n is not None]
+                odd = _fields_named(part)
             except ValueError:
                 odd = [part]
             if unknown := [n for n in odd if n not in PLACEHOLDERS]:
@@ -158,13 +158,26 @@ class CommandMover:
                     f"[run.mover] command: {{{unknown[0]}}} is none of"
                     f" {', '.join(PLACEHOLDERS)}; write a brace that is meant as {{{{"
                 )
-        try:
-            return [part.format(**known) for part in self._template]
-        except (ValueError, KeyError, IndexError, AttributeError) as error:
-            raise PlanError(
-                f"[run.mover] command: {error}: write numbers as in {{alpha:.3f}} or"
-                " {position:02d}"
-            ) from error
+        return [_filled(part, known) for part in self._template]
+
+    def names(self, placeholder: str) -> bool:
+        """Whether the command has this one of `PLACEHOLDERS`."""
+        return any(placeholder in _fields_named(part) for part in self._template)
+
+
+def _fields_named(part: str) -> list[str]:
+    """Names in the braces of a part of a template; ValueError if they do not close."""
+    return [name for _, name, _, _ in Formatter().parse(part) if name is not None]
+
+
+def _filled(part: str, known: Mapping[str, object]) -> str:
+    try:
+        return part.format(**known)
+    except (ValueError, LookupError, AttributeError, TypeError) as error:
+        raise PlanError(
+            f"[run.mover] command: {part!r} cannot be filled in ({error}): write"
+            " numbers as in {alpha:.3f} or {position:02d}"
+        ) from error
 
 
 class _Angle(float):

@@ -202,27 +202,24 @@ def _check_further(about: Description, run: Mapping[str, Any], name: str) -> Non
             raise PlanError(f"{name}: {what} {twice[0]!r} is named twice: name it once")
 
 
-def _check_third_angles(made: PlanTask, name: str) -> None:
-    """Refuse a third angle that the mover does not turn to."""
+def _check_command(made: PlanTask) -> None:
+    """Refuse a command that cannot be called, or that lacks a third angle."""
+    from fieldcal.run.command_mover import CommandMover
+
     third = [p for p in made.positions if p.gamma]
-    if not third:
-        return
-    template = made.mover.get("command", ("{gamma}",))
-    if not any("{gamma}" in str(part) for part in template):
-        raise PlanError(
-            f"{name}: {third[0].name} has a third angle, which [run.mover] command does"
-            " not name: write {gamma} where the turntable wants it"
-        )
+    with CommandMover(made.mover["command"], 1.0) as mover:
+        if third and not mover.names("gamma"):
+            raise PlanError(
+                f"{third[0].name} has a third angle, which [run.mover] command does not"
+                " name: write {gamma} where the turntable wants it"
+            )
 
 
 def _check_mover(made: PlanTask, name: str) -> None:
-    from fieldcal.run.command_mover import CommandMover
-
     mover = made.mover
-    _check_third_angles(made, name)
     try:
         if mover["kind"] == "command":
-            CommandMover(mover["command"], 1.0).close()
+            _check_command(made)
         elif mover["kind"] == "virtual":
             shlex.split(mover.get("options", ""))
     except PlanError as error:

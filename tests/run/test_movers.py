@@ -87,10 +87,17 @@ def test_numbers_may_be_formatted(form: str, argument: str, tmp_path: Path) -> N
     assert said.read_text() == argument
 
 
-@pytest.mark.parametrize("form", ["{alpha:{width}}", "{alpha!z}", "{position:.3q}"])
+@pytest.mark.parametrize(
+    "form",
+    ["{alpha:{width}}", "{alpha!z}", "{position:.3q}", "{alpha:{beta.x}}",
+     "{alpha:{beta[0]}}"],
+)  # fmt: skip
 def test_a_format_that_is_none_is_a_mistake_of_the_command(form: str) -> None:
-    with pytest.raises(PlanError, match=r"^\[run.mover\] command: .*write numbers as"):
+    with pytest.raises(PlanError) as raised:
         CommandMover(["turn", form], 1.0)
+    said = str(raised.value)
+    assert said.startswith(f"[run.mover] command: {form!r} cannot be filled in (")
+    assert said.endswith("write numbers as in {alpha:.3f} or {position:02d}")
 
 
 def test_a_command_that_is_not_there_is_said() -> None:

@@ -281,6 +281,7 @@ def test_a_third_angle_wants_somebody_who_turns_it() -> None:
     whole = of(kind="command", command=["tt", "{alpha}", "{beta}", "{gamma}"])
     turned = CommandMover(whole.mover["command"], 1.0)
     assert turned._filled_command(whole.positions[2], 2) == ["tt", "10", "5", "30"]
+    of(kind="command", command=["tt", "{alpha}", "{beta}", "g={gamma:.2f}"])
     with pytest.raises(PlanError, match=r"write \{gamma\}"):
         of(kind="command", command=["tt", "{alpha}", "{beta}"])
     assert of(kind="virtual").positions[2].gamma

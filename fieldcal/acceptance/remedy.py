@@ -101,9 +101,8 @@ def cheapest_remedy(
 
     """
     doubt = DoubtfulPosition.from_json(calibration.info.get("doubtful_position"))
-    bad = calibration.info.get("bad_position", ())
-    if doubt and len(bad) == len(numbers):
-        number = numbers[int(np.argmax(bad))]  # a place may be held more than once
+    number = _number_in_doubt(doubt, calibration, about, numbers) if doubt else None
+    if doubt and number is not None:
         which = f"position {number + 1} ({doubt.name})"
         says = f"take {which} again: it disagrees with the others"
         return Remedy(says, again=(number,), seconds=seconds)
@@ -121,6 +120,24 @@ def cheapest_remedy(
     return _further_positions(
         calibration, about, had, limits, over, sigma, seconds, left
     )
+
+
+def _number_in_doubt(
+    doubt: DoubtfulPosition,
+    calibration: Calibration,
+    about: Description,
+    numbers: Sequence[int],
+) -> int | None:
+    """Number of the position in doubt; a place may be held more than once."""
+    bad = calibration.info.get("bad_position", ())
+    if len(bad) != len(numbers):
+        return None
+    there = [
+        (chance, number)
+        for chance, number in zip(bad, numbers, strict=True)
+        if about.positions[number].name == doubt.name
+    ]
+    return max(there)[1] if there else None
 
 
 def _expectation(left: Sequence[str]) -> str:

@@ -193,6 +193,20 @@ def test_the_window_in_doubt_is_taken_again_not_another_at_its_place(
     assert remedy.says.startswith(f"take position 5 ({name}) again")
 
 
+def test_of_two_that_are_as_doubtful_the_named_one_is_taken_again(
+    tmp_path: Path,
+) -> None:
+    """Their probabilities are rounded, so both are 1."""
+    session = about(tmp_path / "s", [p.degrees or (0.0, 0.0) for p in FIVE_POSITIONS])
+    name = session.positions[3].name
+    info = {"doubtful_position": {"name": name, "probability": 1.0}}
+    found = found_with(("acc_bias.x",), [1e-3])
+    found = replace(found, info={**info, "bad_position": [0.0, 1.0, 0.0, 1.0, 0.0]})
+    remedy = cheapest_remedy(found, session.about, range(5), LIMITS, [], 1e-3, 30.0)
+    assert remedy is not None and remedy.again == (3,)
+    assert remedy.says.startswith(f"take position 4 ({name}) again")
+
+
 @pytest.mark.parametrize(
     ("failed", "others", "says"),
     [

@@ -36,6 +36,16 @@ GIMBAL_LOCK = 1e-9
 """Cosine of beta below which alpha and gamma turn about the same axis."""
 
 
+def wrap_angle(angle: Array, turn: float = 2 * np.pi) -> Array:
+    """Angles within half a turn either way, in the unit of a whole `turn`.
+
+    >>> wrap_angle(np.array([190.0, -180.0, 30.0]), 360.0)
+    array([-170., -180.,   30.])
+    """
+    wrapped: Array = (angle + turn / 2) % turn - turn / 2
+    return wrapped
+
+
 def direction_cosines(
     alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike | None = None
 ) -> Array:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.probability import MAD_TO_SIGMA
-from fieldcal.core.samples import Array, Index
+from fieldcal.core.samples import Array, Index, runs_of_true
 from fieldcal.noise.likelihood import Flags
 
 CELL = 0.5
@@ -100,8 +100,7 @@ def _first_left(odd: Flags) -> int:
     It is calm, and so are those of the side of a disturbance that is not seen whole.
     """
     left = len(odd) - MIN_CELLS
-    edges = np.flatnonzero(np.diff(np.r_[False, odd, False].astype(int)))
-    for first, end in edges.reshape(-1, 2)[::-1].tolist():
+    for first, end in runs_of_true(odd)[::-1].tolist():
         if end + CELLS_BESIDE > left:
             left = min(left, first - CELLS_BESIDE)
     return max(left, 0)
@@ -152,11 +151,10 @@ def _with_neighbours(odd: Flags) -> Flags:
 def _split_and_bridge(
     rows: Array, odd: Flags, size: int, dt: float, scale: Array
 ) -> list[CalmStretch]:
-    edges = np.flatnonzero(np.diff(np.r_[False, odd, False].astype(int)))
     out, whole, begun, bridged, parts = [], rows.copy(), 0, 0, False
     good = np.repeat(~odd, size)
     good = np.concatenate([good, np.ones(len(rows) - len(good), dtype=bool)])
-    for first, end in (edges.reshape(-1, 2) * size).tolist():
+    for first, end in (runs_of_true(odd) * size).tolist():
         before = whole[max(begun, first - CELLS_BESIDE * size) : first]
         side = slice(end, end + CELLS_BESIDE * size)
         behind = whole[side][good[side]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldcal.calibration.wording import format_with_sigma
+from fieldcal.core.frames import wrap_angle
 from fieldcal.report.blocks import Figure, ReportBlock, Section, Table, table
 from fieldcal.report.charts import Axis, Chart, Series
 from fieldcal.report.gather import ReportMaterial
@@ -51,7 +52,7 @@ def _chart(where: MeasuredAngles) -> Chart:
 
 
 def _misses(where: MeasuredAngles) -> Chart:
-    off = (where.measured - where.stated + 180) % 360 - 180
+    off = wrap_angle(where.measured - where.stated, 360.0)
     x = np.arange(len(where.rows), dtype=float)
     series = tuple(
         Series(

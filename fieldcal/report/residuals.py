@@ -24,6 +24,7 @@ from fieldcal.core.frames import (
     direction_cosines,
     earth_rate_at_home,
     specific_force_at_home,
+    wrap_angle,
 )
 from fieldcal.core.positions import gamma_angles, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array, Block
@@ -182,5 +183,5 @@ def _sigma(force: Array, spread: Array, shown: Array) -> Array:
         moved = force.copy()
         moved[:, axis] += spread[:, axis]
         change = np.rad2deg([angles_of_force_direction(f) for f in moved]) - shown
-        variance += ((change + 180) % 360 - 180) ** 2
+        variance += wrap_angle(change, 360.0) ** 2
     return np.sqrt(variance)

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from fieldcal.core.frames import wrap_angle
 from fieldcal.core.samples import Array
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.diagnosis.findings.found_effects import column_estimates
@@ -106,8 +107,7 @@ def exchanged_positions(
 
 def _is_at(held: Array, there: Array, stated: Array) -> bool:
     """Whether angles are those stated elsewhere, and not those stated, rad."""
-    whole = 2 * np.pi
-    off, apart = ((held - a + np.pi) % whole - np.pi for a in (there, stated))
+    off, apart = wrap_angle(held - there), wrap_angle(held - stated)
     return bool(np.abs(off).max() < EXCHANGED_WITHIN * np.abs(apart).max())
 
 

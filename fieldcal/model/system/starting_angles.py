@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldcal.core.frames import in_procedure_axes
+from fieldcal.core.frames import in_procedure_axes, wrap_angle
 from fieldcal.core.samples import ACC, Array
 from fieldcal.model.rows.reduce import Rows
 from fieldcal.model.state import State
@@ -75,7 +75,7 @@ def _stated_elsewhere(x: Experience, position: int) -> Array:
 
 def _turn(stated: Array, angles: Array) -> Array:
     """Turns from the stated angles to others (k, 2), each at most half a turn, rad."""
-    return np.asarray((angles - stated + np.pi) % (2 * np.pi) - np.pi, float)
+    return wrap_angle(angles - stated)
 
 
 def _grid() -> Array:

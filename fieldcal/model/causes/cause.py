@@ -224,6 +224,6 @@ class Cause:
         return f"{name}:{self.part}" if self.part else name
 
     @property
-    def kin(self) -> tuple[str, str]:
+    def name_and_part(self) -> tuple[str, str]:
         """Common to causes that differ only in the position they belong to."""
         return self.name, self.part

@@ -176,15 +176,17 @@ class Posterior:
 
     def _without_chances(self, score: float, members: Sequence[Member]) -> float:
         """A score without the prior of its causes; variants are equally probable."""
-        counts = sum(np.log(self._variants_of_kin[c.kin]) for c, _ in members)
+        counts = sum(
+            np.log(self._variants_by_name[c.name_and_part]) for c, _ in members
+        )
         return score - self.search.set_log_prior(members) - float(counts)
 
     @cached_property
-    def _variants_of_kin(self) -> Counter[tuple[str, str]]:
+    def _variants_by_name(self) -> Counter[tuple[str, str]]:
         """Number of variants of all causes that differ only in their position."""
         counts = Counter[tuple[str, str]]()
         for cause in self.search.dictionary.causes:
-            counts[cause.kin] += len(cause.variants)
+            counts[cause.name_and_part] += len(cause.variants)
         return counts
 
     def _kind(self, name: str) -> str:

@@ -80,7 +80,7 @@ def ranked_offers(
         for cause, (worth, v, size) in best.items()
         if cause.key not in there.keys
     ]
-    kin: dict[tuple[str, str], Offer] = {}
+    best_by_name: dict[tuple[str, str], Offer] = {}
     for offer in sorted(offers, key=lambda o: -o.score):
-        kin.setdefault(offer.member[0].kin, offer)
-    return [*kin.values()]
+        best_by_name.setdefault(offer.member[0].name_and_part, offer)
+    return [*best_by_name.values()]

@@ -91,9 +91,9 @@ class Offers(Sets):
         for table in self.tables(there, beside):
             for each in table.offers:
                 offer = self._evaluate_all_columns(there, each, table)
-                kin = each.member[0].kin
-                if kin not in best or offer.score > best[kin].score:
-                    best[kin] = offer
+                name = each.member[0].name_and_part
+                if name not in best or offer.score > best[name].score:
+                    best[name] = offer
         return sorted(best.values(), key=lambda o: -o.score)
 
     def _evaluate_all_columns(

@@ -115,7 +115,7 @@ class Search(Offers):
         return {
             other.variants[0]: other
             for other in self.dictionary.causes
-            if other.kin == cause.kin
+            if other.name_and_part == cause.name_and_part
             and (other is cause or other.key not in there.keys)
         }
 

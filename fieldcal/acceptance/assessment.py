@@ -202,13 +202,19 @@ def start_time(marks: Sequence[Mapping[str, Any]]) -> str | None:
 def verification_window(
     marks: Sequence[Mapping[str, Any]], number: int
 ) -> tuple[float, float] | None:
-    """Window of the position after the fitted ones, by its number, s of device time."""
-    windows = [
-        (float(m["start_s"]), float(m["end_s"]))
-        for m in marks
-        if m.get("event") == "window" and m.get("position") == number
-    ]
-    return windows[-1] if windows else None
+    """Window of the position after the fitted ones, by its number, s of device time.
+
+    None if there is none, or if the last one was discarded.
+    """
+    window: tuple[float, float] | None = None
+    for mark in marks:
+        if mark.get("position") != number:
+            continue
+        if mark.get("event") == "window":
+            window = float(mark["start_s"]), float(mark["end_s"])
+        elif mark.get("event") == "repeated":
+            window = None
+    return window
 
 
 def _verification(
@@ -222,8 +228,8 @@ def _verification(
         return None
     try:
         held = average(session.block.between(*window))
-    except FieldcalError:
-        return None
+    except FieldcalError as error:
+        return Verification.unmeasured(position, str(error))
     used = calibration.info.get("angle_sigma_deg")
     stated = calibration.info.get("angles_stated_deg", used)
     angle = float(np.deg2rad(stated or angle_setting(session.about)))

@@ -307,10 +307,10 @@ def _verification_check(
     if verification is None:
         says = "no verification position was recorded (--verify)"
         return Check("verification", None, says)
-    if not np.isfinite([verification.residual_size, verification.chance]).all():
+    if not verification.measured:
         says = (
             f"{verification.position.name}, which was to verify the result, could not"
-            " be measured: record it again with all axes of the accelerometers"
+            f" be measured ({verification.reason}): record it again"
         )
         return Check("verification", False, says)
     far = verification.residual_size > limits.verification_residual

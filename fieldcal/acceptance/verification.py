@@ -43,6 +43,7 @@ class Verification:
     covariance : (3, 3) of the residual, S
     parameter_slopes : (3,) derivative of outputs by each parameter, by full name
     angle_slopes : (3, 2) derivative by the position's alpha and beta, m/s^2/rad
+    reason : why it could not be measured, if samples are missing
 
     """
 
@@ -53,6 +54,20 @@ class Verification:
     covariance: Array
     parameter_slopes: Mapping[str, Array]
     angle_slopes: Array
+    reason: str = "an axis of the accelerometers gives no value there"
+
+    @classmethod
+    def unmeasured(cls, position: Position, reason: str) -> Verification:
+        """A position that was held, but whose samples cannot be used."""
+        unknown, slopes = np.full(3, np.nan), np.full((3, 2), np.nan)
+        return cls(
+            position, unknown, unknown, np.nan, np.diag(unknown), {}, slopes, reason
+        )
+
+    @property
+    def measured(self) -> bool:
+        """Whether the residual is known on all axes."""
+        return bool(np.isfinite([self.residual_size, self.chance]).all())
 
     @property
     def residual_size(self) -> float:
@@ -61,9 +76,10 @@ class Verification:
 
     def noncentrality(self, wrong: WrongAngles) -> float:
         """Non-centrality r^T S^-1 r that wrong angles of the session produce here."""
-        if self.position.alpha is None or self.position.beta is None:
+        alpha, beta = self.position.alpha, self.position.beta
+        if alpha is None or beta is None or not self.measured:
             return 0.0
-        off = wrong.error_at(self.position.alpha, self.position.beta)
+        off = wrong.error_at(alpha, beta)
         moved: Array = self.angle_slopes @ off
         for name, by in wrong.moves.items():
             moved = moved - by * self.parameter_slopes.get(name, 0.0)

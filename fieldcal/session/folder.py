@@ -250,10 +250,12 @@ def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Descriptio
     windows = list(about.windows)
     for mark in marks:
         i = mark.get("position")
-        if mark.get("event") == "window" and isinstance(i, int) and i < len(windows):
+        if not isinstance(i, int) or not 0 <= i < len(windows):
+            continue  # the position behind the fitted ones is for verification
+        if mark.get("event") == "window":
             windows[i] = (float(mark["start_s"]), float(mark["end_s"]))
-        elif mark.get("event") == "repeated" and isinstance(i, int):
-            windows[i : i + 1] = [None]
+        elif mark.get("event") == "repeated":
+            windows[i] = None
     gaps = [
         (float(start), float(end))
         for mark in marks

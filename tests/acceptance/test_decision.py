@@ -27,6 +27,7 @@ from fieldcal.core.positions import (
     Position,
 )
 from fieldcal.evaluation.observations import usable_windows
+from fieldcal.evaluation.solution import solve_session
 from fieldcal.history.family import next_run_distribution
 from fieldcal.session import description
 from fieldcal.session.folder import Session
@@ -455,6 +456,43 @@ def test_a_verification_that_was_not_measured_verifies_nothing(missing: str) -> 
     made = decided(calibration(), verification=seen)
     (said,) = made.reasons
     assert not made.go and "could not be measured" in said
+
+
+@pytest.mark.parametrize(
+    ("spans", "says", "ok"),
+    [
+        ([(0.0, 30.0)], "differ from the prediction", True),
+        ([(0.0, 0.001)], "could not be measured (", False),
+        ([(0.0, 0.001), (0.0, 30.0)], "differ from the prediction", True),
+        ([(0.0, 30.0), None], "no verification position was recorded", None),
+    ],
+)
+def test_a_verification_window_without_samples_is_told_from_none(
+    spans: list[tuple[float, float] | None],
+    says: str,
+    ok: bool | None,
+    tmp_path: Path,
+) -> None:
+    """It was asked for, so that it is missing is NO-GO; a discarded one is none."""
+    held = places(NINE[:6])
+    last = {"alpha_deg": NINE[5][0], "beta_deg": NINE[5][1]}
+    block = recorded(CALM, held)
+    write_session(tmp_path / "s", block, held[:5], site=SITE, verification=last)
+    start, lines = held[5]["start_s"], []
+    for span in spans:
+        mark: dict[str, object] = {"event": "repeated", "position": 5}
+        if span is not None:
+            ends = {"start_s": start + span[0], "end_s": start + span[1]}
+            mark = {"event": "window", "position": 5, **ends}
+        lines.append(json.dumps(mark) + "\n")
+    (tmp_path / "s" / "marks.jsonl").write_text("".join(lines))
+    session = Session.open(tmp_path / "s")
+    windows = usable_windows(session)
+    found = solve_session(session, windows)
+    made = assessment.assess(found, session, windows, limits.read("tactical"), None)
+    checks = made.info["decision"]["checks"]
+    (check,) = [c for c in checks if c["name"] == "verification"]
+    assert says in check["says"] and check["ok"] is ok
 
 
 @pytest.mark.parametrize(("stated", "expected"), [(0.2, 0.2), (None, 0.05)])

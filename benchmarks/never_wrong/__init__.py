@@ -73,8 +73,8 @@ GROUPED = {
         "samples lost, time counted", "lost samples as zeros", "lost samples repeated",
         "wrong bits", "resampled", "rates with few digits", "coarse times",
     ),
-    "a restart, or a gap alone, between positions": (
-        "device restarted", "a gap between positions",
+    "a restart, or a gap, between positions; turns not recorded": (
+        "device restarted", "a gap between positions", "turns not recorded",
     ),
     "a mean or a bias taken out": (
         "mean of acc removed", "mean of acc removed, rounded", "bias of gyr tracked",

@@ -31,6 +31,15 @@ def link_failed(written: Written, bench: Bench, rng: Rng) -> Written:
     return replace(written, samples=samples)
 
 
+def turns_left_out(written: Written, bench: Bench, rng: Rng) -> Written:
+    """The log was stopped at each turn: no sample shows how the device was turned."""
+    s, kept = written.samples, np.zeros(len(written.samples.t), bool)
+    more = float(rng.uniform(0.0, 0.5))
+    for start, end in bench.windows:
+        kept |= s.within(start - more, end + more)
+    return replace(written, samples=Samples(s.t[kept], s.acc[kept], s.gyr[kept]))
+
+
 def _bursts(written: Written, rng: Rng) -> list[slice]:
     """Where samples are lost: 0.1 to 3 % of them, one to 20 at a time."""
     count, longest = len(written.samples.t), int(rng.integers(1, 21))
@@ -155,6 +164,7 @@ def clock_set(written: Written, bench: Bench, rng: Rng) -> Written:
 OF_FILE: dict[str, After] = {
     "samples lost, time counted": samples_lost,
     "a gap between positions": link_failed,
+    "turns not recorded": turns_left_out,
     "lost samples as zeros": zeros,
     "lost samples repeated": held,
     "wrong bits": spikes,

@@ -162,6 +162,9 @@ class Engine:
         number = len(self._about.positions) + len(self._added)
         alpha, beta = position.degrees or (0.0, 0.0)
         angles = {"alpha_deg": alpha, "beta_deg": beta}
+        if self._taken.pop(number, None) is not None:
+            # what was to verify was held behind fewer positions, at other angles
+            self._recorder.mark("repeated", position=number)
         self._recorder.mark(
             POSITION_ADDED, position=number, name=position.name, **angles
         )

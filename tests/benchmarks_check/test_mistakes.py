@@ -225,3 +225,11 @@ def test_significant_digits_keep_a_part_of_a_value() -> None:
         s, plain = _made("few significant digits", bench, seed).samples, _samples(bench)
         off = np.abs(s.acc - plain.acc)
         assert 0 < off.max() and (off < 5.1e-3 * np.abs(plain.acc) + 1e-7).all()
+
+
+def test_a_log_that_is_stopped_at_each_turn_has_the_rests_alone() -> None:
+    bench = _ideal("five")
+    every, s = _samples(bench), _made("turns not recorded", bench).samples
+    assert len(s.t) < len(every.t) and np.abs(s.gyr).max() < 1e-3
+    assert _means(bench, s) == pytest.approx(_means(bench, every))
+    assert np.count_nonzero(np.diff(s.t) > 1.0) == len(bench.windows) - 1

@@ -24,7 +24,7 @@ from fieldcal.diagnosis import diagnose
 from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_each
-from fieldcal.planning.steps import Hold, Plan, hold
+from fieldcal.planning.steps import Hold, Plan, add, hold
 from fieldcal.run.engine import Engine
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import RepeatPosition
@@ -403,6 +403,25 @@ def test_what_was_taken_before_is_not_asked_for_again(bench: Bench) -> None:
     averages = again.run(hold_all(TWO_POSITIONS, 10.0))
     assert averages[0] is first and averages[1].start > second.end
     assert events(bench).count("asked") == 3
+
+
+def test_an_added_position_is_not_what_verified_before(bench: Bench) -> None:
+    """A run that was killed behind its verification may add a position after all."""
+    (verified,) = bench.engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    taken = {0: verified}
+    again = Engine(
+        bench.turner.driver, bench.turner, ABOUT, bench.recorder, 60.0, taken
+    )
+    held = again.run(_added(TWO_POSITIONS[1], 5.0))
+    assert held.start > verified.end
+    assert held.mean[:3] != pytest.approx(verified.mean[:3], abs=1.0)
+    assert events(bench)[-4:] == ["repeated", "added", "asked", "window"]
+
+
+def _added(position: Position, seconds: float) -> Plan[Average]:
+    number = yield from add(position)
+    held = yield from hold(number, position, seconds)
+    return held
 
 
 def test_a_position_left_out_is_told_to_the_procedure(bench: Bench) -> None:

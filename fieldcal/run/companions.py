@@ -169,11 +169,13 @@ class LeadRecorder:
         self._recorder.link_reopened()
 
     def mark(self, event: str, **what: Any) -> None:
-        """Append a mark, and a window to all sessions.
+        """Append a mark to all sessions that it concerns.
 
-        The first device's comes last: what it says is taken, the others have as well,
-        whenever the process is killed.
+        Whenever the process is killed, what the first device's session says is taken,
+        the others have as well: its window comes last, its discard first.
         """
+        if event == "repeated":
+            self._recorder.mark(event, **what)
         for other in self.others:
             if event in ("asked", "insisted", "repeated", "skipped", POSITION_ADDED):
                 other.mark(event, **what)
@@ -182,7 +184,8 @@ class LeadRecorder:
                 gaps = [(host(a), host(b)) for a, b in what.get("without_s", ())]
                 span = (host(what["start_s"]), host(what["end_s"]))
                 other.window(what["position"], span, gaps)
-        self._recorder.mark(event, **what)
+        if event != "repeated":
+            self._recorder.mark(event, **what)
 
 
 @contextmanager

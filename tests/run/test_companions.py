@@ -201,3 +201,34 @@ def test_what_the_operator_discards_is_discarded_of_every_device(
         leads.mark("skipped", position=0)
     events = ["asked", "window", "repeated", "asked", "skipped"]
     assert other.marks == [(event, 0) for event in events]
+
+
+def test_what_the_first_device_has_the_others_have_whenever_it_is_killed(
+    tmp_path: Path,
+) -> None:
+    """A window that is taken is not asked for again, a discarded one is."""
+    own: list[str] = []
+
+    class Own(Recorder):
+        """The first device's session, whose marks are kept."""
+
+        def mark(self, event: str, **what: Any) -> None:
+            own.append(event)
+            super().mark(event, **what)
+
+    class Watching(Recorded):
+        """A further device that looks at the first one's marks at each of its own."""
+
+        def mark(self, event: str, **what: Any) -> None:
+            self.marks.append((event, event in own))
+
+        def window(self, position: int, span: Any, without: Any = ()) -> None:
+            self.marks.append(("window", "window" in own))
+
+    other = Watching()
+    with Own(tmp_path / "s", {"format": 1}) as recorder:
+        leads = LeadRecorder(recorder, [cast(Companion, other)])
+        leads.append(Block.of(np.arange(9.0), np.zeros((9, 3))))
+        leads.mark("window", position=0, start_s=1.0, end_s=8.0)
+        leads.mark("repeated", position=0)
+    assert other.marks == [("window", False), ("repeated", True)]

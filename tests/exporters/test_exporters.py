@@ -65,6 +65,19 @@ def test_an_autopilot_corrects_raw_samples_as_apply_does(
         assert not found.notices
 
 
+def test_ardupilot_numbers_its_fourth_imu_before_the_sensor() -> None:
+    """INS4_ACCOFFS_X, as its list of parameters has it, beside INS_ACC3OFFS_X."""
+    cal = calibration(np.random.default_rng(1), 0.0)
+    for instance, heads in (
+        (2, ("INS_ACC3", "INS_GYR3")),
+        (4, ("INS5_ACC", "INS5_GYR")),
+    ):
+        acc, gyr = heads
+        made = [f"{acc}OFFS_", f"{acc}SCAL_", f"{gyr}OFFS_"]
+        names = list(ardupilot.parameters(cal, instance=instance).values)
+        assert names == [f"{head}{axis}" for head in made for axis in "XYZ"]
+
+
 @pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
 @pytest.mark.parametrize("taken_out", [False, True])
 def test_what_was_installed_is_put_together_with_what_was_found(

@@ -17,11 +17,12 @@ Frame: device axes. Source: parameter lists of ArduPilot (INS_*) and PX4 (CAL_*)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration import Nominal
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 
@@ -163,6 +164,21 @@ class InstalledCalibration:
         """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
         some = parameter_names(self.autopilot, self.instance).get(what, ("",) * 3)
         return np.array([self.values.get(name, np.nan) for name in some])
+
+    def nominal(self, otherwise: Nominal) -> Nominal:
+        """Return what counts where the samples do not determine a parameter.
+
+        Samples of which o and k were taken out are r = o + f / k as far as is known:
+        what is not determined stays as installed. `otherwise` is for other samples.
+        """
+        if not self.taken_out or self.missing or self.damage:
+            return otherwise
+        return replace(
+            otherwise,
+            acc_bias=tuple(self.vector("acc_offset").tolist()),
+            acc_scale=tuple((1 / self.vector("acc_scale")).tolist()),
+            gyr_bias=tuple(self.vector("gyr_offset").tolist()),
+        )
 
     def parameters_after(
         self, acc_bias: Array, acc_scale: Array, gyr_bias: Array

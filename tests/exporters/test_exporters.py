@@ -106,6 +106,44 @@ def test_what_was_installed_is_put_together_with_what_was_found(
         np.testing.assert_allclose(gyr, cal.apply(sent).gyr, atol=1e-12)
 
 
+def without(cal: Calibration, *names: str) -> Calibration:
+    """The calibration as if some parameters had not been determined."""
+    keep = [i for i, n in enumerate(cal.names) if n not in names]
+    return replace(
+        cal,
+        names=tuple(cal.names[i] for i in keep),
+        values=cal.values[keep],
+        covariance=cal.covariance[np.ix_(keep, keep)],
+        units=tuple(cal.units[i] for i in keep),
+    )
+
+
+@pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
+@pytest.mark.parametrize("taken_out", [False, True])
+def test_an_axis_that_was_not_determined_keeps_what_was_installed_and_is_said(
+    module: ModuleType, number: int, taken_out: bool
+) -> None:
+    known = parameter_names(number, 0)
+    device = InstalledCalibration(
+        number, 0, dict.fromkeys(known["rotation"], 0.0), taken_out
+    )
+    for what, value in (("acc_offset", 0.3), ("acc_scale", 1.02), ("gyr_offset", 0.01)):
+        device.values |= dict.fromkeys(known[what], value)
+    cal = calibration(np.random.default_rng(8), 0.0)
+    few = without(cal, "acc_scale.z", "acc_bias.x", "gyr_bias.y")
+    found = module.parameters(few, installed=device)
+    scale, gyro = known["acc_scale"][2], known["gyr_offset"][1]
+    assert found.values[scale] == pytest.approx(1.02)
+    assert found.values[gyro] == pytest.approx(0.01)
+    assert found.values[known["acc_offset"][0]] == pytest.approx(0.3)
+    for said in ("acc_scale z", "acc_bias x", "gyr_bias y"):
+        assert any(s.startswith(f"{said} was not deter") for s in found.notices)
+    # nothing is known to be installed: the nominal one, and that is said as well
+    alone = module.parameters(few)
+    assert alone.values[scale] == 1.0 and alone.values[gyro] == 0.0
+    assert "gyr_bias y was not determined: the nominal one is used" in alone.notices
+
+
 def test_what_an_autopilot_has_no_place_for_is_said_with_its_size() -> None:
     rng = np.random.default_rng(3)
     for _ in range(20):

@@ -23,6 +23,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
+from fieldcal.calibration.names import sensor_of
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
@@ -35,6 +36,9 @@ from fieldcal.session.folder import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"
+
+WRITTEN = ("acc_bias", "acc_scale", "gyr_bias")
+"""Groups that autopilots have parameters for."""
 
 LARGEST_OFFSET, LARGEST_SCALE_ERROR = 3.5, 0.2
 """Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot accepts."""
@@ -164,14 +168,14 @@ def _left_out_notices(
 def _undetermined_notices(calibration: Calibration, known: bool) -> Iterator[str]:
     """Sentences about what was not determined; `known` if the installed one stays."""
     instead = "the installed one stays" if known else "the nominal one is used"
-    for group in ("acc_bias", "acc_scale", "gyr_bias"):
+    written = {sensor_of(group) for group in calibration.groups if group in WRITTEN}
+    for group in WRITTEN:
         lacking = [a for a in "xyz" if f"{group}.{a}" not in calibration.names]
-        if group == "gyr_bias" and group not in calibration.groups:
-            yield f"{group} was not determined: not written"
-        elif group not in calibration.groups:
-            yield f"{group} was not determined: {instead}"
-        elif lacking:
-            yield f"{group} {', '.join(lacking)} was not determined: {instead}"
+        if not lacking:
+            continue
+        what = group if len(lacking) == 3 else f"{group} {', '.join(lacking)}"
+        then = instead if sensor_of(group) in written else "not written"
+        yield f"{what} was not determined: {then}"
 
 
 def write(source: ExportSource, path: Path) -> list[str]:

@@ -380,6 +380,26 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
 
 
+def test_a_sensor_that_was_not_recorded_is_said_as_it_is(tmp_path: Path) -> None:
+    """Neither parameters that are not written nor windows are what is wrong."""
+    rng = np.random.default_rng(6)
+    whole, raw = calibration(rng, 0.0), samples(rng, 2000)
+    for sensor, name in (("acc", "accelerometer"), ("gyr", "gyroscope")):
+        blind = replace(raw, **{sensor: np.full((len(raw), 3), np.nan)})
+        few = without(whole, *(n for n in whole.names if n.startswith(sensor)))
+        some = source(tmp_path / sensor, few, blind)
+        path = written(some, "ardupilot", tmp_path / sensor)
+        assert sensor.upper() not in path.read_text().partition("INS_")[2]
+        says = load_exporter("px4").write(some, tmp_path / sensor / "p.params")
+        assert f"{sensor}_bias was not determined: not written" in says
+        assert not any("nominal one is used" in s for s in says)
+        says = load_exporter("kalibr").write(some, tmp_path / sensor / "k.yaml")
+        assert (
+            f"{name}_noise_density was not determined: the session has no {name}s"
+            in says
+        )
+
+
 @pytest.mark.parametrize("name", format_names())
 def test_the_command_writes_every_format_and_overwrites_none(
     name: str,

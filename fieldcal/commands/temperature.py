@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.export import number_of_sensor
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--format", choices=FORMATS, help="of the file (default: json)")
     add("-o", "--output", type=Path, metavar="FILE", help="write a file")
     add("--device", metavar="URL", help="write onto an autopilot, and read back")
-    add("--instance", type=int, default=0, metavar="N",
+    add("--instance", type=number_of_sensor, default=0, metavar="N",
         help="autopilots: number of the sensor, from 0 (default: 0)")  # fmt: skip
     add("--yes", action="store_true", help="do not ask")
     add(

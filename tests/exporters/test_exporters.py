@@ -260,7 +260,7 @@ def test_sensors_are_counted_from_0(
 ) -> None:
     call = ["export", str(tmp_path), "--format", "px4", f"--instance={number}"]
     assert main(call) == 2
-    assert "is no number from 0 on" in capsys.readouterr().err
+    assert "is no number from 0 to 4" in capsys.readouterr().err
 
 
 def test_kalibr_predicts_what_was_recorded(

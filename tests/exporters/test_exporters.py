@@ -380,6 +380,23 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
 
 
+def test_apply_says_of_which_axes_the_nominal_values_are_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(9)
+    cal, raw = calibration(rng, 0.0), samples(rng)
+    source(tmp_path / "s", without(cal, "acc_scale.z", "gyr_bias.y"), raw)
+    out = tmp_path / "out.csv"
+    assert main(["apply", str(tmp_path / "s"), str(out)]) == 0
+    said = "nominal value is taken: acc_scale.z, gyr_bias.y, gyr_scale\n"
+    assert capsys.readouterr().err.endswith(said)
+    blind = replace(raw, gyr=np.full((len(raw), 3), np.nan))
+    few = without(cal, *(n for n in cal.names if n.startswith("gyr")))
+    source(tmp_path / "blind", few, blind)
+    assert main(["apply", str(tmp_path / "blind"), str(out)]) == 0
+    assert "nominal" not in capsys.readouterr().err
+
+
 def test_a_sensor_that_was_not_recorded_is_said_as_it_is(tmp_path: Path) -> None:
     """Neither parameters that are not written nor windows are what is wrong."""
     rng = np.random.default_rng(6)

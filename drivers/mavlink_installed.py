@@ -17,11 +17,12 @@ Frame: device axes. Source: parameter lists of ArduPilot (INS_*) and PX4 (CAL_*)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from fieldcal.calibration import Nominal
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 
@@ -34,6 +35,33 @@ GYRO_CAL_AT_START = "INS_GYR_CAL"
 """Parameter of ArduPilot: whether it averages its gyroscopes at each start."""
 
 
+MOST_SENSORS = 5
+"""Largest number of IMUs of an autopilot."""
+
+NUMBERED_SENSORS = 3
+"""ArduPilot's sensors whose number follows the sensor's name, as in INS_ACC2OFFS; that
+of further ones comes first, as in INS4_ACCOFFS."""
+
+
+def ardupilot_prefix(what: str, instance: int, first: str = "") -> str:
+    """Beginning of ArduPilot's names of the parameters of one IMU.
+
+    Parameters
+    ----------
+    what : ``ACC``, ``GYR`` or ``TCAL``
+    instance : number of the IMU, from 0
+    first : number of the first IMU in the name: most names have none there
+
+    >>> [ardupilot_prefix("ACC", n) for n in (0, 1, 3)]
+    ['INS_ACC', 'INS_ACC2', 'INS4_ACC']
+
+    """
+    number = instance + 1
+    if number > NUMBERED_SENSORS:
+        return f"INS{number}_{what}"
+    return f"INS_{what}{number if instance else first}"
+
+
 def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]:
     """Names of the parameters for offsets, scales and mounting, by what they hold.
 
@@ -41,8 +69,7 @@ def parameter_names(autopilot: int, instance: int) -> dict[str, tuple[str, ...]]
     ('INS_ACC2SCAL_X', 'INS_ACC2SCAL_Y', 'INS_ACC2SCAL_Z')
     """
     if autopilot == ARDUPILOT:
-        acc = "INS_ACC" if instance == 0 else f"INS_ACC{instance + 1}"
-        gyr = "INS_GYR" if instance == 0 else f"INS_GYR{instance + 1}"
+        acc, gyr = (ardupilot_prefix(triad, instance) for triad in ("ACC", "GYR"))
         return {
             "acc_offset": tuple(f"{acc}OFFS_{axis}" for axis in AXES),
             "acc_scale": tuple(f"{acc}SCAL_{axis}" for axis in AXES),
@@ -65,7 +92,7 @@ def other_processing_parameters(autopilot: int, instance: int) -> tuple[str, ...
     Not every program has them; one without an answer is ignored.
     """
     if autopilot == ARDUPILOT:
-        corrects = f"INS_TCAL{instance + 1}_ENABLE"
+        corrects = f"{ardupilot_prefix('TCAL', instance, '1')}_ENABLE"
         return ("INS_ACCEL_FILTER", "INS_GYRO_FILTER", corrects, GYRO_CAL_AT_START)
     if autopilot == PX4:
         cutoffs = ("IMU_ACCEL_CUTOFF", "IMU_GYRO_CUTOFF")
@@ -137,6 +164,21 @@ class InstalledCalibration:
         """Return ``acc_offset``, ``acc_scale`` or ``gyr_offset``, (3,), nan unknown."""
         some = parameter_names(self.autopilot, self.instance).get(what, ("",) * 3)
         return np.array([self.values.get(name, np.nan) for name in some])
+
+    def nominal(self, otherwise: Nominal) -> Nominal:
+        """Return what counts where the samples do not determine a parameter.
+
+        Samples of which o and k were taken out are r = o + f / k as far as is known:
+        what is not determined stays as installed. `otherwise` is for other samples.
+        """
+        if not self.taken_out or self.missing or self.damage:
+            return otherwise
+        return replace(
+            otherwise,
+            acc_bias=tuple(self.vector("acc_offset").tolist()),
+            acc_scale=tuple((1 / self.vector("acc_scale")).tolist()),
+            gyr_bias=tuple(self.vector("gyr_offset").tolist()),
+        )
 
     def parameters_after(
         self, acc_bias: Array, acc_scale: Array, gyr_bias: Array

@@ -1,7 +1,8 @@
 """Opens a simulator's output: a session folder, or any file that import reads.
 
 A file need not state positions. If the recording's windows, counted from the first
-sample, lie within rests of the simulated device, it followed the same schedule.
+sample, lie within rests of the simulated device, it followed the same schedule; what is
+beyond a rest, because the simulator began to write a little later, is cut off.
 Otherwise its rests are the recording's positions in order, if their numbers agree.
 """
 
@@ -127,11 +128,12 @@ def _description_of_simulated(
     )  # fmt: skip
     later = float(block.t[0] - real.t[0])
     moved = [None if w is None else (w[0] + later, w[1] + later) for w in about.windows]
-    if all(w is None or _lies_in_rest(w, rests) for w in moved):
+    resting = [None if w is None else _part_in_rest(w, rests) for w in moved]
+    if sum(part is not None for part in resting) == len(ours):
         gaps = tuple(
             (start + later, end + later) for start, end in about.excluded_spans
         )
-        return replace(about, windows=tuple(moved), excluded_spans=gaps)
+        return replace(about, windows=tuple(resting), excluded_spans=gaps)
     if len(rests) == len(ours) == len(about.windows):
         return replace(about, windows=tuple(rests), excluded_spans=())
     raise InputError(
@@ -142,7 +144,9 @@ def _description_of_simulated(
     )
 
 
-def _lies_in_rest(window: Span, rests: Sequence[Span]) -> bool:
+def _part_in_rest(window: Span, rests: Sequence[Span]) -> Span | None:
+    """The part of a window in a rest; None if too much of it is in none."""
     start, end = window
-    most = max((min(end, b) - max(start, a) for a, b in rests), default=0.0)
-    return most > INSIDE * (end - start)
+    parts = [(max(start, a), min(end, b)) for a, b in rests]
+    first, last = max(parts, key=lambda part: part[1] - part[0], default=(0.0, 0.0))
+    return (first, last) if last - first > INSIDE * (end - start) else None

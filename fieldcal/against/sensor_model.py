@@ -77,6 +77,12 @@ class SensorModel:
             return self.shown.level(channel)
         return self.noise.get(channel, 0.0)
 
+    def knows_noise(self, triad: str) -> bool:
+        """Whether the noise of "acc" or "gyr" is known, of this model or as shown."""
+        if any(channel[0] == triad[0] for channel in self.noise):
+            return True
+        return self.shown is not None and self.shown.knows_noise(triad)
+
     def matrix(self, triad: str) -> Array:
         """Scale factors and cross-coupling of "acc" or "gyr", (3, 3)."""
         out = np.diag(self.group(f"{triad}_scale"))

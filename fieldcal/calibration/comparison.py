@@ -3,7 +3,9 @@
     d = a - b,  C = C_a + C_b,  z_i = d_i / sqrt(C_ii),  chi2 = d^T C^-1 d
 
 for the parameters that both have. The two are taken as independent, which calibrations
-from different recordings are.
+from different recordings are. Where C has no inverse, chi2 is that of the combinations
+that have an uncertainty. A parameter that both know exactly has z = 0 if it is the same
+in both; if not, z and chi2 are infinite.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ class Comparison:
     ----------
     names : (k,) parameters that both have
     difference, sigma : (k,) first less second, and its standard uncertainty
-    chi2, dof : of all differences together
+    chi2, dof : of all differences together; dof is the rank of C
     chance : probability of such a chi2 if nothing has changed
     only_first, only_second : parameters that one of them lacks
 
@@ -50,7 +52,11 @@ class Comparison:
     @property
     def z(self) -> Array:
         """Each difference in standard uncertainties, (k,)."""
-        return self.difference / self.sigma
+        exact = np.where(
+            self.difference == 0, 0.0, np.copysign(np.inf, self.difference)
+        )
+        known = self.sigma > 0
+        return np.where(known, self.difference / np.where(known, self.sigma, 1), exact)
 
     @property
     def changed(self) -> tuple[str, ...]:
@@ -81,17 +87,26 @@ def compare(first: Calibration, second: Calibration) -> Comparison:
             )
     d = first.values[i] - second.values[j]
     c = first.covariance[np.ix_(i, i)] + second.covariance[np.ix_(j, j)]
-    sigma = np.sqrt(np.diag(c))
-    # scaled, so that rad/s and m/s^2 do not make it look singular
-    z = d / sigma
-    chi2 = float(z @ np.linalg.solve(c / np.outer(sigma, sigma), z))
+    chi2, dof = _chi2_of_differences(d, c)
     return Comparison(
         tuple(common),
         d,
-        sigma,
+        np.sqrt(np.diag(c)),
         chi2,
-        len(common),
-        chi2_tail(chi2, len(common)),
+        dof,
+        chi2_tail(chi2, dof),
         tuple(n for n in first.names if n not in common),
         tuple(n for n in second.names if n not in common),
     )
+
+
+def _chi2_of_differences(d: Array, c: Array) -> tuple[float, int]:
+    """Chi-squared of differences (k,) with the covariance (k, k), and its rank."""
+    sigma = np.sqrt(np.diag(c))
+    known = sigma > 0
+    s, z = sigma[known], d[known] / sigma[known]
+    # scaled, so that rad/s and m/s^2 do not make it look singular
+    power, axes = np.linalg.eigh(c[np.ix_(known, known)] / np.outer(s, s))
+    apart = power > len(power) * np.finfo(float).eps * power.max(initial=0.0)
+    chi2 = float(np.sum((axes[:, apart].T @ z) ** 2 / power[apart]))
+    return np.inf if d[~known].any() else chi2, int(apart.sum())

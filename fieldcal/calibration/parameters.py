@@ -103,6 +103,14 @@ class Calibration:
         """The ids present, in order."""
         return tuple(dict.fromkeys(group_of(n) for n in self.names))
 
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Full names of the biases and scale factors that were not determined."""
+        every = (
+            f"{group}.{a}" for group, (axes, _) in COMPONENTS.items() for a in axes
+        )
+        return tuple(name for name in every if name not in self.names)
+
     def components(self, group: str) -> tuple[str, ...]:
         """Component names of a group that were determined."""
         parsed = map(ParameterName.of, self.names)

@@ -31,7 +31,7 @@ def format_with_sigma(value: float, sigma: float) -> tuple[str, str]:
     ('0.0000', '0.0014')
     """
     if not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.6g}", "?"
+        return f"{value:z.6g}", "?"
     digits = max(0, 1 - math.floor(math.log10(sigma)))
     return f"{value:z.{digits}f}", f"{sigma:.{digits}f}"
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from fieldcal.calibration import Calibration
     from fieldcal.core.samples import Block
 
 EXAMPLE = """\
@@ -42,16 +43,29 @@ def run(args: argparse.Namespace) -> int:
     calibration = read_calibration(args.calibration or args.session)
     check_same_installed(calibration, session)
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
-    kept = [g for g in ("acc_scale", "gyr_scale") if g not in calibration.groups]
-    for group in kept:
-        sys.stderr.write(
-            f"fieldcal apply: {group} is not in the calibration, the nominal one is "
-            "used\n"
-        )
     block = calibration.apply(session.block, nominal)
+    if kept := _nominal_parameters(calibration, block):
+        sys.stderr.write(
+            "fieldcal apply: not determined, the nominal value is taken:"
+            f" {', '.join(kept)}\n"
+        )
     _write_samples(args.out, block)
     sys.stdout.write(f"written: {args.out}, {len(block)} samples, m/s^2 and rad/s\n")
     return 0
+
+
+def _nominal_parameters(calibration: Calibration, block: Block) -> list[str]:
+    """Names of biases and scale factors that were not determined, of what was measured.
+
+    A group of which nothing was determined is named as a whole.
+    """
+    from fieldcal.calibration.names import group_of
+
+    sensors = {"acc": block.acc, "gyr": block.gyr}
+    measured = [name for name, three in sensors.items() if (three == three).any()]
+    out = [n for n in calibration.undetermined if n[:3] in measured]
+    whole = (n if group_of(n) in calibration.groups else group_of(n) for n in out)
+    return list(dict.fromkeys(whole))
 
 
 def _with_units(table: pa.Table) -> pa.Table:

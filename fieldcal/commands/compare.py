@@ -142,8 +142,9 @@ def comparison_table(found: Comparison) -> str:
         found.names, found.difference, found.sigma, found.z, strict=True
     ):
         value, sigma = format_with_sigma(-float(d), float(s))
+        sigma = sigma if s > 0 else "0"
         mark = "  changed" if name in found.changed else ""
-        lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:12.1f}{mark}")
+        lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:z12.1f}{mark}")
     for which, names in (("first", found.only_first), ("second", found.only_second)):
         if names:
             lines.append(f"only in the {which}: {', '.join(names)}")
@@ -161,7 +162,7 @@ def comparison_document(found: Comparison) -> dict[str, object]:
         "difference": [-float(d) for d in found.difference],
         "sigma": found.sigma.tolist(),
         "changed": list(found.changed),
-        "chi2": found.chi2,
+        "chi2": found.chi2 if np.isfinite(found.chi2) else None,
         "dof": found.dof,
         "chance": found.chance,
         "only_first": list(found.only_first),

@@ -42,8 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def number_of_sensor(text: str) -> int:
     """Number of a sensor, from 0."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is no number from 0 on")
+    from fieldcal.drivers.mavlink_installed import MOST_SENSORS
+
+    last = MOST_SENSORS - 1
+    if not text.isdecimal() or int(text) > last:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number from 0 to {last}")
     return int(text)
 
 

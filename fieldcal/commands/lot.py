@@ -86,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _print_lot(found: LotAnalysis) -> None:
     from fieldcal.calibration.wording import format_unit, format_with_sigma
+    from fieldcal.commands.text_columns import text_columns
 
     say = sys.stdout.write
     share, low, high = (100 * part for part in found.yield_share)
@@ -95,14 +96,16 @@ def _print_lot(found: LotAnalysis) -> None:
         f"yield {found.good} of {found.judged}: {share:.1f} % (95 %: {low:.1f} to"
         f" {high:.1f} %)\n\n"
     )
-    say(f"{'parameter':24}{'mean ± of it':>24}{'spread (95 %)':>32}{'Cpk':>14}\n")
+    rows = [["parameter", "mean ± of it", "spread (95 %)", "Cpk"]]
     for one in found.parameters.values():
         fit = one.distribution
         mean = " ± ".join(format_with_sigma(fit.mean, fit.mean_sigma))
         wide = f"{fit.spread:.2g} ({fit.low:.2g} to {fit.high:.2g})"
         unit = format_unit(one.unit)
         cpk = "" if one.cpk is None else f"{one.cpk:.2f} ± {one.cpk_sigma:.2f}"
-        say(f"{one.name:24}{mean:>24}{f'{wide} {unit}':>32}{cpk:>14}\n")
+        rows.append([one.name, mean, f"{wide} {unit}".rstrip(), cpk])
+    for line in text_columns(rows):
+        say(line + "\n")
     for line in lot_findings(found):
         say(line + "\n")
 

@@ -231,7 +231,7 @@ def _recalibration_times(
     """When each bias leaves the limit of the grade, and the start of that time."""
     from fieldcal.history.location import default_location
     from fieldcal.history.store import History
-    from fieldcal.noise.recalibration import recalibration_time
+    from fieldcal.noise.recalibration import AVERAGED_S, recalibration_time
 
     runs = History(history or default_location()).runs(serial) if serial else ()
     out = {}
@@ -239,7 +239,7 @@ def _recalibration_times(
         group = "acc_bias" if name[0] == "a" else "gyr_bias"
         steps = _history_steps(runs, f"{group}.{name[1]}")
         limit = float(getattr(allowed, f"{group}_sigma"))
-        variance = channel.averaging.at(30.0)[0] ** 2
+        variance = channel.averaging.at(AVERAGED_S)[0] ** 2
         pair = channel.pair
         unseen = pair.walk / pair.left_out if math.isnan(pair.walk_sigma) else 0.0
         out[name] = recalibration_time(

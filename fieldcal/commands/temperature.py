@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.export import number_of_sensor
 from fieldcal.core.errors import InputError
 from fieldcal.core.escaping import escape_line
 
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--format", choices=FORMATS, help="of the file (default: json)")
     add("-o", "--output", type=Path, metavar="FILE", help="write a file")
     add("--device", metavar="URL", help="write onto an autopilot, and read back")
-    add("--instance", type=int, default=0, metavar="N",
+    add("--instance", type=number_of_sensor, default=0, metavar="N",
         help="autopilots: number of the sensor, from 0 (default: 0)")  # fmt: skip
     add("--yes", action="store_true", help="do not ask")
     add(
@@ -182,6 +183,7 @@ def _print_model(found: ThermalModel, at: float | None, last: ThermalPoint) -> N
         format_with_sigma,
         parameter_title,
     )
+    from fieldcal.commands.text_columns import text_columns
     from fieldcal.thermal.wording import REPORTED_SIGMAS, change_sentences
 
     say = sys.stdout.write
@@ -192,17 +194,17 @@ def _print_model(found: ThermalModel, at: float | None, last: ThermalPoint) -> N
     shown = [found.low, found.reference, found.high]
     if at is not None:
         shown = sorted({*shown, at})
-    head = "".join(f"{f'{t:.1f} °C':>24}" for t in shown)
-    say(f"{'parameter':24}{head}  {'from run to run':>16}  order\n")
+    heads = [f"{t:.1f} °C" for t in shown]
+    rows = [["parameter", *heads, "from run to run", "order"]]
     values = {t: found.at(t) for t in shown}
     for name, curve in found.curves.items():
-        cells = "".join(
-            f"{' ± '.join(format_with_sigma(*values[t][name])):>24}" for t in shown
-        )
+        cells = [" ± ".join(format_with_sigma(*values[t][name])) for t in shown]
         order = f"{curve.order} (P = {curve.orders[curve.order]:.2f})"
         unit = format_unit(curve.unit)
-        spread = f"± {curve.spread:.2g} {unit}"
-        say(f"{parameter_title(name):24}{cells}  {spread:>16}  {order}\n")
+        spread = f"± {curve.spread:.2g} {unit}".rstrip()
+        rows.append([parameter_title(name), *cells, spread, order])
+    for line in text_columns(rows):
+        say(line + "\n")
     if at is not None:
         told, rest = change_sentences(found.change(at, last.temperature))
         say(

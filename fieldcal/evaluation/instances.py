@@ -36,7 +36,7 @@ class Instance(NamedTuple):
     ----------
     name : of the instance
     length : R of (1), m/s^2
-    sigma : its standard uncertainty, m/s^2
+    sigma : its standard uncertainty, m/s^2; nan with a single rest
     every_way : whether the rests point in all directions, so that bias cancels
     rests : number of rests
     of_g : R / g - 1
@@ -61,9 +61,11 @@ class Instance(NamedTuple):
 
     def sentence(self) -> str:
         """One sentence with the numbers."""
+        error = f" ± {self.sigma:.1g}" if np.isfinite(self.sigma) else ""
+        many = "a single rest" if self.rests == 1 else f"{self.rests} rests"
         text = (
-            f"{self.name}: |a| at rest is {self.length:.4f} ± {self.sigma:.1g} m/s²"
-            f" in {self.rests} rests{'' if self.every_way else ', bias included'},"
+            f"{self.name}: |a| at rest is {self.length:.4f}{error} m/s² in {many}"
+            f"{'' if self.every_way else ', bias included'},"
             f" {100 * self.of_g:+.2f} % of g"
         )
         if np.isfinite(self.of_others):
@@ -123,5 +125,5 @@ def _rest_length(means: Array) -> tuple[float, float, bool]:
             away = np.linalg.norm(means - center[:3], axis=1) - radius
             spare = len(means) - len(center)
             return radius, float(np.sqrt((away @ away) / spare / len(means))), True
-    sigma = float(lengths.std(ddof=1)) if len(lengths) > 1 else 0.0
-    return float(np.median(lengths)), sigma / np.sqrt(len(lengths)), False
+    sigma = lengths.std(ddof=1) / np.sqrt(len(lengths)) if len(lengths) > 1 else np.nan
+    return float(np.median(lengths)), float(sigma), False

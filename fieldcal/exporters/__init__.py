@@ -13,7 +13,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-from fieldcal.calibration import COMPONENTS
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import InputError
 from fieldcal.core.plugins import module_names
@@ -54,10 +53,7 @@ class ExportSource:
     @property
     def undetermined(self) -> list[str]:
         """Biases and scale factors for which the nominal value is taken."""
-        every = [
-            f"{group}.{a}" for group, (axes, _) in COMPONENTS.items() for a in axes
-        ]
-        return [name for name in every if name not in self.calibration.names]
+        return list(self.calibration.undetermined)
 
     @property
     def notices(self) -> list[str]:

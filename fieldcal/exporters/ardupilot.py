@@ -15,7 +15,7 @@ Units: m/s^2, rad/s. Source: ArduPilot's parameter list, INS_*.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +23,7 @@ import numpy as np
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.calibration.diagonal import DiagonalCalibration, reduce_to_diagonal
+from fieldcal.calibration.names import sensor_of
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
@@ -35,6 +36,9 @@ from fieldcal.session.folder import write_atomically
 
 WHAT = "ArduPilot parameters (INS_ACCOFFS, INS_ACCSCAL, INS_GYROFFS)"
 ENDING = ".param"
+
+WRITTEN = ("acc_bias", "acc_scale", "gyr_bias")
+"""Groups that autopilots have parameters for."""
 
 LARGEST_OFFSET, LARGEST_SCALE_ERROR = 3.5, 0.2
 """Largest offset, m/s^2, and difference of a scale from 1 that ArduPilot accepts."""
@@ -105,8 +109,10 @@ def autopilot_parameters(
             "out: export the format of that program"
         )
     device = installed or _nothing_installed(autopilot, instance)
+    start = nominal or Nominal()
+    start = start if installed is None else installed.nominal(start)
     acc, gyr = (
-        reduce_to_diagonal(calibration, sensor, nominal) for sensor in ("acc", "gyr")
+        reduce_to_diagonal(calibration, sensor, start) for sensor in ("acc", "gyr")
     )
     every = device.parameters_after(acc.bias, acc.scale, gyr.bias)
     known = parameter_names(autopilot, device.instance)
@@ -118,7 +124,12 @@ def autopilot_parameters(
         kept += known["gyr_offset"]
     if not kept:
         raise InputError("the calibration has neither biases nor scales to install")
-    says = _left_out_notices(calibration, acc, gyr)
+    says = [
+        *_left_out_notices(calibration, acc, gyr),
+        *_undetermined_notices(
+            calibration, installed is not None and installed.taken_out
+        ),
+    ]
     return ArdupilotParameters({name: every[name] for name in kept}, tuple(says))
 
 
@@ -151,13 +162,20 @@ def _left_out_notices(
             "gyro_cross_coupling has no place in these parameters: leaving it out "
             f"makes errors up to {worst:.3g} of the rate"
         )
-    for group in ("acc_bias", "acc_scale", "gyr_bias"):
-        if group not in calibration.groups:
-            says.append(
-                f"{group} was not determined: "
-                + ("not written" if group == "gyr_bias" else "the nominal one is used")
-            )
     return says
+
+
+def _undetermined_notices(calibration: Calibration, known: bool) -> Iterator[str]:
+    """Sentences about what was not determined; `known` if the installed one stays."""
+    instead = "the installed one stays" if known else "the nominal one is used"
+    written = {sensor_of(group) for group in calibration.groups if group in WRITTEN}
+    for group in WRITTEN:
+        lacking = [a for a in "xyz" if f"{group}.{a}" not in calibration.names]
+        if not lacking:
+            continue
+        what = group if len(lacking) == 3 else f"{group} {', '.join(lacking)}"
+        then = instead if sensor_of(group) in written else "not written"
+        yield f"{what} was not determined: {then}"
 
 
 def write(source: ExportSource, path: Path) -> list[str]:

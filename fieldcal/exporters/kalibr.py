@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.samples import Array, Block
+from fieldcal.core.samples import ACC, GYR, Array, Block
 from fieldcal.exporters import ExportSource
 from fieldcal.session.folder import Session, write_atomically
 from fieldcal.session.noise_file import read_noise
@@ -105,16 +105,18 @@ def write(source: ExportSource, path: Path) -> list[str]:
 def _densities_of_windows(session: Session, says: list[str]) -> list[str]:
     """Lines with the noise densities of the session's windows, (3)."""
     noise, lines = window_noise_density(session), []
-    for name, values in (("accelerometer", noise[:3]), ("gyroscope", noise[3:])):
+    six = session.block.six
+    for name, part in (("accelerometer", ACC), ("gyroscope", GYR)):
+        values = noise[part]
         known = values[np.isfinite(values)]
         if len(known):
             lines.append(f"{name}_noise_density: {known.max():.6g}")
         else:
             lines.append(f"# {name}_noise_density: not determined")
-            says.append(
-                f"{name}_noise_density was not determined: no window of the session "
-                "lasts 2 s"
-            )
+            why = "no window of the session lasts 2 s"
+            if not np.isfinite(six[:, part]).any():
+                why = f"the session has no {name}s"
+            says.append(f"{name}_noise_density was not determined: {why}")
         lines.append(f"# {name}_random_walk: not determined")
     says.append(
         "the random walks are not determined by windows of seconds: run fieldcal noise "

@@ -4,7 +4,8 @@
     var o' = var b / k^2,  var k' = k^2 var s / s^4                                 (2)
 
 with o, k what was installed while it was recorded, b, s what was found from that. What
-was not determined is as nominal. Units m/s^2, rad/s; device axes.
+was not determined stays as installed, or is as nominal if the samples have o and k in
+them. Units m/s^2, rad/s; device axes.
 """
 
 from __future__ import annotations
@@ -85,7 +86,8 @@ def changes(
         If what was installed is not known whole, or the board is mounted turned.
 
     """
-    acc, gyr = (reduce_to_diagonal(found, sensor, nominal) for sensor in ("acc", "gyr"))
+    start = installed.nominal(nominal)
+    acc, gyr = (reduce_to_diagonal(found, sensor, start) for sensor in ("acc", "gyr"))
     new = installed.parameters_after(acc.bias, acc.scale, gyr.bias)  # (1)
     k = np.ones(3) if installed.taken_out else installed.vector("acc_scale")
     sigma = {

@@ -28,7 +28,12 @@ from numpy.polynomial import Polynomial
 from fieldcal.core.errors import InputError
 from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array
-from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4, parameter_names
+from fieldcal.drivers.mavlink_installed import (
+    ARDUPILOT,
+    PX4,
+    ardupilot_prefix,
+    parameter_names,
+)
 from fieldcal.thermal import ThermalCurve, ThermalModel
 from fieldcal.thermal.curves import TERMS
 
@@ -95,7 +100,7 @@ def thermal_parameters(
         if (bias := model.of(f"{sensor}_bias")) is None:
             continue
         if autopilot == ARDUPILOT:
-            values |= _ardupilot(sensor, instance + 1, bias, model)
+            values |= _ardupilot(sensor, instance, bias, model)
         else:
             values |= _px4(sensor, instance, bias, model, ids)
         values |= _there(known[f"{sensor}_offset"], bias, UNITS[sensor])
@@ -129,22 +134,24 @@ def _zip(
 
 
 def _ardupilot(
-    sensor: str, n: int, bias: list[ThermalCurve], model: ThermalModel
+    sensor: str, instance: int, bias: list[ThermalCurve], model: ThermalModel
 ) -> dict[str, ThermalParameter]:
     """Coefficients of (1), about 35 °C."""
     word = SENSORS[sensor][0]
+    head = ardupilot_prefix("TCAL", instance, "1")
+    caltemp = f"{ardupilot_prefix(word, instance, '1')}_CALTEMP"
     shift = _shifted(ARDUPILOT_REFERENCE_C - model.reference)
     values = {
-        f"INS_TCAL{n}_ENABLE": ThermalParameter(1.0),
-        f"INS_TCAL{n}_TMIN": ThermalParameter(model.low, unit="degC"),
-        f"INS_TCAL{n}_TMAX": ThermalParameter(model.high, unit="degC"),
-        f"INS_{word}{n}_CALTEMP": ThermalParameter(model.reference, unit="degC"),
+        f"{head}_ENABLE": ThermalParameter(1.0),
+        f"{head}_TMIN": ThermalParameter(model.low, unit="degC"),
+        f"{head}_TMAX": ThermalParameter(model.high, unit="degC"),
+        caltemp: ThermalParameter(model.reference, unit="degC"),
     }
     for axis, curve in zip("XYZ", bias, strict=True):
         a = shift @ curve.coefficients
         sigma = np.sqrt(np.diag(shift @ curve.covariance @ shift.T))
         for k in range(1, TERMS):
-            values[f"INS_TCAL{n}_{word}{k}_{axis}"] = ThermalParameter(
+            values[f"{head}_{word}{k}_{axis}"] = ThermalParameter(
                 MICRO * a[k], MICRO * sigma[k], _unit(f"1e-6*{UNITS[sensor]}", k)
             )
     return values

@@ -18,8 +18,10 @@ from fieldcal.core.errors import DeviceError, InputError
 from fieldcal.drivers.mavlink_dialog import parameter_list
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
+    MOST_SENSORS,
     PX4,
     InstalledCalibration,
+    ardupilot_prefix,
     identity_parameters,
     parameter_names,
 )
@@ -33,9 +35,9 @@ SAVED = "installed-before-"
 GYR_OFFSETS = {
     name
     for autopilot in (ARDUPILOT, PX4)
-    for instance in range(3)
+    for instance in range(MOST_SENSORS)
     for name in parameter_names(autopilot, instance)["gyr_offset"]
-} | {f"INS_GYR{n}_CALTEMP" for n in (1, 2, 3)}
+} | {f"{ardupilot_prefix('GYR', n, '1')}_CALTEMP" for n in range(MOST_SENSORS)}
 """Parameters that an autopilot sets by itself."""
 
 

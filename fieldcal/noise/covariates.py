@@ -5,21 +5,23 @@
     E (c_k - z_k beta)^2 = S_k (1 - h_k),    h_k = z_k (Z' W Z)^-1 z_k' / S_k      (3)
 
 c are the coefficients of the last levels, z those of the thermometer and of the time. S
-comes from a fit of the residual, in turn. A covariate is accepted if the gain of
+comes from a fit of the residual, in turn, below the corner of a filter if there is one;
+in the end it is that of the chosen processes. A covariate is accepted if the gain of
 held-out coefficients, chi^2 / 2 - 1, exceeds its standard error, chi. The thermometer's
 own noise would bias (2) low, so only the part of z above that noise is used.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fieldcal.core.samples import Array
-from fieldcal.noise.likelihood import Powers, whittle_likelihood
+from fieldcal.noise.likelihood import Flags, Powers, whittle_likelihood
 from fieldcal.noise.spectrum import CosineSpectrum
-from fieldcal.noise.terms import fit_untimed_terms
+from fieldcal.noise.terms import fit_untimed_terms, without_filter
 
 ROUNDS = 3
 """Fits of beta and S in turn."""
@@ -37,11 +39,21 @@ class CovariateFit:
     powers : of the residual, (b, folds)
     found : value and standard error of each accepted covariate, by name: "R", channel
         units per s, and "temperature", per degree
+    used : coefficients (k,) of each of them
 
     """
 
     powers: Powers
     found: dict[str, tuple[float, float]]
+    used: dict[str, Array]
+
+    def at_level(
+        self, spectrum: CosineSpectrum, channel: int, level: Array
+    ) -> dict[str, tuple[float, float]]:
+        """`found` by (2), with the expected powers (b,) of the processes as S."""
+        z = _columns(self.used, len(spectrum.last.bin))
+        beta, covariance = _weighted_fit(spectrum, channel, z, level)
+        return _named(self.used, beta, covariance)
 
 
 def fit_covariates(
@@ -56,11 +68,14 @@ def fit_covariates(
     covariates : coefficients (k,) of each, by name
 
     """
-    best = _regress(spectrum, channel, {})
+    values = spectrum.last.values[:, channel]
+    whole = _powers_of_rest(spectrum, channel, values, np.ones(len(values)))
+    free = without_filter(spectrum, whole).free
+    best = _regress(spectrum, channel, {}, free)
     left = dict(covariates)
     while left:
         tried = [
-            _regress(spectrum, channel, {**best.used, name: left[name]})
+            _regress(spectrum, channel, {**best.used, name: left[name]}, free)
             for name in left
         ]
         one = max(tried, key=lambda f: f.log_likelihood)
@@ -70,7 +85,9 @@ def fit_covariates(
         best = one
         left = {n: z for n, z in left.items() if n not in best.used}
     return CovariateFit(
-        _powers_of_rest(spectrum, channel, best.rest, best.weight), best.found
+        _powers_of_rest(spectrum, channel, best.rest, best.weight),
+        best.found,
+        best.used,
     )
 
 
@@ -84,30 +101,53 @@ class _Regression:
 
 
 def _regress(
-    spectrum: CosineSpectrum, channel: int, used: dict[str, Array]
+    spectrum: CosineSpectrum, channel: int, used: dict[str, Array], free: Flags
 ) -> _Regression:
+    """Regress a channel; bins that are `free` (b,) do not tell the level of the rest.
+
+    Else the bend of a filter would be taken for a slope towards low frequencies, where
+    the covariates are.
+    """
     values = spectrum.last.values[:, channel]
-    z = np.array(list(used.values())).reshape(len(used), len(values)).T
+    z = _columns(used, len(values))
     rest: Array = values
     one, h = np.ones(len(values)), np.zeros(len(values))
     beta: Array = np.zeros(len(used))
     covariance: Array = np.zeros((len(used), len(used)))
     for _ in range(ROUNDS if used else 1):
-        powers = _powers_of_rest(spectrum, channel, rest, one)
+        powers = replace(_powers_of_rest(spectrum, channel, rest, one), free=free)
         level = fit_untimed_terms(spectrum, powers).level
-        each = level[spectrum.last.bin]
-        white = z / each[:, None]
-        covariance = np.linalg.pinv(z.T @ white)
-        beta = covariance @ (white.T @ values)  # (2)
+        beta, covariance = _weighted_fit(spectrum, channel, z, level)
         rest = values - z @ beta
-        h = np.sum((white @ covariance) * z, axis=1)  # (3)
+        own = level[spectrum.last.bin]
+        h = np.sum((z @ covariance) * z, axis=1) / own  # (3)
     powers = _powers_of_rest(spectrum, channel, rest, one)
     total = whittle_likelihood(
-        level, powers.power.sum(axis=1), powers.count.sum(axis=1)
+        level[~free], powers.power[~free].sum(axis=1), powers.count[~free].sum(axis=1)
     )
-    sigma = np.sqrt(np.diag(covariance))
-    found = {n: (float(b), float(s)) for n, b, s in zip(used, beta, sigma, strict=True)}
+    found = _named(used, beta, covariance)
     return _Regression(used, rest, np.clip(1 - h, 1e-9, 1), found, total)
+
+
+def _columns(used: Mapping[str, Array], count: int) -> Array:
+    """Coefficients of covariates, (k, p), k of them."""
+    return np.array(list(used.values())).reshape(len(used), count).T
+
+
+def _weighted_fit(
+    spectrum: CosineSpectrum, channel: int, z: Array, level: Array
+) -> tuple[Array, Array]:
+    """Beta (p,) of (2) with its covariance, for coefficients z (k, p) and S (b,)."""
+    white = z / level[spectrum.last.bin][:, None]
+    covariance = np.linalg.pinv(z.T @ white)
+    return covariance @ (white.T @ spectrum.last.values[:, channel]), covariance
+
+
+def _named(
+    used: Iterable[str], beta: Array, covariance: Array
+) -> dict[str, tuple[float, float]]:
+    sigma = np.sqrt(np.diag(covariance))
+    return {n: (float(b), float(s)) for n, b, s in zip(used, beta, sigma, strict=True)}
 
 
 def _powers_of_rest(

@@ -205,10 +205,11 @@ def _estimate_channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEs
             covariates["temperature"] = warmth
     left = fit_covariates(spectrum, i, covariates)
     chosen = choose_processes(spectrum, left.powers)
+    trends = left.at_level(spectrum, i, chosen.best.level)
     drawn = tuple(draw_sizes(spectrum, chosen))
     processes = _process_sizes(chosen.best, UNITS[i])
-    if "R" in left.found:
-        value, sigma = left.found["R"]
+    if "R" in trends:
+        value, sigma = trends["R"]
         processes["R"] = ProcessSize(value, sigma, PROCESS_UNITS["R"].format(UNITS[i]))
     free = spectrum.frequency[chosen.powers.free]
     return ChannelEstimate(
@@ -216,14 +217,14 @@ def _estimate_channel(spectrum: CosineSpectrum, i: int, warm: bool) -> ChannelEs
         UNITS[i],
         processes,
         _upper_limits(drawn, processes, UNITS[i]),
-        left.found.get("temperature"),
+        trends.get("temperature"),
         drawn,
         measured_allan_deviation(
-            spectrum.stretches, i, left.found.get("temperature", (0.0,))[0]
+            spectrum.stretches, i, trends.get("temperature", (0.0,))[0]
         ),
         fit_filter_noise(spectrum, chosen, drawn),
         averaging_error(
-            drawn, left.found.get("R", (0.0,))[0], spectrum.dt, spectrum.seconds
+            drawn, trends.get("R", (0.0,))[0], spectrum.dt, spectrum.seconds
         ),
         chosen.dispersion,
         float(free.min()) if len(free) else np.inf,

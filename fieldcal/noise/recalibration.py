@@ -5,8 +5,13 @@ After t a bias has changed by a normally distributed amount of variance
     v(t) = K^2 t + D(t) + V,     mean R t                                          (1)
 
 with D the structure function of flicker and Gauss-Markov processes,
-2 s^2 (1 - exp(-t/T)) of each, and V the variance of the calibration itself. With L the
-limit of the grade the chance to be beyond it is
+
+    D(t) = 2 s^2 (T/A (1 - exp(-A/T)))^2 (1 - exp(-t/T))                           (4)
+
+of each, and V the variance of the calibration itself. A bias is a mean over A, as a
+calibration takes it: a process that is quicker, such as that of a filter, averages out
+and is white noise, which V has. With L the limit of the grade the chance to be beyond
+it is
 
     P(t) = 1 - Phi((L - R t)/sqrt v) + Phi((-L - R t)/sqrt v)                      (2)
 
@@ -37,6 +42,9 @@ CHANCES = (0.05, 0.32)
 
 MAX_INTERVAL_S = 20 * 365.25 * 86400.0
 """Longest time that is stated, s."""
+
+AVERAGED_S = 30.0
+"""A of (4), s; the papers use 30 to 60 s."""
 
 MIN_HISTORY_STEPS = 3
 """Fewest steps of the history from which its walk is estimated."""
@@ -144,10 +152,12 @@ def _structure(
         if term == "K" and known is None:
             total += size * seconds
         elif term == "G":
-            total += -2 * size * np.expm1(-seconds / time)
+            kept = -np.expm1(-AVERAGED_S / time) * time / AVERAGED_S
+            total += -2 * size * kept**2 * np.expm1(-seconds / time)  # (4)
         elif term in ("B", "BT"):
-            # of each e-fold of correlation times up to T, those below t have moved
-            total += 2 * size / np.pi * np.log1p(np.minimum(seconds, time))
+            # of each e-fold of correlation times from A to T, those below t have moved
+            moved = np.maximum(np.minimum(seconds, time) / AVERAGED_S, 1.0)
+            total += 2 * size / np.pi * np.log(moved)
     if known is None:
         return total if "K" in one.terms else total + unseen**2 * seconds
     return total + known * seconds

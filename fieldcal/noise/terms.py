@@ -61,7 +61,7 @@ class ChosenProcesses:
 
 def choose_processes(spectrum: CosineSpectrum, powers: Powers) -> ChosenProcesses:
     """Choose the processes of a channel."""
-    powers = _without_filter(spectrum, powers)
+    powers = without_filter(spectrum, powers)
     best, seen = grow_set(spectrum, powers)
     dispersion = _dispersion(powers, best)
     if dispersion > 1:
@@ -221,7 +221,7 @@ def _better(more: NoiseFit, less: NoiseFit) -> bool:
     return bool(gain > np.sqrt(2 * likely))
 
 
-def _without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
+def without_filter(spectrum: CosineSpectrum, powers: Powers) -> Powers:
     """Leave bins above a corner out of the fit, if that predicts better."""
     top = spectrum.frequency.max()
     best, chosen = fit_untimed_terms(spectrum, powers), powers

@@ -163,6 +163,26 @@ def test_what_is_not_changed_stays_where_one_element_holds_several(
     np.testing.assert_allclose(axes(found, "CAL_ACC0_{}SCALE"), SCALE)
 
 
+def test_a_triad_that_neither_has_keeps_the_noise_of_the_simulator(
+    tmp_path: Path,
+) -> None:
+    """Accelerometers alone: no gyroscope is made to be without noise."""
+    loud = {"ax": 0.02, "ay": 0.02, "az": 0.03}
+    shown = SensorModel(noise=dict.fromkeys(loud, 0.01))
+    model = SensorModel(noise=loud, shown=shown, rate_hz=100.0)
+    found = yaml.safe_load(written("kalibr", tmp_path, model)[0])
+    assert found["accelerometer_noise_density"] == pytest.approx(0.003)
+    assert "gyroscope_noise_density" not in found
+    path = tmp_path / "patch.toml"
+    patches.write("toml", model, path)
+    noise = profile_file.read_profile(path).noise
+    assert noise.acc == (0.02, 0.02, 0.03) and noise.gyr == type(noise)().gyr
+    # what the simulator shows of it is known, and is 0 where it has none
+    both = SensorModel(noise=loud, shown=SensorModel(noise={"gx": 0.0}), rate_hz=100.0)
+    found = yaml.safe_load(written("kalibr", tmp_path, both)[0])
+    assert found["gyroscope_noise_density"] == 0
+
+
 def test_an_instant_counts_from_the_start_of_the_recording_that_has_it(
     tmp_path: Path,
 ) -> None:

@@ -13,6 +13,7 @@ from observed import BIAS, COUPLING, SCALE, G, observe, outputs
 
 from fieldcal.calibration import Calibration, Nominal, compare
 from fieldcal.calibration.document import schema
+from fieldcal.commands.compare import comparison_document
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, WIDE_POSITIONS
 from fieldcal.core.samples import Array, Block
@@ -99,6 +100,26 @@ def test_comparison_is_a_fair_test() -> None:
     assert np.mean([c.chi2 for c in found]) == pytest.approx(15, rel=0.04)
     assert np.mean([c.chance < 0.05 for c in found]) == pytest.approx(0.05, abs=0.02)
     assert np.std([c.z for c in found]) == pytest.approx(1, abs=0.03)
+
+
+def test_what_both_know_exactly_is_the_same_or_has_changed() -> None:
+    """And a combination without uncertainty does not spoil the others."""
+    cov = 1e-8 * np.eye(15)
+    cov[3, 3] = 0.0
+    moved = VALUES.copy()
+    moved[0] += 1e-4
+    same = compare(made(cov, values=moved), made(cov))
+    assert same.z[3] == 0 and same.changed == () and same.dof == 14
+    assert same.chi2 == pytest.approx(0.5)  # (1e-4)^2 / 2e-8
+    moved[3] -= 1e-9
+    other = compare(made(cov, values=moved), made(cov))
+    assert other.z[3] == -np.inf and other.changed == (NAMES[3],)
+    assert other.chi2 == np.inf and other.chance == 0.0
+    assert comparison_document(other)["chi2"] is None
+    cov[3:5, 3:5] = 1e-8  # both off by the same amount
+    alike = VALUES.copy()
+    alike[3:5] += 2e-4
+    assert compare(made(cov, values=alike), made(cov)).chi2 == pytest.approx(2.0)
 
 
 def test_comparison_names_what_changed_and_what_is_missing() -> None:

@@ -50,6 +50,13 @@ def test_a_level_imu_may_have_a_bias() -> None:
     assert not alone.out and alone.document()["of_others"] is None
 
 
+def test_a_single_rest_tells_no_uncertainty() -> None:
+    """Its scatter is unknown, and not 0."""
+    one = compare_instances({"a": np.array([[0.1, 0.0, G]])}, G)[0]
+    assert "m/s² in a single rest" in one.sentence() and "±" not in one.sentence()
+    assert one.document()["sigma"] is None and one.rests == 1
+
+
 def test_import_says_at_once_which_imu_is_out_and_so_does_compare(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

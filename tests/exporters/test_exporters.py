@@ -65,6 +65,19 @@ def test_an_autopilot_corrects_raw_samples_as_apply_does(
         assert not found.notices
 
 
+def test_ardupilot_numbers_its_fourth_imu_before_the_sensor() -> None:
+    """INS4_ACCOFFS_X, as its list of parameters has it, beside INS_ACC3OFFS_X."""
+    cal = calibration(np.random.default_rng(1), 0.0)
+    for instance, heads in (
+        (2, ("INS_ACC3", "INS_GYR3")),
+        (4, ("INS5_ACC", "INS5_GYR")),
+    ):
+        acc, gyr = heads
+        made = [f"{acc}OFFS_", f"{acc}SCAL_", f"{gyr}OFFS_"]
+        names = list(ardupilot.parameters(cal, instance=instance).values)
+        assert names == [f"{head}{axis}" for head in made for axis in "XYZ"]
+
+
 @pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
 @pytest.mark.parametrize("taken_out", [False, True])
 def test_what_was_installed_is_put_together_with_what_was_found(
@@ -91,6 +104,44 @@ def test_what_was_installed_is_put_together_with_what_was_found(
         acc, gyr = corrected(dict(new), number, 1, raw)
         np.testing.assert_allclose(acc, cal.apply(sent).acc, atol=1e-12)
         np.testing.assert_allclose(gyr, cal.apply(sent).gyr, atol=1e-12)
+
+
+def without(cal: Calibration, *names: str) -> Calibration:
+    """The calibration as if some parameters had not been determined."""
+    keep = [i for i, n in enumerate(cal.names) if n not in names]
+    return replace(
+        cal,
+        names=tuple(cal.names[i] for i in keep),
+        values=cal.values[keep],
+        covariance=cal.covariance[np.ix_(keep, keep)],
+        units=tuple(cal.units[i] for i in keep),
+    )
+
+
+@pytest.mark.parametrize(("module", "number"), [(ardupilot, ARDUPILOT), (px4, PX4)])
+@pytest.mark.parametrize("taken_out", [False, True])
+def test_an_axis_that_was_not_determined_keeps_what_was_installed_and_is_said(
+    module: ModuleType, number: int, taken_out: bool
+) -> None:
+    known = parameter_names(number, 0)
+    device = InstalledCalibration(
+        number, 0, dict.fromkeys(known["rotation"], 0.0), taken_out
+    )
+    for what, value in (("acc_offset", 0.3), ("acc_scale", 1.02), ("gyr_offset", 0.01)):
+        device.values |= dict.fromkeys(known[what], value)
+    cal = calibration(np.random.default_rng(8), 0.0)
+    few = without(cal, "acc_scale.z", "acc_bias.x", "gyr_bias.y")
+    found = module.parameters(few, installed=device)
+    scale, gyro = known["acc_scale"][2], known["gyr_offset"][1]
+    assert found.values[scale] == pytest.approx(1.02)
+    assert found.values[gyro] == pytest.approx(0.01)
+    assert found.values[known["acc_offset"][0]] == pytest.approx(0.3)
+    for said in ("acc_scale z", "acc_bias x", "gyr_bias y"):
+        assert any(s.startswith(f"{said} was not deter") for s in found.notices)
+    # nothing is known to be installed: the nominal one, and that is said as well
+    alone = module.parameters(few)
+    assert alone.values[scale] == 1.0 and alone.values[gyro] == 0.0
+    assert "gyr_bias y was not determined: the nominal one is used" in alone.notices
 
 
 def test_what_an_autopilot_has_no_place_for_is_said_with_its_size() -> None:
@@ -209,7 +260,7 @@ def test_sensors_are_counted_from_0(
 ) -> None:
     call = ["export", str(tmp_path), "--format", "px4", f"--instance={number}"]
     assert main(call) == 2
-    assert "is no number from 0 on" in capsys.readouterr().err
+    assert "is no number from 0 to 4" in capsys.readouterr().err
 
 
 def test_kalibr_predicts_what_was_recorded(
@@ -327,6 +378,43 @@ def test_what_was_not_determined_is_said_not_filled_in_silence(
     says = load_exporter("ardupilot").write(some, tmp_path / "a.param")
     assert "gyr_bias was not determined: not written" in says
     assert "GYR" not in (tmp_path / "a.param").read_text().partition("INS_")[2]
+
+
+def test_apply_says_of_which_axes_the_nominal_values_are_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(9)
+    cal, raw = calibration(rng, 0.0), samples(rng)
+    source(tmp_path / "s", without(cal, "acc_scale.z", "gyr_bias.y"), raw)
+    out = tmp_path / "out.csv"
+    assert main(["apply", str(tmp_path / "s"), str(out)]) == 0
+    said = "nominal value is taken: acc_scale.z, gyr_bias.y, gyr_scale\n"
+    assert capsys.readouterr().err.endswith(said)
+    blind = replace(raw, gyr=np.full((len(raw), 3), np.nan))
+    few = without(cal, *(n for n in cal.names if n.startswith("gyr")))
+    source(tmp_path / "blind", few, blind)
+    assert main(["apply", str(tmp_path / "blind"), str(out)]) == 0
+    assert "nominal" not in capsys.readouterr().err
+
+
+def test_a_sensor_that_was_not_recorded_is_said_as_it_is(tmp_path: Path) -> None:
+    """Neither parameters that are not written nor windows are what is wrong."""
+    rng = np.random.default_rng(6)
+    whole, raw = calibration(rng, 0.0), samples(rng, 2000)
+    for sensor, name in (("acc", "accelerometer"), ("gyr", "gyroscope")):
+        blind = replace(raw, **{sensor: np.full((len(raw), 3), np.nan)})
+        few = without(whole, *(n for n in whole.names if n.startswith(sensor)))
+        some = source(tmp_path / sensor, few, blind)
+        path = written(some, "ardupilot", tmp_path / sensor)
+        assert sensor.upper() not in path.read_text().partition("INS_")[2]
+        says = load_exporter("px4").write(some, tmp_path / sensor / "p.params")
+        assert f"{sensor}_bias was not determined: not written" in says
+        assert not any("nominal one is used" in s for s in says)
+        says = load_exporter("kalibr").write(some, tmp_path / sensor / "k.yaml")
+        assert (
+            f"{name}_noise_density was not determined: the session has no {name}s"
+            in says
+        )
 
 
 @pytest.mark.parametrize("name", format_names())

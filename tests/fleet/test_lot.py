@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -255,6 +256,31 @@ def test_units_of_unknown_time_are_in_no_chart() -> None:
     assert "5 units of unknown time" in render_lot_page(found, "everything")
     alone = of(unknown)
     assert not alone.alarms and render_lot_page(alone, "everything")
+
+
+def test_numbers_of_a_fine_device_do_not_run_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = Database(tmp_path / "h")
+
+    def put(db: object) -> None:
+        for one in units(40):
+            fine = {
+                name: (x * 1e-4, sigma * 1e-4, unit)
+                for name, (x, sigma, unit) in one.parameters.items()
+            }
+            one = replace(one, parameters=fine)
+            sessions.store_session(db, one)  # type: ignore[arg-type]
+
+    data.run(put, write=True)
+    assert main(["lot", "--history", str(tmp_path / "h")]) in (0, 1)
+    text = capsys.readouterr().out
+    for axis in "xyz":
+        line = re.search(rf"^gyr_bias\.{axis} .*rad/s.*$", text, re.M)
+        assert line
+        mean, wide = re.split(r" {2,}", line[0])[1:3]
+        for number in (*mean.split(" ± "), wide.split(" ")[0]):
+            assert abs(float(number)) < 1e-5
 
 
 def test_the_command_reads_the_store_and_writes_a_page(

@@ -7,6 +7,7 @@ import pty
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from processes import FIELDCAL, simulated
 
 from fieldcal.calibration import Calibration, Nominal
 from fieldcal.cli import main
-from fieldcal.commands.write import propose_changes
+from fieldcal.commands.write import change_table, propose_changes
 from fieldcal.core.errors import InputError
 from fieldcal.drivers.mavlink_installed import (
     ARDUPILOT,
@@ -120,6 +121,26 @@ def test_what_is_installed_takes_all_of_it_out(
         np.array([new[n] for n in known[w]]) for w in ("acc_offset", "acc_scale")
     )
     np.testing.assert_allclose((raw - offset) * factor, true, atol=1e-9)
+
+
+@pytest.mark.parametrize("taken_out", [False, True])
+def test_what_was_not_determined_is_kept_as_the_table_says(taken_out: bool) -> None:
+    """Without gyroscopes, and without the scale factor of z."""
+    found, there = calibration(), installed(taken_out=taken_out)
+    keep = [i for i, n in enumerate(found.names) if n[:3] == "acc" and n[-3:] != "e.z"]
+    few = replace(
+        found,
+        names=tuple(found.names[i] for i in keep),
+        values=found.values[keep],
+        covariance=found.covariance[np.ix_(keep, keep)],
+        units=tuple(found.units[i] for i in keep),
+    )
+    wanted = changes(few, Nominal(), there)
+    kept = [line for line in change_table(wanted).splitlines() if "kept" in line]
+    assert len(kept) == 4
+    for c in wanted:
+        if any(line.startswith(c.name) for line in kept):
+            assert c.new == pytest.approx(c.old, abs=1e-12), c
 
 
 def test_the_uncertainty_of_a_parameter_is_that_of_many_calibrations() -> None:

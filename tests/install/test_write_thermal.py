@@ -21,6 +21,7 @@ from fieldcal.core.samples import Block
 from fieldcal.drivers.mavlink_installed import ARDUPILOT, PX4
 from fieldcal.drivers.mavlink_parameters import ParameterLink
 from fieldcal.install.thermal import id_names, thermal_parameters
+from fieldcal.install.transaction import GYR_OFFSETS
 from fieldcal.sim_device.autopilot import Autopilot
 from fieldcal.thermal import ThermalModel, thermal_model, thermal_point
 
@@ -78,6 +79,15 @@ def test_the_autopilot_takes_out_what_the_device_does(kind: str, instance: int) 
         np.testing.assert_allclose(out[3:], rate, atol=5e-6)
     hot = Block.of(seq / 100, three * acc, three * gyr, np.full(3, 60.0), seq)
     np.testing.assert_allclose(sent(autopilot, hot), sent(autopilot, block), atol=1e-6)
+
+
+def test_ardupilot_numbers_its_fourth_imu_before_the_sensor() -> None:
+    """INS4_TCAL_ACC1_X and INS4_ACC_CALTEMP, as its list of parameters has them."""
+    names = set(thermal_parameters(ARDUPILOT, model(device()), 3).values)
+    assert {"INS4_TCAL_ENABLE", "INS4_TCAL_GYR3_Z", "INS4_GYR_CALTEMP"} <= names
+    assert {"INS4_TCAL_ACC1_X", "INS4_ACC_CALTEMP", "INS4_ACCOFFS_X"} <= names
+    assert all(name.startswith("INS4_") for name in names)
+    assert {"INS5_GYROFFS_Y", "INS5_GYR_CALTEMP", "CAL_GYRO3_XOFF"} <= GYR_OFFSETS
 
 
 @pytest.mark.thorough

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks.noise.processes import bound, covariance, noise, recording
 from fieldcal.core.errors import InputError
@@ -208,6 +209,27 @@ def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
     ).channels.values():
         assert channel.processes["N"].value == pytest.approx(1.0, rel=0.08)
         assert channel.filtered_hz < 60
+
+
+@pytest.mark.statistical
+def test_a_filter_in_the_device_is_no_ramp_and_hides_none() -> None:
+    """White noise of N behind a low-pass: a slope is known to N sqrt(12 / T^3)."""
+    rng, dt, n = np.random.default_rng(17), 0.02, 60_000
+    best = 1e-3 * dt**0.5 * np.sqrt(12 / (n * dt) ** 3)
+    keep = np.exp(-dt / 0.1)
+    drawn = 1e-3 * rng.standard_normal((n, 6))
+    values = lfilter([1 - keep], [1, -keep], drawn, axis=0)
+    t = np.arange(n)[:, None] * dt
+    for slope in (0.0, 20 * best):
+        block = recording(values + slope * t, dt)
+        found = estimate_noise([reduce_recording([block])]).channels.values()
+        seen = [c.processes["R"] for c in found if "R" in c.processes]
+        assert len(seen) == (6 if slope else 0)
+        for one in seen:
+            assert one.sigma > 0.75 * best
+            assert abs(one.value - slope) < 3.5 * best
+        if seen:
+            assert np.median([one.sigma for one in seen]) < 1.25 * best
 
 
 def test_several_sessions_tell_more_than_one() -> None:

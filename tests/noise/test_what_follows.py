@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks.noise.processes import noise, recording
 from fieldcal.core.frames import EARTH_RATE
@@ -131,15 +132,35 @@ def test_what_returns_leaves_its_limit_by_as_much_as_it_has() -> None:
 
 
 def test_flicker_up_to_a_time_changes_no_more_behind_it() -> None:
-    """Each e-fold of its correlation times, from 1 s on, has B^2 / pi."""
+    """Each e-fold of its correlation times, from 30 s on, has B^2 / pi."""
     time = 1e4
     known = (SizeDraw(("N", "BT"), np.log([1e-18, 1.0, time])),)
-    most = math.sqrt(2 / math.pi * math.log(time))
+    most = math.sqrt(2 / math.pi * math.log(time / 30))
     inside, beyond = (
         recalibration_time(known, 0.0, 1.96 * part * most, 0.0).seconds[0]
         for part in (0.95, 1.05)
     )
     assert 0.2 * time < inside < 2 * time and beyond == math.inf
+
+
+@pytest.mark.parametrize("time", [0.06, 3.0, 300.0, 3e4])
+def test_a_bias_is_a_mean_and_no_single_sample(time: float) -> None:
+    """What changes are means over 30 s, counted; a filter's process is white noise."""
+    s, step, n = 1e-3, 3.0, 4_000_000
+    rng, rho = np.random.default_rng(33), math.exp(-step / time)
+    white = s * math.sqrt(1 - rho**2) * rng.standard_normal(n)
+    means = lfilter([1.0], [1.0, -rho], white).reshape(-1, 10).mean(axis=1)
+    if time < step:  # means over a step, which are independent
+        means *= math.sqrt(2 * time / step)
+    known = (SizeDraw(("N", "G"), np.log([1e-18, s**2, time])),)
+    # the variance of the calibration is that of such a mean; the later one has as much
+    alone = np.var(np.diff(means)) / 2
+    for lag in (20, 2000):
+        change = np.std(means[lag:] - means[:-lag])
+        spread = math.sqrt(change**2 - alone)
+        for limit, past in ((1.96 * spread * 1.1, False), (1.96 * spread / 1.1, True)):
+            found = recalibration_time(known, 0.0, limit, float(alone)).seconds[0]
+            assert (found <= 30 * lag * 1.2) is past, (lag, limit, found)
 
 
 def test_a_ramp_leaves_its_limit_on_a_day() -> None:

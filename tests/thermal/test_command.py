@@ -75,6 +75,15 @@ def test_virtual_sessions_at_several_temperatures_become_one_model(
     assert "beyond the sessions" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("number", ["-1", "x", "5"])
+def test_a_sensor_that_no_autopilot_has_is_refused(
+    number: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not written as INS_ACC0OFFS."""
+    assert main(["temperature", "a", "b", "c", f"--instance={number}"]) == 2
+    assert "is no number from 0 to 4" in capsys.readouterr().err
+
+
 def at(of: Warming, temperature: float, serial: str = "A1") -> Calibration:
     covariance = exact(of)
     return session(of, temperature, np.zeros(len(covariance)), covariance, serial)

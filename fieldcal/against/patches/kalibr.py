@@ -26,9 +26,9 @@ def text(model: SensorModel) -> tuple[str, list[str]]:
     """The file, and what the user must know."""
     lines = ["# fieldcal: raw = M true + bias (true -> raw), m/s^2 and rad/s"]
     says = ["random walks are as they were: no comparison of minutes shows them"]
-    for name, letter in (("accelerometer", "a"), ("gyroscope", "g")):
-        levels = [model.level(f"{letter}{axis}") for axis in "xyz"]
-        if model.noise and model.rate_hz > 0:
+    for name, triad in (("accelerometer", "acc"), ("gyroscope", "gyr")):
+        levels = [model.level(f"{triad[0]}{axis}") for axis in "xyz"]
+        if model.noise and model.knows_noise(triad) and model.rate_hz > 0:
             density = max(levels) / np.sqrt(model.rate_hz)
             lines.append(f"{name}_noise_density: {density:.6g}")
     if model.rate_hz > 0:

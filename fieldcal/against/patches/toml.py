@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fieldcal.against.sensor_model import SensorModel
-from fieldcal.core.samples import CHANNELS
+from fieldcal.against.sensor_model import TRIADS, SensorModel
 from fieldcal.sim_device.effects import ids, kind
 from fieldcal.sim_device.profile_file import FORMAT, profile_from_tables
 
@@ -55,14 +54,11 @@ def _beyond(name: str, values: dict[str, Any]) -> list[str]:
 
 def _noise(model: SensorModel) -> dict[str, list[float]]:
     """White noise by triad; what is random besides is an effect of its own."""
-    level = [model.level(name) for name in CHANNELS]
-    none = [0.0, 0.0, 0.0]
-    return {
-        "acc": level[:3],
-        "gyr": level[3:],
-        "acc_instability": none,
-        "gyr_instability": none,
-    }
+    out: dict[str, list[float]] = {}
+    for triad in filter(model.knows_noise, TRIADS):
+        out[triad] = [model.level(f"{triad[0]}{axis}") for axis in "xyz"]
+        out[f"{triad}_instability"] = [0.0, 0.0, 0.0]
+    return out
 
 
 def _known(name: str, values: Any) -> dict[str, Any]:

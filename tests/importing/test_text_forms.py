@@ -216,3 +216,28 @@ def test_the_text_of_a_dataflash_log_is_read_for_its_first_imu(tmp_path: Path) -
     np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
     np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE)
     np.testing.assert_allclose(got.temperature, 31.5)
+
+
+def tagged(rows: int, gyroscope_first: bool) -> str:
+    """Lines of two sensors in turn, so many of each, that hold the number of a row."""
+    found = []
+    for first in range(0, ROWS, rows):
+        some = range(first, min(first + rows, ROWS))
+        acc = [f"ACCE;{i / RATE:.3f};{i}.5;0.2;9.8" for i in some]
+        gyr = [f"GYRO;{i / RATE + 0.004:.3f};{i}.5;0.1;0.2" for i in some]
+        found += [*gyr, *acc] if gyroscope_first else [*acc, *gyr]
+    return "\n".join(found) + "\n"
+
+
+@pytest.mark.parametrize("rows", [1, 7, 30])
+@pytest.mark.parametrize("gyroscope_first", [False, True])
+def test_lines_of_two_sensors_may_come_many_at_a_time(
+    tmp_path: Path, rows: int, gyroscope_first: bool
+) -> None:
+    columns = ("_", "t", "ax", "ay", "az", "gx", "gy", "gz")
+    path = tmp_path / "log.txt"
+    path.write_text(tagged(rows, gyroscope_first))
+    recording = open_recording(path, ReadOptions(columns=columns))
+    got = concat(list(recording.blocks("0")))
+    np.testing.assert_array_equal(got.acc[:, 0], np.arange(ROWS) + 0.5)
+    np.testing.assert_array_equal(got.gyr[:, 0], got.acc[:, 0])

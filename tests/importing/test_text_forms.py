@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +74,41 @@ def test_a_date_and_a_time_that_a_space_parts(tmp_path: Path, heading: str) -> N
     np.testing.assert_allclose(
         read(tmp_path, lines).t, np.arange(ROWS) / RATE, atol=2e-6
     )
+
+
+def test_counts_behind_a_time_are_no_zone(tmp_path: Path) -> None:
+    counts = [[(-1) ** (i // 3) * (1000 + i), 250, -16000] for i in range(ROWS)]
+    rows = [f"{when(i)!s:.26} {' '.join(map(str, counts[i]))}" for i in range(1, ROWS)]
+    rows = [row.replace(" 23:59:59 ", " 23:59:59.0 ") for row in rows]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(rows) + "\n")
+    wanted = ReadOptions(columns=("t", "ax", "ay", "az"))
+    got = concat(list(open_recording(path, wanted).blocks("0")))
+    np.testing.assert_array_equal(got.acc, counts[1:])
+    np.testing.assert_allclose(np.diff(got.t), 1 / RATE, atol=2e-6)
+
+
+@pytest.mark.parametrize("separator", [",", " "])
+def test_a_night_in_which_clocks_are_set_back_goes_on(
+    tmp_path: Path, separator: str
+) -> None:
+    began = datetime(2024, 10, 27, 0, 59, 58, tzinfo=UTC)
+
+    def stamp(row: int) -> str:
+        t = began + timedelta(seconds=row / RATE)
+        summer = t < began.replace(hour=1, minute=0, second=0)
+        berlin = t.astimezone(timezone(timedelta(hours=2 if summer else 1)))
+        return berlin.isoformat(timespec="milliseconds")
+
+    got = read(tmp_path, text(stamp, separator))
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+
+
+@pytest.mark.parametrize("zone", ["+00", "-07", "+0530", " +02:00", " UTC", "Z"])
+def test_zones_as_programs_write_them(zone: str) -> None:
+    clock = ClockText()
+    got = [clock.seconds(f"2024-05-03 12:00:0{i}.5{zone}") for i in (0, 1)]
+    assert got == [43200.5, 43201.5]
 
 
 def test_minutes_and_seconds_of_a_spreadsheet_begin_again_each_hour() -> None:

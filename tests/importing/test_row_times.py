@@ -102,3 +102,16 @@ def test_a_time_that_leaps_ahead_within_the_first_seconds_begins_nothing_anew(
     got = np.concatenate([clock.of({"t": part}, len(part)) for part in parts])
     np.testing.assert_array_equal(got, t)
     assert not clock.says
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+@pytest.mark.parametrize("bits", [24, 32])
+def test_a_counter_of_us_goes_on_whatever_it_is_divided_by(
+    unit: str, bits: int
+) -> None:
+    counts = np.arange(2**bits - 500_000, 2**bits + 500_000, 10_000)
+    written = counts % 2**bits / {"s": 1e6, "ms": 1e3, "us": 1.0}[unit]
+    times = RowTimes(ReadOptions(columns=("t",), time_unit=unit))
+    t = np.concatenate([times.of({"t": one}, 25) for one in np.split(written, 4)])
+    np.testing.assert_allclose(np.diff(t), 0.01, atol=1e-6)
+    assert ["go on" in said for said in times.says] == [True]

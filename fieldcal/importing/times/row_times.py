@@ -21,6 +21,12 @@ FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 COUNTED = (2.0**16, 2.0**24, 2.0**32)
 """Where counters of a device begin again."""
 
+DIVIDED = tuple(many * tick for many in COUNTED for tick in (1e-6, 1e-3))
+"""Likewise of counters of us and ms that a program divides before it writes them, s."""
+
+LONG_PERIOD = 10.0
+"""Times that such a period is longer than what is near its end."""
+
 PERIODS = (60.0, 3600.0, 86400.0, 604800.0)
 """Where clocks begin again, s: a minute, an hour, a day, a week."""
 
@@ -159,7 +165,10 @@ class RowTimes:
     def _period(self, before: float, began: float, scale: float) -> float:
         """Where a clock began again that went from one time to another; 0 if not."""
         near = NEAR_STEPS * self._usual
-        for period in (*(many * scale for many in COUNTED), *PERIODS):
+        own = (many * scale for many in COUNTED)
+        # of a period of few steps any time is near both ends
+        divided = (p for p in DIVIDED if p > LONG_PERIOD * near)
+        for period in (*own, *divided, *PERIODS):
             if 0 <= began < near and 0 < period - before < near:
                 self.says.append(
                     f"its clock ends at {period:g} s and begins again: the times behind"

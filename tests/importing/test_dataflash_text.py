@@ -9,6 +9,7 @@ import pytest
 from laid_about import turned
 
 from fieldcal.cli import main
+from fieldcal.importing.files.gzip_stream import PIECE
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)
@@ -94,3 +95,12 @@ def test_a_log_may_lack_the_gyroscope_that_it_defines(tmp_path: Path) -> None:
     block = Session.open(tmp_path / "out").block
     assert len(block) == rows
     assert np.isnan(block.gyr).all()
+
+
+def test_the_imu_may_begin_far_behind_what_defines_it(tmp_path: Path) -> None:
+    before = "ATT, 5000000, 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.123456789"
+    lines = [*TOP, *[before] * (PIECE // len(before) + 100), *one_kind()[len(TOP) :]]
+    path = tmp_path / "flight.log"
+    path.write_text("\n".join(lines) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert len(Session.open(tmp_path / "out").block) == len(ROWS)

@@ -46,7 +46,8 @@ class TextSource:
             for read in readers:
                 # no lines at all would be the end of the text
                 lines = read(lines) if lines else []
-            yield ("\n".join(lines) + "\n").encode()
+            if lines:
+                yield ("\n".join(lines) + "\n").encode()
         lines = []
         for read in readers:
             lines = [*(read(lines) if lines else []), *read([])]

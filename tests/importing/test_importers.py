@@ -23,7 +23,7 @@ from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
-from fieldcal.importing.session.validation import RowValidator
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults

@@ -97,11 +97,12 @@ class ColumnRecording(Recording):
 
     def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """Samples of its rows, also where each holds one of two sensors alone."""
-        rows = RowsInTurn()
+        rows = RowsInTurn(str(self.path), self.repair)
         for block in rows.through(blocks):
             self.in_turn = rows.told
             yield block
         self.says += [s for s in rows.says if s not in self.says]
+        self.mended += [s for s in rows.mended if s not in self.mended]
 
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""

@@ -16,7 +16,9 @@ TOPIC, FRAME = "/imu/data", "imu_link"
 IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 
 
-def messages(types: Any, rows: Array, first: bool) -> list[tuple[int, str, Any]]:
+def messages(
+    types: Any, rows: Array, first: bool, stamped: bool = True
+) -> list[tuple[int, str, Any]]:
     """Time of logging, ns, topic and message of rows t, a, w; some temperatures."""
     header, time = (
         types.types["std_msgs/msg/Header"],
@@ -27,7 +29,7 @@ def messages(types: Any, rows: Array, first: bool) -> list[tuple[int, str, Any]]
     open_, found = np.zeros(9), []
     for i, row in enumerate(rows):
         ns = round(1e9 * row[0])
-        stamp = time(sec=ns // 10**9, nanosec=ns % 10**9)
+        stamp = time(*(divmod(ns, 10**9) if stamped else (0, 0)))
         above = {"stamp": stamp, "frame_id": FRAME} | ({"seq": i} if first else {})
         said = header(**above)
         if i % 50 == 0:
@@ -40,7 +42,7 @@ def messages(types: Any, rows: Array, first: bool) -> list[tuple[int, str, Any]]
     return found
 
 
-def bag(folder: Path, rows: Array, first: bool) -> Path:
+def bag(folder: Path, rows: Array, first: bool, stamped: bool = True) -> Path:
     """Write a bag of either kind, rows t, a, w (n, 7), into a folder."""
     if first:
         path, types = folder / "log.bag", get_typestore(Stores.ROS1_NOETIC)
@@ -56,6 +58,6 @@ def bag(folder: Path, rows: Array, first: bool) -> Path:
                 "/imu/temperature", TEMPERATURE, typestore=types
             ),
         }
-        for logged, topic, said in messages(types, rows, first):
+        for logged, topic, said in messages(types, rows, first, stamped):
             writer.write(to[topic], logged, pack(said, type(said).__msgtype__))
     return path if first else next(path.glob("*.db3"))

@@ -25,10 +25,9 @@ from fieldcal.importing.messages.mcap_messages import (
 )
 from fieldcal.importing.messages.ros_messages import (
     IMU,
-    MESSAGES_AT_ONCE,
     TEMPERATURE,
+    MessageRows,
     message_row,
-    samples_of_rows,
 )
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -91,7 +90,7 @@ class McapLog(Recording):
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a topic, many at a time."""
         degrees = {t for t, kind in self._topics().items() if kind == TEMPERATURE}
-        rows: list[tuple[float, ...]] = []
+        rows = MessageRows()
         warm = dict[str, float]()
         with unpacked_file(self.path, self.cut_off) as path:
             found = self._streamed if self.repair else self._indexed
@@ -101,18 +100,16 @@ class McapLog(Recording):
                         warm[said.header.frame_id] = said.temperature
                         continue
                     degrees_now = warm.get(said.header.frame_id, np.nan)
-                    rows.append(message_row(said, degrees_now, logged))
+                    row = message_row(said, degrees_now, logged)
                 except (AttributeError, TypeError) as error:
                     raise InputError(
                         f"{self.path}: messages of {topic} are none of the kind that"
                         f" they are called, by their schema in the file ({error});"
                         " record them again with the definition of their type"
                     ) from error
-                if len(rows) == MESSAGES_AT_ONCE:
-                    yield samples_of_rows(rows)
-                    rows = []
-        if rows:
-            yield samples_of_rows(rows)
+                yield from rows.add(row)
+        yield from rows.rest()
+        self.says += [s for s in rows.says if s not in self.says]
 
     def _indexed(
         self, path: Path, stream: str, degrees: set[str]

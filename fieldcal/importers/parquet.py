@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -80,6 +80,7 @@ class ParquetFile(ColumnRecording):
                 batch.validate(full=True)
                 table = {c: self._numbers(batch, n, clock) for c, n in named.items()}
                 yield samples.block(table, batch.num_rows)
+        self.says += [s for s in samples.says if s not in self.says]
 
     @contextmanager
     def _batches(self, every: bool = False) -> Iterator[tuple[Any, Iterator[Any]]]:
@@ -104,10 +105,11 @@ class ParquetFile(ColumnRecording):
                 elif magic == FEATHER:
                     feather = pa.ipc.open_file(file)
                     many = range(feather.num_record_batches)
-                    yield feather.schema, (feather.get_batch(i) for i in many)
+                    each = (feather.get_batch(i) for i in many)
+                    yield feather.schema, _gathered(each)
                 else:
                     stream = pa.ipc.open_stream(file)
-                    yield stream.schema, iter(stream)
+                    yield stream.schema, _gathered(stream)
             except MemoryError as error:  # also of a damaged size
                 raise InputError(
                     f"{self.path}: needs more memory than there is, or is damaged; copy"
@@ -159,6 +161,20 @@ class ParquetFile(ColumnRecording):
         read = (clock.seconds(str(text)) for text in column)
         found = np.array([np.nan if since is None else since for since in read])
         return found / self.wanted.time_scale
+
+
+def _gathered(batches: Iterable[Any]) -> Iterator[Any]:
+    """Batches of many rows: whoever writes them while they come, writes few in each."""
+    import pyarrow as pa
+
+    waiting: list[Any] = []
+    for batch in batches:
+        waiting.append(batch)
+        if sum(one.num_rows for one in waiting) >= ROWS:
+            yield from pa.Table.from_batches(waiting).combine_chunks().to_batches()
+            waiting = []
+    if waiting:
+        yield from pa.Table.from_batches(waiting).combine_chunks().to_batches()
 
 
 def _is_text(kind: Any) -> bool:

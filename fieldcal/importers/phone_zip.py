@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.file_names import ACC, GYR
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
@@ -53,18 +55,31 @@ class PhoneArchive(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of both sensors, those of the accelerometer with the nearest."""
-        pair, flows = AlignedPair(), []
-        for text in self._opened():
-            one = text.alone("0")
-            one.wanted = replace(
-                one.wanted,
-                acc_unit=self.wanted.acc_unit, acc_lsb=self.wanted.acc_lsb,
-                gyr_unit=self.wanted.gyr_unit, gyr_lsb=self.wanted.gyr_lsb,
-                time_unit=self.wanted.time_unit,
-            )  # fmt: skip
-            flows.append(one.blocks("0"))
+        pair, both = AlignedPair(), [self._in_units(t) for t in self._opened()]
+        judges = [
+            RowValidator(f"{self.path}: {one.member}", one.place, self.repair)
+            for one in both
+        ]
+        flows = [j.through(t.blocks("0")) for j, t in zip(judges, both, strict=True)]
         acc, gyr = [*flows, iter(())][:2]
         yield from pair.through(acc, gyr)
+        for judge, one in zip(judges, both, strict=True):
+            said = [*one.mended, *judge.mended]
+            self.mended += [f"{one.member}: {sentence}" for sentence in said]
+            self.says += [s for s in one.says if s not in self.says]
+
+    def _in_units(self, text: TextColumns) -> TextColumns:
+        """A text of one sensor, in the units that were found for all."""
+        one = copy(text)
+        one.says, one.mended = [], []
+        one.wanted = replace(
+            one.imus()["0"],
+            acc_unit=self.wanted.acc_unit, acc_lsb=self.wanted.acc_lsb,
+            gyr_unit=self.wanted.gyr_unit, gyr_lsb=self.wanted.gyr_lsb,
+            time_unit=self.wanted.time_unit,
+        )  # fmt: skip
+        one.imus_found = {"0": one.wanted}
+        return one
 
     def _opened(self) -> tuple[TextColumns, ...]:
         """The texts of accelerometer and gyroscope, as they are in it."""

@@ -19,10 +19,9 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.files.gzip_stream import first_bytes, unpacked_file
 from fieldcal.importing.messages.ros_messages import (
     IMU,
-    MESSAGES_AT_ONCE,
     TEMPERATURE,
+    MessageRows,
     message_row,
-    samples_of_rows,
 )
 from fieldcal.importing.recording import ImuStream, Recording
 
@@ -66,7 +65,7 @@ class RosBag(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of a topic, many at a time."""
-        rows: list[tuple[float, ...]] = []
+        rows = MessageRows()
         warm = dict[str, float]()
         with unpacked_file(self.path, self.cut_off) as path:
             kinds = self._topics(path)
@@ -77,12 +76,9 @@ class RosBag(Recording):
                     warm[said.header.frame_id] = said.temperature
                     continue
                 degrees = warm.get(said.header.frame_id, np.nan)
-                rows.append(message_row(said, degrees, logged))
-                if len(rows) == MESSAGES_AT_ONCE:
-                    yield samples_of_rows(rows)
-                    rows = []
-        if rows:
-            yield samples_of_rows(rows)
+                yield from rows.add(message_row(said, degrees, logged))
+        yield from rows.rest()
+        self.says += [s for s in rows.says if s not in self.says]
 
     def _topics(self, path: Path) -> dict[str, str]:
         """Kind of the messages of each topic."""

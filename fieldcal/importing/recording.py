@@ -69,12 +69,14 @@ class MeanScatter(NamedTuple):
 
     Attributes
     ----------
-    values : (n, 6) in units of the table; nan where not written
+    means : (n, 6) in units of the table, of all its rows; nan where not written
+    values : (n, 6) likewise
     many : (n,) samples of each mean; None where not written
     timed : whether the table says when each was taken
 
     """
 
+    means: Array
     values: Array
     many: Array | None
     timed: bool

@@ -173,18 +173,18 @@ class Session:
         if "block" in vars(self) or len(installed_stretches(self.marks())) > 1:
             yield self.block
             return
-        clock = clock or ClockStepRemover()
+        clock, cut = clock or ClockStepRemover(), list[str]()
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
         for whole in sample_files.iterate_samples(
-            sample_files.find_samples(self.folder)
+            sample_files.find_samples(self.folder), cut
         ):
             raw, _ = remove_blank_samples(whole)
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
             yield clock.add(_blank_gaps(part, self.about.excluded_spans))
         yield clock.flush()
-        self.warnings += tuple(step.sentence() for step in clock.steps)
+        self.warnings += (*cut, *(step.sentence() for step in clock.steps))
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""

@@ -76,8 +76,15 @@ def read_samples(path: Path) -> tuple[Block, tuple[str, ...]]:
     return _block(columns), warnings
 
 
-def iterate_samples(path: Path) -> Iterator[Block]:
+def iterate_samples(path: Path, says: list[str] | None = None) -> Iterator[Block]:
     """Samples of a file as by `read_samples`, part by part, with bounded memory.
+
+    Behind a damaged place, or in front of where it was cut off, all others at once.
+
+    Parameters
+    ----------
+    path : the file
+    says : list to which warnings about what was cut off are added
 
     Raises
     ------
@@ -87,29 +94,38 @@ def iterate_samples(path: Path) -> Iterator[Block]:
     """
     import pyarrow as pa
 
-    last = -np.inf
+    last, rows = -np.inf, 0
+    says = [] if says is None else says
     try:
-        for batch in _batches(path):
+        for batch in _batches(path, says):
             columns = {name: _numbers(path, batch, name) for name in batch.schema.names}
             _check_columns(path, columns)
             t = columns["t"]
             if len(t) and not (t[0] > last and (np.diff(t) > 0).all()):
                 read_samples(path)  # raises an error that says where
             last = float(t[-1]) if len(t) else last
-            whole = _block(columns)
-            for first in range(0, len(whole), ROWS_AT_ONCE):
-                yield whole[first : first + ROWS_AT_ONCE]
+            rows += len(t)
+            yield from _parts(_block(columns))
     except (pa.ArrowException, OSError):
-        read_samples(path)  # raises an error that says what is wrong, and where
-        raise
-    if last == -np.inf:
+        # raises an error that says what is wrong and where, unless its end is missing
+        whole, warnings = read_samples(path)
+        says += warnings
+        yield from _parts(whole[rows:])
+        rows = len(whole)
+    if not rows:
         raise SessionError(f"{path}: has no rows; record it again")
 
 
-def _batches(path: Path) -> Iterator[pa.RecordBatch]:
+def _parts(whole: Block) -> Iterator[Block]:
+    """Some rows at a time."""
+    for first in range(0, len(whole), ROWS_AT_ONCE):
+        yield whole[first : first + ROWS_AT_ONCE]
+
+
+def _batches(path: Path, says: list[str]) -> Iterator[pa.RecordBatch]:
     """Record batches of a file of any format, with the columns of samples."""
     if path.name.endswith(".arrows"):
-        yield from _stream_batches(path)
+        yield from _stream_batches(path, says)
     elif path.name.endswith(".parquet"):
         import pyarrow.parquet
 
@@ -126,7 +142,7 @@ def _batches(path: Path) -> Iterator[pa.RecordBatch]:
         yield from iterate_text_batches(path)
 
 
-def _stream_batches(path: Path) -> Iterator[pa.RecordBatch]:
+def _stream_batches(path: Path, says: list[str]) -> Iterator[pa.RecordBatch]:
     """Batches of a stream; after a damaged place, all intact rows at once."""
     import pyarrow as pa
 
@@ -142,7 +158,8 @@ def _stream_batches(path: Path) -> Iterator[pa.RecordBatch]:
             rows += batch.num_rows
             yield batch
     if not finished or not rows:
-        table, _ = _read_arrows(path)
+        table, warnings = _read_arrows(path)
+        says += warnings
         yield from table.slice(rows).to_batches()
 
 

@@ -7,7 +7,7 @@ column.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,9 @@ SAMPLE_COLUMNS = (
 )
 """Columns that a samples file may have, in the order in which they are written."""
 
+_NAMES_BYTES = 1 << 16
+"""Bytes at the beginning within which the names of the columns end."""
+
 _GUNZIP = 16 + zlib.MAX_WBITS
 
 
@@ -30,11 +33,15 @@ def iterate_text_batches(path: Path) -> Iterator[pa.RecordBatch]:
     import pyarrow as pa
     import pyarrow.csv
 
-    packed = path.name.endswith(".gz")
-    with pa.input_stream(path, compression="gzip" if packed else None) as stream:
+    packed = "gzip" if path.name.endswith(".gz") else None
+    with pa.input_stream(path, compression=packed) as stream:
+        names = _names(path, stream.read(_NAMES_BYTES))
+    with pa.input_stream(path, compression=packed) as stream:
         reader = pyarrow.csv.open_csv(
             stream,
-            read_options=pyarrow.csv.ReadOptions(use_threads=False, block_size=1 << 24),
+            read_options=pyarrow.csv.ReadOptions(
+                use_threads=False, block_size=1 << 24, skip_rows=1, column_names=names
+            ),
             convert_options=pyarrow.csv.ConvertOptions(
                 column_types={name: pa.float64() for name in SAMPLE_COLUMNS},
                 null_values=["", "nan", "NaN"],
@@ -64,11 +71,7 @@ def read_text_table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
     if not data.strip():
         raise SessionError(f"{path}: is empty; it needs a row of names and samples")
     data, short = _without_short_row(data)
-    names = _names(data)
-    if not set(names) & set(SAMPLE_COLUMNS):
-        raise SessionError(
-            f"{path}: the first row must name the columns: {', '.join(SAMPLE_COLUMNS)}"
-        )
+    names = _names(path, data)
     try:
         table = pyarrow.csv.read_csv(
             pa.BufferReader(data),
@@ -82,14 +85,31 @@ def read_text_table(path: Path) -> tuple[pa.Table, tuple[str, ...]]:
             ),
         )
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise SessionError(f"{path}: {_first_bad_row(data)}") from error
+        raise SessionError(f"{path}: {_first_bad_row(names, data)}") from error
     return table, cut_off_warnings(path, table) if cut or short else ()
 
 
-def _names(data: bytes) -> list[str]:
+def _names(path: Path, data: bytes) -> list[str]:
+    """Names of the columns, without spaces and quotes about them.
+
+    Raises
+    ------
+    SessionError
+        If they are not those of samples, or a column is there twice.
+
+    """
     # Excel begins "CSV UTF-8" with a byte order mark
     first = data.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace")
-    return [name.strip().strip('"') for name in first.split(",")]
+    names = [name.strip().strip('"') for name in first.split(",")]
+    known = [name for name in names if name in SAMPLE_COLUMNS]
+    if not known:
+        raise SessionError(
+            f"{path}: the first row must name the columns: {', '.join(SAMPLE_COLUMNS)}"
+        )
+    for name in known:
+        if known.count(name) > 1:
+            raise SessionError(f"{path}: has two columns {name}; name one otherwise")
+    return names
 
 
 def _gunzip(path: Path, data: bytes) -> tuple[bytes, bool]:
@@ -118,10 +138,9 @@ def _without_short_row(data: bytes) -> tuple[bytes, bool]:
     return head + b"\n", True
 
 
-def _first_bad_row(data: bytes) -> str:
+def _first_bad_row(names: Sequence[str], data: bytes) -> str:
     """Text about the first invalid row; slow, used after a failure only."""
     lines = data.decode(errors="replace").splitlines()
-    names = _names(data)
     for row, line in enumerate(lines[1:], start=1):
         cells = line.split(",")
         if line and len(cells) != len(names):

@@ -240,10 +240,17 @@ class Window:
             If it is too short for its mean to have an error.
 
         """
+        least = FEWEST_CELLS * CELL
         if len(self._cells) < FEWEST_CELLS:
+            what = f"a window of {self.n} samples over {self.elapsed:.2g} s"
+            if self.elapsed < least:
+                raise InputError(
+                    f"{what} is too short for its mean to have an error: take"
+                    f" {least:g} s or more"
+                )
             raise InputError(
-                f"a window of {self.n} samples over {self.elapsed:.2g} s is too short "
-                f"for its mean to have an error: take {FEWEST_CELLS * CELL:g} s or more"
+                f"{what} has values in {self.seconds:.2g} s of it only, too few for its"
+                " mean to have an error: the rest is missing, stuck or clipped"
             )
         if moved := self.disturbance:
             raise moved

@@ -16,7 +16,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importers.csv_like import TextColumns
 from fieldcal.importing.recording import ReadOptions as Layout
-from fieldcal.importing.session.validation import RowValidator
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session
 
 ACC = ("ax", "ay", "az")

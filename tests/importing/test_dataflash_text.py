@@ -9,6 +9,7 @@ import pytest
 from laid_about import turned
 
 from fieldcal.cli import main
+from fieldcal.importing.files.gzip_stream import PIECE
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)
@@ -66,10 +67,10 @@ def test_the_first_imu_is_read(tmp_path: Path, lines: object) -> None:
     path.write_text("\n".join(lines()) + "\n")
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
     block = Session.open(tmp_path / "out").block
-    assert len(ROWS) - 1 <= len(block) <= len(ROWS)
-    np.testing.assert_allclose(block.t, ROWS[: len(block), 0], atol=1e-6)
-    np.testing.assert_allclose(block.acc, ROWS[: len(block), 1:4], atol=1e-6)
-    np.testing.assert_allclose(block.gyr, ROWS[: len(block), 4:], atol=1e-6)
+    assert len(block) == len(ROWS)
+    np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-6)
+    np.testing.assert_allclose(block.acc, ROWS[:, 1:4], atol=1e-6)
+    np.testing.assert_allclose(block.gyr, ROWS[:, 4:], atol=1e-6)
     warm = block.temperature
     assert np.isnan(warm).all() if lines is two_kinds else (warm == 38.5).all()
 
@@ -84,3 +85,22 @@ def test_rates_of_a_flight_are_not_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "flight.log"
     path.write_text("\n".join(found) + "\n")
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+
+
+def test_a_log_may_lack_the_gyroscope_that_it_defines(tmp_path: Path) -> None:
+    path, rows = tmp_path / "log.log", 1200
+    row = "ACC, {0}, 0, {0}, 0.1, 0.2, 9.8".format
+    path.write_text("\n".join([*TOP, *(row(10_000 * i) for i in range(rows))]) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    block = Session.open(tmp_path / "out").block
+    assert len(block) == rows
+    assert np.isnan(block.gyr).all()
+
+
+def test_the_imu_may_begin_far_behind_what_defines_it(tmp_path: Path) -> None:
+    before = "ATT, 5000000, 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.123456789"
+    lines = [*TOP, *[before] * (PIECE // len(before) + 100), *one_kind()[len(TOP) :]]
+    path = tmp_path / "flight.log"
+    path.write_text("\n".join(lines) + "\n")
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert len(Session.open(tmp_path / "out").block) == len(ROWS)

@@ -14,7 +14,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.files.spool import IN_MEMORY, SpooledRows
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 from fieldcal.importing.session.ingest import import_stream
-from fieldcal.importing.session.validation import RowValidator
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session
 from fieldcal.windows import still_stretches
 

@@ -23,7 +23,7 @@ from fieldcal.importers import formats, open_recording
 from fieldcal.importing import recording as recordings
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.session.ingest import import_stream
-from fieldcal.importing.session.validation import RowValidator
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session import sample_files
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
@@ -246,6 +246,40 @@ def test_tables_with_named_columns(tmp_path: Path, kind: str) -> None:
             writer.write_table(made)
     columns = "t=time,ax=acc_x,ay=acc_y,az=acc_z,gx,gy,gz"
     assert_same(session(tmp_path / "s", str(path), "--columns", columns).block, imu(1))
+
+
+@pytest.mark.parametrize("kind", ["stream", "feather"])
+def test_a_table_may_have_few_rows_in_a_batch(tmp_path: Path, kind: str) -> None:
+    """As whoever writes them while they come; its rows share a time by tens."""
+    import pyarrow as pa
+
+    rows = table(imu(1))
+    rows[:, 0] = np.floor(np.arange(len(rows)) / 10) / 10
+    names = ["time", "acc_x", "acc_y", "acc_z", "gx", "gy", "gz"]
+    made = pa.table(dict(zip(names, rows.T, strict=True)))
+    path = tmp_path / "table"
+    new = pa.ipc.new_file if kind == "feather" else pa.ipc.new_stream
+    with new(path, made.schema) as writer:
+        writer.write_table(made, max_chunksize=15)
+    found = session(tmp_path / "s", str(path), "--gyr-unit", "rad/s").block
+    np.testing.assert_allclose(np.diff(found.t), 0.01, atol=1e-9)
+    np.testing.assert_array_equal(found.acc, rows[:, 1:4])
+
+
+def test_a_number_for_what_is_missing_in_a_table_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    rows = table(imu(1))
+    rows[20:25, 1:] = -999.0
+    names = ["time", "acc_x", "acc_y", "acc_z", "gx", "gy", "gz"]
+    made = pa.table(dict(zip(names, rows.T, strict=True)))
+    pyarrow.parquet.write_table(made, tmp_path / "table")
+    call = ["import", str(tmp_path / "table"), "-o", str(tmp_path / "s")]
+    assert main([*call, "--gyr-unit", "rad/s"]) == 0
+    assert "-999 stands for a missing value: 5 rows" in capsys.readouterr().err
 
 
 def test_files_of_one_imu_are_joined_where_their_times_agree(

@@ -81,6 +81,15 @@ def test_records_and_lists_are_samples(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(got.t - got.t[0], T, atol=1e-6)
 
 
+def test_a_lost_record_stretches_no_other(tmp_path: Path) -> None:
+    document, size = blocks(10), 10
+    del document["data"][3]
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(document))
+    whole = np.delete(T, slice(3 * size, 4 * size))
+    np.testing.assert_allclose(read(path).t, whole, atol=1e-3)
+
+
 def test_a_line_that_is_cut_off_is_refused_or_left_out(tmp_path: Path) -> None:
     path = tmp_path / "log.json"
     path.write_text(DOCUMENTS["lines"][:-20])

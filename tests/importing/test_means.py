@@ -266,3 +266,29 @@ def test_a_scatter_of_the_gyroscopes_alone_leaves_gravity_to_tell_the_rest() -> 
     assert found.why.endswith(
         "their scatter, and what remains of |a| = g and of steady rates"
     )
+
+
+@pytest.mark.parametrize("what", ["empty", "names again", "damaged"])
+def test_a_line_that_is_no_position_leaves_the_others_their_own_scatter(
+    tmp_path: Path, what: str
+) -> None:
+    rows = means(7, 12)
+    scatter = SCATTER * (1 + np.arange(12))
+    table = np.column_stack([rows, *[scatter] * 3, *[scatter / 4] * 3, [COUNT] * 12])
+    path = write(tmp_path, table, heading=f"{SIX},{STD},n")
+    head, *lines = path.read_text().splitlines()
+    odd = {"empty": "," * 12, "names again": head, "damaged": f"x{lines[4]}"}[what]
+    path.write_text("\n".join([head, *lines[:4], odd, *lines[4:]]) + "\n")
+    out = tmp_path / "out"
+    call = ["import", str(path), "-o", str(out), "--gravity", str(G)]
+    assert main([*call, *(["--repair"] if what == "damaged" else [])]) == 0
+    sigma = Session.open(out).about.mean_sigma
+    expected = np.outer(scatter / np.sqrt(COUNT), [1, 1, 1, 0.25, 0.25, 0.25])
+    np.testing.assert_allclose(sigma, expected, rtol=1e-3)
+
+
+def test_an_axis_that_a_position_lacks_is_unknown_there_alone(tmp_path: Path) -> None:
+    rows = means(8, 12)
+    rows[3, 0] = np.nan
+    _, made = session(tmp_path, rows, SIX, "--sigma", "0.005,0.0005")
+    assert np.argwhere(np.isnan(made.about.mean_sigma)).tolist() == [[3, 0]]

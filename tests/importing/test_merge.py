@@ -240,3 +240,26 @@ def test_a_part_of_a_file_without_rows_is_not_its_end(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["import", *files, "--join", "-o", str(out), "--gravity", str(G)]) == 0
     np.testing.assert_allclose(Session.open(out).block.six, rows[:, 1:])
+
+
+def test_files_in_different_units_are_not_one_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = "t,ax,ay,az,gx,gy,gz"
+    rows = [face(i, 0.4 + 20.0 * i) for i in range(6)]
+    rows[2][:, 1:4] /= G
+    files = [
+        str(write(tmp_path, one, f"f_{i}.csv", bare)) for i, one in enumerate(rows)
+    ]
+    call = ["import", *files, "--in-order", "-o", str(tmp_path / "out")]
+    assert main(call) == 2
+    said = capsys.readouterr().err
+    assert "in f_2.csv: their units differ" in said
+    named = bare.replace("ax,ay,az", "ax (g),ay (g),az (g)")
+    write(tmp_path, rows[2], "f_2.csv", named)
+    stated = bare.replace("ax,ay,az", "ax (m/s^2),ay (m/s^2),az (m/s^2)")
+    for i in (0, 1, 3, 4, 5):
+        write(tmp_path, rows[i], f"f_{i}.csv", stated)
+    assert main(call) == 0
+    length = np.linalg.norm(Session.open(tmp_path / "out").block.acc, axis=1)
+    assert 9.0 < length.min() and length.max() < 10.8

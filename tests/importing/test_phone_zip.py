@@ -110,3 +110,44 @@ def test_an_archive_that_is_spoilt_is_one_sentence(
     path.write_bytes(spoil(path.read_bytes()))
     assert main(["import", str(path)]) == 2
     assert "cannot be read" in capsys.readouterr().err
+
+
+def in_turn(rows: Array) -> str:
+    """Rows of which each holds one sensor, as if two logs were merged by time."""
+    lines = [(t, f"{a:.6f},{b:.6f},{c:.6f},,,") for t, a, b, c in rows[:, :4].tolist()]
+    lines += [(t + LATE, f",,,{a:.9f},{b:.9f},{c:.9f}")
+              for t, a, b, c in rows[:, [0, 4, 5, 6]].tolist()]  # fmt: skip
+    whole = [f"{t:.4f},{rest}" for t, rest in sorted(lines)]
+    return "\n".join(["t,ax,ay,az,gx,gy,gz", *whole]) + "\n"
+
+
+@pytest.mark.parametrize("stamp", ["0.5", "", "9999"])
+@pytest.mark.parametrize("way", ["zip", "join", "in turn"])
+def test_a_wrong_time_of_the_gyroscope_costs_its_own_sample_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str, stamp: str
+) -> None:
+    rows, at = turned(2, RATE), 700
+    files = phyphox(rows)
+    lines = (in_turn(rows) if way == "in turn" else files["Gyroscope.csv"]).splitlines()
+    line = 1 + at if way != "in turn" else 2 + 2 * at
+    lines[line] = f"{stamp},{lines[line].partition(',')[2]}"
+    files["Gyroscope.csv"] = "\n".join(lines) + "\n"
+    paths = [packed(tmp_path, files)]
+    if way != "zip":
+        names = ["Accelerometer.csv", "Gyroscope.csv"] if way == "join" else []
+        paths = [tmp_path / name for name in names] or [tmp_path / "log.csv"]
+        for path in paths:
+            path.write_text(files.get(path.name, files["Gyroscope.csv"]))
+    call = ["import", *map(str, paths), "-o", str(tmp_path / "s"), "--gyr-unit"]
+    call += ["rad/s", *(["--join"] if way == "join" else [])]
+    assert main(call) == 2
+    place = (
+        f"sample {at + 1} of its gyroscope" if way == "in turn" else f"line {at + 2}"
+    )
+    assert place in (said := capsys.readouterr().err) and "column t: " in said
+    assert main([*call, "--repair"]) == 0
+    assert place in (said := capsys.readouterr().err) and "left out" in said
+    block = Session.open(tmp_path / "s").block
+    assert np.flatnonzero(np.isnan(block.gyr[:, 0])).tolist() == [at]
+    known = np.arange(len(rows)) != at
+    np.testing.assert_allclose(block.gyr[known], rows[known, 4:], atol=1e-8)

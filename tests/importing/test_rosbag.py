@@ -33,6 +33,19 @@ def test_a_bag_is_read_with_the_temperature_of_its_frame(
 
 
 @pytest.mark.parametrize("first", [True, False])
+def test_messages_without_a_stamp_have_the_time_of_their_logging(
+    first: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = turned(1, 20.0)
+    path = bag(tmp_path, rows, first, stamped=False)
+    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert "headers of its messages have no stamp" in capsys.readouterr().err
+    block = Session.open(tmp_path / "out").block
+    np.testing.assert_allclose(np.diff(block.t), np.diff(rows[:, 0]), atol=1e-6)
+    np.testing.assert_allclose(block.acc, rows[:, 1:4])
+
+
+@pytest.mark.parametrize("first", [True, False])
 def test_a_bag_that_was_cut_off_is_one_sentence(
     first: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -78,7 +78,7 @@ def test_the_clock_of_a_device_that_was_started_again_goes_on(cut: int) -> None:
     steps = np.diff(got)
     assert np.flatnonzero(steps > 1).tolist() == [59, 119]
     np.testing.assert_allclose(steps[[59, 119]], BETWEEN)
-    assert len(clock.says) == 1 and "(and 1 times more)" in clock.says[0]
+    assert len(clock.says) == 1 and "(and once more)" in clock.says[0]
 
 
 def test_a_time_that_steps_back_for_another_reason_stays() -> None:
@@ -102,3 +102,52 @@ def test_a_time_that_leaps_ahead_within_the_first_seconds_begins_nothing_anew(
     got = np.concatenate([clock.of({"t": part}, len(part)) for part in parts])
     np.testing.assert_array_equal(got, t)
     assert not clock.says
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+@pytest.mark.parametrize("bits", [24, 32])
+def test_a_counter_of_us_goes_on_whatever_it_is_divided_by(
+    unit: str, bits: int
+) -> None:
+    counts = np.arange(2**bits - 500_000, 2**bits + 500_000, 10_000)
+    written = counts % 2**bits / {"s": 1e6, "ms": 1e3, "us": 1.0}[unit]
+    times = RowTimes(ReadOptions(columns=("t",), time_unit=unit))
+    t = np.concatenate([times.of({"t": one}, 25) for one in np.split(written, 4)])
+    np.testing.assert_allclose(np.diff(t), 0.01, atol=1e-6)
+    assert ["go on" in said for said in times.says] == [True]
+
+
+def read(t: Array, cuts: tuple[int, ...]) -> tuple[Array, list[str]]:
+    """Times of rows that come in pieces, and what is said of them."""
+    times = RowTimes(ReadOptions(columns=("t",)))
+    found = [times.of({"t": one}, len(one)) for one in np.split(t, cuts)]
+    return np.concatenate(found), times.says
+
+
+@pytest.mark.parametrize("cut", [40, 60, 61, 62])
+def test_one_wrong_time_is_no_start_wherever_a_piece_ends(cut: int) -> None:
+    t = 500.0 + np.arange(120) / 10
+    t[60] = 5.0
+    found, says = read(t, (cut,))
+    np.testing.assert_array_equal(np.delete(found, 60), np.delete(t, 60))
+    assert not says
+    assert not 506.0 < found[60] < 506.1  # whoever judges rows leaves it out
+
+
+@pytest.mark.parametrize("cut", [40, 60, 61, 62])
+def test_a_start_is_one_wherever_a_piece_ends(cut: int) -> None:
+    t = 1.7e9 + np.arange(120) / 10
+    t[60:] += 0.5 - t[60]
+    found, says = read(t, (cut,))
+    np.testing.assert_allclose(np.diff(found)[59], BETWEEN, atol=1e-3)
+    np.testing.assert_allclose(np.delete(np.diff(found), 59), 0.1, atol=1e-3)
+    assert [said.partition(",")[0] for said in says] == [
+        "its clock begins anew 5.9 s behind its first row"
+    ]
+
+
+def test_a_clock_that_ends_often_is_said_once() -> None:
+    t = np.arange(0, 600, 0.5) % 60
+    found, says = read(t, (100, 250))
+    np.testing.assert_allclose(np.diff(found), 0.5)
+    assert len(says) == 1

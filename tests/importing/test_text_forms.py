@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +74,41 @@ def test_a_date_and_a_time_that_a_space_parts(tmp_path: Path, heading: str) -> N
     np.testing.assert_allclose(
         read(tmp_path, lines).t, np.arange(ROWS) / RATE, atol=2e-6
     )
+
+
+def test_counts_behind_a_time_are_no_zone(tmp_path: Path) -> None:
+    counts = [[(-1) ** (i // 3) * (1000 + i), 250, -16000] for i in range(ROWS)]
+    rows = [f"{when(i)!s:.26} {' '.join(map(str, counts[i]))}" for i in range(1, ROWS)]
+    rows = [row.replace(" 23:59:59 ", " 23:59:59.0 ") for row in rows]
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join(rows) + "\n")
+    wanted = ReadOptions(columns=("t", "ax", "ay", "az"))
+    got = concat(list(open_recording(path, wanted).blocks("0")))
+    np.testing.assert_array_equal(got.acc, counts[1:])
+    np.testing.assert_allclose(np.diff(got.t), 1 / RATE, atol=2e-6)
+
+
+@pytest.mark.parametrize("separator", [",", " "])
+def test_a_night_in_which_clocks_are_set_back_goes_on(
+    tmp_path: Path, separator: str
+) -> None:
+    began = datetime(2024, 10, 27, 0, 59, 58, tzinfo=UTC)
+
+    def stamp(row: int) -> str:
+        t = began + timedelta(seconds=row / RATE)
+        summer = t < began.replace(hour=1, minute=0, second=0)
+        berlin = t.astimezone(timezone(timedelta(hours=2 if summer else 1)))
+        return berlin.isoformat(timespec="milliseconds")
+
+    got = read(tmp_path, text(stamp, separator))
+    np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE, atol=2e-6)
+
+
+@pytest.mark.parametrize("zone", ["+00", "-07", "+0530", " +02:00", " UTC", "Z"])
+def test_zones_as_programs_write_them(zone: str) -> None:
+    clock = ClockText()
+    got = [clock.seconds(f"2024-05-03 12:00:0{i}.5{zone}") for i in (0, 1)]
+    assert got == [43200.5, 43201.5]
 
 
 def test_minutes_and_seconds_of_a_spreadsheet_begin_again_each_hour() -> None:
@@ -216,3 +251,28 @@ def test_the_text_of_a_dataflash_log_is_read_for_its_first_imu(tmp_path: Path) -
     np.testing.assert_allclose(got.gyr, [[0.01, -0.02, 0.03]] * ROWS)
     np.testing.assert_allclose(got.t, np.arange(ROWS) / RATE)
     np.testing.assert_allclose(got.temperature, 31.5)
+
+
+def tagged(rows: int, gyroscope_first: bool) -> str:
+    """Lines of two sensors in turn, so many of each, that hold the number of a row."""
+    found = []
+    for first in range(0, ROWS, rows):
+        some = range(first, min(first + rows, ROWS))
+        acc = [f"ACCE;{i / RATE:.3f};{i}.5;0.2;9.8" for i in some]
+        gyr = [f"GYRO;{i / RATE + 0.004:.3f};{i}.5;0.1;0.2" for i in some]
+        found += [*gyr, *acc] if gyroscope_first else [*acc, *gyr]
+    return "\n".join(found) + "\n"
+
+
+@pytest.mark.parametrize("rows", [1, 7, 30])
+@pytest.mark.parametrize("gyroscope_first", [False, True])
+def test_lines_of_two_sensors_may_come_many_at_a_time(
+    tmp_path: Path, rows: int, gyroscope_first: bool
+) -> None:
+    columns = ("_", "t", "ax", "ay", "az", "gx", "gy", "gz")
+    path = tmp_path / "log.txt"
+    path.write_text(tagged(rows, gyroscope_first))
+    recording = open_recording(path, ReadOptions(columns=columns))
+    got = concat(list(recording.blocks("0")))
+    np.testing.assert_array_equal(got.acc[:, 0], np.arange(ROWS) + 0.5)
+    np.testing.assert_array_equal(got.gyr[:, 0], got.acc[:, 0])

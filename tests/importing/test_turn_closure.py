@@ -86,3 +86,9 @@ def test_rates_of_another_device_close_at_no_scale() -> None:
     away = np.roll(other[:, 4:], 1, axis=1)
     assert closing_scale(rows[:, 0], rows[:, 1:4] / G, away, 1.0) is None
     assert closing_scale(rows[:, 0], rows[:, 1:4] / G, -other[:, 4:], 1.0) is None
+
+
+def test_times_that_most_rows_share_tell_no_scale() -> None:
+    rows = jerked(3, 0.0)
+    shared = np.floor(rows[:, 0] * 10) / 10
+    assert closing_scale(shared, rows[:, 1:4] / G, rows[:, 4:], 1.0) is None

@@ -12,7 +12,7 @@ from laid_about import turned
 from fieldcal.cli import main
 from fieldcal.core.samples import Block
 from fieldcal.exporters.kalibr import window_noise_density
-from fieldcal.importing.session.validation import SampleWriter
+from fieldcal.importing.session.sample_writer import SampleWriter
 from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.folder import Session
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.errors import InputError, SessionError
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Block
+from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.session import description, sample_files
@@ -332,3 +332,42 @@ def test_a_long_parquet_file_is_not_held_in_memory(tmp_path: Path) -> None:
         most = max(most, pa.total_allocated_bytes() - before)
     assert rows == 400_000
     assert most < path.stat().st_size / 2
+
+
+@pytest.mark.parametrize("ending", ["csv", "csv.gz", "arrows"])
+def test_part_by_part_is_what_the_whole_is_where_the_end_is_missing(
+    tmp_path: Path, ending: str
+) -> None:
+    rows = [f"{t / 100},0.1,-9.8,{t % 7},0,0,0" for t in range(5000)]
+    data = "\n".join([HEAD, *rows, ""]).encode()
+    (tmp_path / "session.toml").write_text("format = 1\n")
+    path = tmp_path / f"samples.{ending}"
+    if ending == "arrows":
+        names = HEAD.split(",")
+        columns = np.array([[float(x) for x in row.split(",")] for row in rows]).T
+        whole = pa.table(dict(zip(names, columns, strict=True)))
+        with pa.ipc.new_stream(str(path), whole.schema) as stream:
+            stream.write_table(whole, max_chunksize=1000)
+        data = path.read_bytes()
+    elif ending == "csv.gz":
+        data = gzip.compress(data)
+    path.write_bytes(data[: -len(data) // 4 - 3])
+    at_once, parted = Session.open(tmp_path), Session.open(tmp_path)
+    got = concat(parted.blocks())
+    assert 1000 < len(got) == len(at_once.block) < 5000
+    np.testing.assert_array_equal(got.six, at_once.block.six)
+    assert any("cut off" in said for said in at_once.warnings)
+    assert parted.warnings == at_once.warnings
+
+
+def test_names_of_columns_may_have_spaces_about_them(tmp_path: Path) -> None:
+    session = Session.open(folder(tmp_path, "", f"{HEAD.replace(',', ', ')}\n{ROWS}"))
+    np.testing.assert_array_equal(concat(session.blocks()).six, session.block.six)
+
+
+def test_a_column_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    session = Session.open(folder(tmp_path, "", f"{HEAD[:-2]}gx\n{ROWS}"))
+    with pytest.raises(SessionError, match="two columns gx"):
+        _ = session.block
+    with pytest.raises(SessionError, match="two columns gx"):
+        list(session.blocks())

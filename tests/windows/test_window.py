@@ -507,6 +507,14 @@ def test_a_window_one_cell_short_is_told_what_it_needs() -> None:
     assert short.covariance.shape == (6, 6) and np.isnan(short.covariance).all()
 
 
+def test_a_window_of_which_most_is_missing_is_not_called_short() -> None:
+    t = np.arange(3000) / 100
+    acc = np.where((t < 0.5)[:, None], [0.0, -9.8, 0.1], np.nan)
+    with pytest.raises(InputError, match=r"has values in 0\.5 s of it only") as error:
+        average(Block.of(t, acc))
+    assert "too short" not in str(error.value)
+
+
 def test_motion_that_is_just_allowed_is_rest() -> None:
     block = block_of(white(np.random.default_rng(22), 3000))
     ratio = filled(block).largest_motion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,11 @@ IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 
 NOT_MEASURED = -1
 """First element of a covariance where nothing was measured."""
+
+UNSTAMPED = (
+    "the headers of its messages have no stamp: the times at which they were logged are"
+    " taken, which tremble with the load of the computer"
+)
 
 MESSAGES_AT_ONCE = 4096
 """Messages made into samples at once."""
@@ -37,8 +43,34 @@ def message_row(said: Any, degrees: float, logged: int) -> tuple[float, ...]:
     return (stamp.sec + 1e-9 * stamp.nanosec, *acc, *gyr, degrees, 1e-9 * logged)
 
 
-def samples_of_rows(rows: list[tuple[float, ...]]) -> Block:
-    """Convert rows of `message_row` to samples."""
-    table = np.array(rows)
-    t, acc, gyr = table[:, 0], table[:, 1:4], table[:, 4:7]
-    return Block.of(t, acc, gyr, table[:, 7], None, table[:, 8])
+class MessageRows:
+    """Gathers rows of `message_row` to samples, many at a time.
+
+    Where no header has a stamp, the times of logging count, as long as none has.
+
+    Attributes
+    ----------
+    says : what the user must know, a sentence each
+
+    """
+
+    def __init__(self) -> None:
+        self.says: list[str] = []
+        self._rows: list[tuple[float, ...]] = []
+
+    def add(self, row: tuple[float, ...]) -> Iterator[Block]:
+        """Take a row in; gives samples when there are many."""
+        self._rows.append(row)
+        if len(self._rows) == MESSAGES_AT_ONCE:
+            yield from self.rest()
+
+    def rest(self) -> Iterator[Block]:
+        """Give the samples that wait."""
+        if not self._rows:
+            return
+        table, self._rows = np.array(self._rows), []
+        t, acc, gyr, logged = table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 8]
+        # a simulation begins at 0, and leaves it with its next message
+        if (t == 0).all() and (len(t) > 1 or self.says):
+            t, self.says = logged, [UNSTAMPED]
+        yield Block.of(t, acc, gyr, table[:, 7], None, logged)

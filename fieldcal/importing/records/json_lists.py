@@ -3,14 +3,14 @@
 A list of records becomes a list for each of their fields: ``{"acc": {"x": 1}}`` gives
 ``acc_x``, three numbers in a list are axes, and texts that are times of a clock become
 seconds. Records that hold several samples each say when the first of them was taken;
-the others lie evenly until the next record begins. Where the texts or the fields of
-records differ, such as the name of a sensor, each kind has lists of its own.
+the others lie evenly until the next record begins, where none was lost between. Where
+the texts or the fields of records differ, such as the name of a sensor, each kind has
+lists of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from fieldcal.importing.records.json_record import (
 )
 from fieldcal.importing.records.record_pairs import pair_records
 from fieldcal.importing.times.clock_text import ClockText
+from fieldcal.importing.times.fifo_time import GAP_BATCHES
 from fieldcal.importing.words.heading_words import heading_meaning
 
 
@@ -136,8 +137,15 @@ def _sample_fields(records: Sequence[JsonRecord]) -> dict[str, Array]:
 
 
 def _evenly_spaced_times(begins: Array, many: Sequence[int]) -> Array:
-    """Times of samples at equal intervals from one record to the next."""
-    steps = [b - a for a, b in pairwise(begins)] or [0.0]
-    last = steps[-1] * many[-1] / max(many[-2] if len(many) > 1 else 1, 1)
-    parts = zip(begins, [*steps[: len(begins) - 1], last], many, strict=True)
-    return np.concatenate([b + s * np.arange(m) / m for b, s, m in parts])
+    """Times of samples at equal intervals from one record to the next.
+
+    Behind a pause, and in the last record, they lie as far apart as they usually do.
+    """
+    number = np.array(many)
+    away = np.append(np.diff(begins), np.nan) / np.maximum(number, 1)
+    forward = away[away > 0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    step = np.where((away > 0) & (away < GAP_BATCHES * usual), away, usual)
+    place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+    times: Array = np.repeat(begins, number) + place * np.repeat(step, number)
+    return times

@@ -18,12 +18,9 @@ from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.importing.files.spool import SpooledRows
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.found_rests import find_rests
+from fieldcal.importing.session.sample_writer import SampleWriter, file_record
 from fieldcal.importing.session.stream_facts import StreamFacts
-from fieldcal.importing.session.validation import (
-    RowValidator,
-    SampleWriter,
-    file_record,
-)
+from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.units.time_units import recording_date
 from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
 from fieldcal.session.folder import DESCRIPTION

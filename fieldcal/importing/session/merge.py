@@ -13,6 +13,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array, Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.times.row_validator import RowValidator
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
@@ -68,11 +69,11 @@ class SeveralFiles(Recording):
         """The files that it is read from."""
         return [path for part in self.parts for path in part.files()]
 
-    def _tell(self) -> None:
+    def _tell(self, parts: Iterable[Recording]) -> None:
         """Say what the files said while they were read, each sentence once."""
-        for part in self.parts:
+        for part in parts:
             self.says += [s for s in part.says if s not in self.says]
-            self.mended += part.mended
+            self.mended += [s for s in part.mended if s not in self.mended]
 
 
 class FilesInOrder(SeveralFiles):
@@ -101,7 +102,7 @@ class FilesInOrder(SeveralFiles):
         and are taken to follow after a pause.
         """
         yield from self._in_order(p.blocks(_name(p)) for p in self.parts)
-        self._tell()
+        self._tell(self.parts)
 
     def first_rows(self, stream: str, most: int) -> Block:
         """Rows at the beginning of each file, so many in all."""
@@ -158,7 +159,7 @@ class MergedFiles(SeveralFiles):
         """
         pair = self._triads()
         yield from self._aligned(*pair) if pair else self._row_by_row(stream)
-        self._tell()
+        self._tell(self.parts)
 
     def _triads(self) -> tuple[Recording, Recording] | None:
         """Accelerometers and gyroscopes of different times; None of others."""
@@ -178,13 +179,21 @@ class MergedFiles(SeveralFiles):
 
     def _aligned(self, acc: Recording, gyr: Recording) -> Iterator[Block]:
         pair, begin = AlignedPair(), float("nan")
-        flows = [_with_clock_times(p).blocks(_name(p)) for p in (acc, gyr)]
+        both = [_with_clock_times(p) for p in (acc, gyr)]
+        judges = [RowValidator(str(p.path), p.place, p.repair) for p in both]
+        forces, rates = (
+            judge.through(p.blocks(_name(p)))
+            for judge, p in zip(judges, both, strict=True)
+        )
         together = False
-        for block in pair.through(*flows):
+        for block in pair.through(forces, rates):
             if np.isnan(begin) and len(block):
                 begin = self.began = float(block.t[0])
             together = together or bool(np.isfinite(block.gyr).any())
             yield replace(block, t=block.t - begin)
+        for judge, one in zip(judges, both, strict=True):
+            one.mended += [f"{one.path.name}: {said}" for said in judge.mended]
+        self._tell(both)
         if not together:
             raise InputError(
                 f"{gyr.path}: no sample is at a time at which {acc.path.name} has one;"

@@ -97,11 +97,12 @@ class ColumnRecording(Recording):
 
     def paired(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """Samples of its rows, also where each holds one of two sensors alone."""
-        rows = RowsInTurn()
+        rows = RowsInTurn(str(self.path), self.repair)
         for block in rows.through(blocks):
             self.in_turn = rows.told
             yield block
         self.says += [s for s in rows.says if s not in self.says]
+        self.mended += [s for s in rows.mended if s not in self.mended]
 
     def scatter(self) -> MeanScatter | None:
         """What its columns say of the scatter, if its rows are means."""
@@ -113,12 +114,9 @@ class ColumnRecording(Recording):
             return None
         fits = (w for w in self.heading() if len(w.columns) == table.shape[1])
         where = scatter_columns(next(fits, Heading([])).columns)
-        values = np.full((len(table), 6), np.nan)
-        for i, channel in enumerate(CHANNELS):
-            if channel in where:
-                values[:, i] = table[:, where[channel]]
+        means, values = (_columns_of(table, places) for places in (at, where))
         count = table[:, where["n"]] if "n" in where else None
-        return MeanScatter(values, count, columns.has_time(wanted.columns))
+        return MeanScatter(means, values, count, columns.has_time(wanted.columns))
 
     def _found(self) -> dict[str, ReadOptions]:
         if self.wanted.columns:
@@ -206,6 +204,15 @@ class ColumnRecording(Recording):
             f" {quote(with_them)} if they are, or --columns"
             f" {quote(','.join(_columns_option(known, places, way.skip)))}"
         )
+
+
+def _columns_of(table: Array, places: Mapping[str, int]) -> Array:
+    """Numbers (n, 6) of the channels that stand in a table; nan of others."""
+    found = np.full((len(table), len(CHANNELS)), np.nan)
+    for i, channel in enumerate(CHANNELS):
+        if channel in places:
+            found[:, i] = table[:, places[channel]]
+    return found
 
 
 def _columns_option(

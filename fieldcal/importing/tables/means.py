@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.probability import MAD_TO_SIGMA
-from fieldcal.core.samples import Array, concat
+from fieldcal.core.samples import Array, Index, concat
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.recording import MeanScatter, Recording
 from fieldcal.importing.words.heading_words import (
@@ -211,11 +211,30 @@ def _list_of(sigma: Array) -> list[float | str]:
     [0.01, 0.02, 0.03, 'unknown', 0.0001]
     """
     known = np.isfinite(sigma)
-    last = int(np.flatnonzero(known)[-1])
+    last = int(np.flatnonzero(known)[-1]) if known.any() else len(sigma) - 1
     return [
         float(f"{one:.4g}") if there else "unknown"
         for one, there in zip(sigma[: last + 1], known, strict=False)
     ]
+
+
+def _rows_in_table(means: Array, table: Array) -> Index:
+    """Rows of a table (m, 6) that became means (n, 6), in order, signs aside.
+
+    Rows that cannot be read are in the table alone.
+    """
+    if len(means) == len(table):
+        return np.arange(len(means))
+    found, at = [], -1
+    for row in np.abs(means):
+        same = (
+            i
+            for i in range(at + 1, len(table))
+            if np.allclose(np.abs(table[i]), row, rtol=1e-9, atol=0, equal_nan=True)
+        )
+        at = next(same, at)
+        found.append(at)
+    return np.array(found, dtype=np.intp)
 
 
 def tables_of_means(
@@ -241,12 +260,17 @@ def tables_of_means(
     """
     block = concat(recording.alone(stream).blocks(stream))
     scale = np.repeat([recording.wanted.acc_scale, recording.wanted.gyr_scale], 3)
+    rows = _rows_in_table(block.six, scatter.means * scale)
+    # rows without any value are no positions
+    told = np.isfinite(block.six).any(axis=1)
+    block, rows = block[np.flatnonzero(told)], rows[told]
+    many = None if scatter.many is None else scatter.many[rows]
     found = estimate_mean_uncertainty(
-        block.six, scatter.values * scale, scatter.many, gravity
+        block.six, scatter.values[rows] * scale, many, gravity
     )
     if said:
         found = MeanUncertainty(_stated_uncertainty(said, block.six), "")
-    if not np.isfinite(found.sigma[:, :3]).all():
+    if not np.isfinite(found.sigma[:, :3])[np.isfinite(block.acc)].all():
         raise InputError(
             f"{recording.path}: nothing says how well its {len(block)} means are known:"
             " add --sigma 0.005,0.0005 (of accelerations in m/s^2, of rates in rad/s),"

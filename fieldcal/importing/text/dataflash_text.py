@@ -65,7 +65,7 @@ class DataflashText(TextForm):
         """Return what reads a text of this form from its beginning."""
         first: dict[str, str] = {}
         wanted: list[str] = []
-        pairs = NearestLines()
+        pairs = NearestLines(len(RATES))
 
         def messages(lines: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
             """Messages of the first instance, by their names and fields."""
@@ -86,7 +86,7 @@ class DataflashText(TextForm):
             if said and not wanted:
                 all_in_one = any(name == "IMU" for name, _ in said)
                 wanted.extend(["IMU"] if all_in_one else ["ACC", "GYR"])
-            rows = []
+            rows = [] if lines else [_in_order(row) for row in pairs.rest()]
             for name, one in (one for one in said if one[0] in wanted):
                 if name == "IMU":
                     rows.append(self._row(one))
@@ -98,8 +98,7 @@ class DataflashText(TextForm):
                     both = pairs.rate(float(t), [one[n] for n in RATES])
                 else:
                     both = pairs.force(float(t), [t, *(one[n] for n in FORCES)])
-                # the time, what is behind the forces, and they
-                rows += [[row[0], *row[4:], *row[1:4], ""] for row in both]
+                rows += [_in_order(row) for row in both]
             return [",".join(row) for row in rows]
 
         return read
@@ -108,3 +107,8 @@ class DataflashText(TextForm):
         """Cells of a message that has all channels."""
         warm = next((one[name] for name in WARM if name in one), "")
         return [*(one.get(n, "") for n in (self._time, *RATES, *FORCES)), warm]
+
+
+def _in_order(row: Sequence[str]) -> list[str]:
+    """Time, rates, forces and no temperature, of time, forces and rates."""
+    return [row[0], *row[4:], *row[1:4], ""]

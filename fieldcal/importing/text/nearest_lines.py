@@ -1,45 +1,69 @@
-"""Lines of two sensors in turn: each beside the nearest of the other.
+"""Lines of two sensors in one text: each beside the nearest of the other.
 
-Nothing is interpolated.
+Lines of both may come one by one or many of one at a time, as telephones hand samples
+over. Nothing is interpolated.
 """
 
 from __future__ import annotations
 
+from collections import deque
+
 WAITING = 1000
-"""Lines that wait for one of the gyroscope: it may end before."""
+"""Lines of either sensor that wait for the other: it may end before."""
 
 
 class NearestLines:
-    """Puts each line of one sensor beside the nearest of the other."""
+    """Puts each line of the accelerometer beside the nearest of the gyroscope.
 
-    def __init__(self) -> None:
-        self._waiting: list[tuple[float, list[str]]] = []
-        self._last: tuple[float, list[str]] | None = None
+    Parameters
+    ----------
+    width : cells of a line of the gyroscope
+
+    """
+
+    def __init__(self, width: int) -> None:
+        self._width = width
+        self._waiting: deque[tuple[float, list[str]]] = deque()
+        self._rates: deque[tuple[float, list[str]]] = deque()
         self._before = self._step = float("nan")
 
     def force(self, t: float, row: list[str]) -> list[list[str]]:
-        """Take a line of the accelerometer in; return those that wait in vain."""
+        """Take a line of the accelerometer in; return those whose nearest is known."""
+        anew = self.rest() if t < self._before else []
         self._step = t - self._before if t > self._before else self._step
         self._before = t
         self._waiting.append((t, row))
-        many = len(self._waiting) - WAITING
-        late, self._waiting = (
-            self._waiting[: max(many, 0)],
-            self._waiting[max(many, 0) :],
-        )
-        return [self._beside(*one, None) for one in late]
+        return anew + self._ready()
 
     def rate(self, t: float, row: list[str]) -> list[list[str]]:
-        """Take a line of the gyroscope in; return all that wait, each with one."""
-        found = [self._beside(*one, (t, row)) for one in self._waiting]
-        self._waiting, self._last = [], (t, row)
+        """Take a line of the gyroscope in; return those whose nearest is known."""
+        anew = self.rest() if self._rates and t < self._rates[-1][0] else []
+        self._rates.append((t, row))
+        found = anew + self._ready()
+        if len(self._rates) > WAITING:
+            self._rates.popleft()
         return found
 
-    def _beside(
-        self, t: float, row: list[str], new: tuple[float, list[str]] | None
-    ) -> list[str]:
-        near = [one for one in (self._last, new) if one is not None]
-        nearest = min(near, key=lambda one: abs(one[0] - t))
+    def rest(self) -> list[list[str]]:
+        """Return all lines that wait: what comes behind, if anything, begins anew."""
+        found = [self._beside(*one) for one in self._waiting]
+        self._waiting.clear()
+        self._rates.clear()
+        return found
+
+    def _ready(self) -> list[list[str]]:
+        found, waiting = [], self._waiting
+        until = self._rates[-1][0] if self._rates else float("-inf")
+        while waiting and (waiting[0][0] <= until or len(waiting) > WAITING):
+            found.append(self._beside(*waiting.popleft()))
+        return found
+
+    def _beside(self, t: float, row: list[str]) -> list[str]:
+        rates = self._rates
+        while len(rates) > 1 and (
+            rates[1][0] <= t or abs(rates[1][0] - t) < abs(rates[0][0] - t)
+        ):
+            rates.popleft()
         # what is further than a step belongs to another line
-        far = abs(nearest[0] - t) > self._step
-        return [*row, *([""] * len(nearest[1]) if far else nearest[1])]
+        far = not rates or abs(rates[0][0] - t) > self._step
+        return [*row, *([""] * self._width if far else rates[0][1])]

@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
-from itertools import chain
+from functools import partial
+from itertools import chain, tee
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.times.row_validator import RowValidator
 
 MIN_ROWS = 20
 """Rows of each sensor that tell."""
@@ -37,15 +39,23 @@ class RowsInTurn:
     gyroscope; where one sensor is slower than the rows, those without it are left out.
     Other rows stay as they are.
 
+    Parameters
+    ----------
+    name : of the file, for errors
+    repair : whether samples whose times cannot be are left out and said, or refused
+
     Attributes
     ----------
     says : what the user must know, a sentence each
+    mended : what was left out, likewise
     told : whether rows are of two sensors
 
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str, repair: bool) -> None:
+        self._name, self._repair = name, repair
         self.says: list[str] = []
+        self.mended: list[str] = []
         self.told = False
         self._warm = np.nan
 
@@ -67,19 +77,29 @@ class RowsInTurn:
                 self._whole(chain([first], flow)) if slow else chain([first], flow)
             )
             return
-        pair = AlignedPair()
-        for block in chain([first], flow):
-            acc, gyr = _known(block)
-            warm = self._warmth(block.temperature)[acc]
-            yield pair.feed(
-                Block.of(block.t[acc], block.acc[acc], None, warm),
-                Block.of(block.t[gyr], np.full((gyr.sum(), 3), np.nan), block.gyr[gyr]),
-            )
-        yield pair.rest()
+        yield from self._paired(chain([first], flow))
+
+    def _paired(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """Samples of the accelerometer, each with the nearest of the gyroscope."""
+        pair, (first, second) = AlignedPair(), tee(blocks)
+        judges = [
+            RowValidator(self._name, partial(_sample_of, sensor), self._repair)
+            for sensor in ("accelerometer", "gyroscope")
+        ]
+        flows = map(self._forces, first), map(_rates, second)
+        acc, gyr = (j.through(flow) for j, flow in zip(judges, flows, strict=True))
+        yield from pair.through(acc, gyr)
+        self.mended += [said for judge in judges for said in judge.mended]
         self.says.append(
             "its rows hold the accelerometer or the gyroscope: each sample of the first"
             f" goes with the nearest, {1e3 * pair.worst:.2g} ms apart at most"
         )
+
+    def _forces(self, block: Block) -> Block:
+        """Samples of the accelerometer alone."""
+        acc, _ = _known(block)
+        warm = self._warmth(block.temperature)[acc]
+        return Block.of(block.t[acc], block.acc[acc], None, warm)
 
     def _whole(self, blocks: Iterable[Block]) -> Iterator[Block]:
         """Rows of both sensors alone."""
@@ -103,6 +123,18 @@ class RowsInTurn:
         self._warm = float(held[last[-1]])
         filled: Array = held[last][1:]
         return filled
+
+
+def _sample_of(sensor: str, number: int) -> str:
+    """Name a sample of one sensor, counted from 0."""
+    return f"sample {number + 1} of its {sensor}"
+
+
+def _rates(block: Block) -> Block:
+    """Samples of the gyroscope alone."""
+    _, gyr = _known(block)
+    unknown = np.full((int(gyr.sum()), 3), np.nan)
+    return Block.of(block.t[gyr], unknown, block.gyr[gyr])
 
 
 def _alternate(alone: NDArray[np.bool_], both: NDArray[np.bool_]) -> bool:

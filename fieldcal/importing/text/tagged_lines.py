@@ -101,10 +101,11 @@ class TaggedLines(TextForm):
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
-        pairs = NearestLines()
+        here = {self._place, self._time}
+        pairs = NearestLines(self._gyr.width - len(here) if self._gyr else 0)
 
         def read(lines: Sequence[str]) -> list[str]:
-            found = []
+            found = [] if lines else pairs.rest()
             for line in lines:
                 row = split_cells(line, self._separator)
                 word = row[self._place] if len(row) > self._place else ""

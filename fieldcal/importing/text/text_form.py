@@ -10,7 +10,8 @@ MOSTLY = 0.5
 """Share of lines that tell the form of a text."""
 
 Reader = Callable[[Sequence[str]], list[str]]
-"""Turns lines into lines; called with one piece of a text after the other."""
+"""Turns lines into lines; called with one piece of a text after the other, and with no
+lines where the text ends."""
 
 
 class TextForm(ABC):

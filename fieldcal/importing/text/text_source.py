@@ -44,7 +44,14 @@ class TextSource:
                 continue
             lines = split_lines(data)
             for read in readers:
-                lines = read(lines)
+                # no lines at all would be the end of the text
+                lines = read(lines) if lines else []
+            if lines:
+                yield ("\n".join(lines) + "\n").encode()
+        lines = []
+        for read in readers:
+            lines = [*(read(lines) if lines else []), *read([])]
+        if lines:
             yield ("\n".join(lines) + "\n").encode()
 
     def _whole_lines(self) -> Iterator[bytes]:

@@ -8,7 +8,6 @@ interpolated. What comes out does not depend on how the samples were cut into bl
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import zip_longest
 
 import numpy as np
 
@@ -33,14 +32,16 @@ class AlignedPair:
         self._period = np.nan
         self.worst = 0.0
 
-    def feed(self, acc: Block | None, gyr: Block | None) -> Block:
-        """Return samples of which both sides are known."""
+    def feed(
+        self, acc: Block | None, gyr: Block | None, wait: float = MAX_WAIT_S
+    ) -> Block:
+        """Return samples of which both sides are known, or that waited so long, s."""
         self._acc += [acc] if acc is not None else []
         self._gyr += [gyr] if gyr is not None else []
         acc_all, gyr_all = concat(self._acc), concat(self._gyr)
         until = gyr_all.t[-1] if len(gyr_all) else -np.inf
         if len(acc_all):
-            until = max(until, acc_all.t[-1] - MAX_WAIT_S)
+            until = max(until, acc_all.t[-1] - wait)
         ready = int(np.searchsorted(acc_all.t, until))
         self._acc = [acc_all[ready:]]
         out = self._paired(acc_all[:ready], gyr_all)
@@ -53,9 +54,23 @@ class AlignedPair:
         return out
 
     def through(self, acc: Iterable[Block], gyr: Iterable[Block]) -> Iterator[Block]:
-        """All samples of two flows, which end when they end."""
-        for two in zip_longest(acc, gyr):
-            yield self.feed(*two)
+        """All samples of two flows, which end when they end.
+
+        A piece of a file spans more time the slower its sensor is. So the next one is
+        of the flow that is behind, and samples wait until the gyroscope has come up.
+        """
+        flows, newest = (iter(acc), iter(gyr)), [-np.inf, -np.inf]
+        while min(newest) < np.inf:
+            behind = int(newest[1] < newest[0])
+            block = next(flows[behind], None)
+            if block is None:
+                newest[behind] = np.inf
+                continue
+            known = block.t[np.isfinite(block.t)]
+            newest[behind] = float(np.max(known, initial=newest[behind]))
+            wait = np.inf if newest[1] < np.inf else 0.0
+            force, rate = (None, block) if behind else (block, None)
+            yield self.feed(force, rate, wait)
         yield self.rest()
 
     def rest(self) -> Block:

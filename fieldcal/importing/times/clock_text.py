@@ -3,8 +3,8 @@
 Dates may stand before the time of day, in any usual order, or in a column of their own;
 AM and PM, decimal commas and zones are understood, and spreadsheets' ``59:50.1``
 (minutes and seconds) as well. Times count in seconds from the first midnight, or the
-first hour. Which of 03/05 is the month matters only where the date changes: the reading
-that lies nearest to the date before is taken.
+first hour, by the clock of the first one's zone. Which of 03/05 is the month matters
+only where the date changes: the reading that lies nearest to the date before is taken.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ _DATE = (
 )
 _TIME = (
     r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:[.,:]\d+)?)"
-    r"(?:\s*(?P<half>[AaPp][Mm]))?(?:\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d))?"
+    r"(?:\s*(?P<half>[AaPp][Mm]))?"
 )
-_CLOCK = re.compile(rf"(?:(?:{_DATE}|(?P<days>\d+) days?)[T ,;\t]\s*)?{_TIME}")
+_ZONE = r"(?:\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?))?"
+_CLOCK = re.compile(rf"(?:(?:{_DATE}|(?P<days>\d+) days?)[T ,;\t]\s*)?{_TIME}{_ZONE}")
 _LATE_YEAR = re.compile(
     r"(?:[A-Z][a-z]{2} )?(?P<month>[A-Z][a-z]{2})\s+(?P<day>\d{1,2})"
     r" (?P<time>[\d:.]+) (?P<year>\d{4})"
@@ -29,7 +30,12 @@ _LATE_YEAR = re.compile(
 
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
 _DAY = re.compile(_DATE)
-IN_LINE = re.compile(rf"{_DATE}[T ]\s*{_TIME}(?=\s|$)")
+_ZONE_BEFORE_NUMBERS = (
+    r"(?:\s*(?:Z|UTC|GMT)|[+-]\d\d(?::?\d\d)?|\s*[+-](?:\d\d:\d\d|0\d\d\d))?"
+)
+"""Behind a space, ``-1234`` is the number of the next column."""
+
+IN_LINE = re.compile(rf"{_DATE}[T ]\s*{_TIME}{_ZONE_BEFORE_NUMBERS}(?=\s|$)")
 """A date and time between columns that spaces part."""
 
 _MONTHS = "jan feb mar apr may jun jul aug sep oct nov dec".split()
@@ -71,6 +77,7 @@ class ClockText:
         self._days: dict[str, int] = {}
         self._first: int | None = None
         self._day, self._last = 0, 0.0
+        self._zone: float | None = None
 
     def seconds(self, text: str, day: str = "") -> float | None:
         """Seconds since the first midnight; None of what is no time.
@@ -88,12 +95,20 @@ class ClockText:
         if half:
             h = h % 12 + (12 if half == "pm" else 0)
         s = float(re.sub("[,:]", ".", said["s"]))
-        since = HOUR * h + 60.0 * int(said["m"]) + s
+        since = HOUR * h + 60.0 * int(said["m"]) + s - self._set_forward(said["zone"])
         if said["days"]:
             return DAY * int(said["days"]) + since
         if written := said["date"] or day.strip():
             return DAY * self._number(written) + since
         return self._unwrapped(since, DAY)
+
+    def _set_forward(self, zone: str | None) -> float:
+        """By how much a clock is set forward since the first time, s: in summer."""
+        if zone is None:
+            return 0.0
+        east = _east_of_greenwich(zone)
+        self._zone = east if self._zone is None else self._zone
+        return east - self._zone
 
     def _of_minutes(self, text: str) -> float | None:
         said = _MINUTES.fullmatch(text.strip())
@@ -143,3 +158,14 @@ def _possible_dates(written: str) -> list[int]:
         except ValueError:
             continue
     return found
+
+
+def _east_of_greenwich(zone: str) -> float:
+    """By how much the clocks of a zone are ahead of UTC, s.
+
+    >>> [_east_of_greenwich(zone) for zone in ("Z", "+05:30", "-07")]
+    [0.0, 19800.0, -25200.0]
+    """
+    digits = re.sub(r"\D", "", zone).ljust(4, "0")
+    east = HOUR * int(digits[:2]) + 60.0 * int(digits[2:])
+    return -east if zone.startswith("-") else east

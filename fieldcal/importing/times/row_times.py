@@ -21,6 +21,12 @@ FRACTIONS = {"t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9}
 COUNTED = (2.0**16, 2.0**24, 2.0**32)
 """Where counters of a device begin again."""
 
+DIVIDED = tuple(many * tick for many in COUNTED for tick in (1e-6, 1e-3))
+"""Likewise of counters of us and ms that a program divides before it writes them, s."""
+
+LONG_PERIOD = 10.0
+"""Times that such a period is longer than what is near its end."""
+
 PERIODS = (60.0, 3600.0, 86400.0, 604800.0)
 """Where clocks begin again, s: a minute, an hour, a day, a week."""
 
@@ -111,6 +117,8 @@ class RowTimes:
         self._seen, self._sum, self._offset = 0, 0.0, 0.0
         self._earlier = self._last = self._usual = np.nan
         self._anew: list[float] = []
+        self._began = np.nan
+        self._unsure: tuple[float, float] | None = None
         self._spread = BatchTimes(wanted.batch) if wanted.batch else None
 
     def of(self, columns: Mapping[str, Array], n: int) -> Array:
@@ -137,6 +145,9 @@ class RowTimes:
             if name in columns:
                 t = t + columns[name] * size
         known = np.flatnonzero(np.isfinite(t))
+        if len(known):
+            self._began = float(t[known[0]]) if np.isnan(self._began) else self._began
+            self._decide(float(t[known[0]]))
         earlier = np.concatenate([[self._earlier, self._last], t[known]])
         steps = np.diff(earlier[1:])
         forward = steps[steps > 0]
@@ -150,21 +161,39 @@ class RowTimes:
             period = self._period(before, began, scale)
             if not period and _lasts(t[known[i : i + 2]], before):
                 period = self._started(before, began)
+                if period and i + 1 == len(known):
+                    self._unsure = before, period
             offsets[known[i] :] += period
             self._offset += period
         self._earlier, self._last = earlier[-2:].tolist()
         t = t + offsets
         return t
 
+    def _decide(self, following: float) -> None:
+        """Take a start back that the last row of a block alone showed, if it was none.
+
+        A time that goes on from the one before that row shows that it was a wrong one.
+        """
+        if self._unsure is not None and following > self._unsure[0]:
+            self._last, self._earlier = self._unsure[0], np.nan
+            self._offset -= self._unsure[1]
+            self._anew.pop()
+            self._say_starts()
+        self._unsure = None
+
     def _period(self, before: float, began: float, scale: float) -> float:
         """Where a clock began again that went from one time to another; 0 if not."""
         near = NEAR_STEPS * self._usual
-        for period in (*(many * scale for many in COUNTED), *PERIODS):
+        own = (many * scale for many in COUNTED)
+        # of a period of few steps any time is near both ends
+        divided = (p for p in DIVIDED if p > LONG_PERIOD * near)
+        for period in (*own, *divided, *PERIODS):
             if 0 <= began < near and 0 < period - before < near:
-                self.says.append(
+                said = (
                     f"its clock ends at {period:g} s and begins again: the times behind"
                     " go on"
                 )
+                self.says += [said] if said not in self.says else []
                 return period
         return 0.0
 
@@ -173,11 +202,18 @@ class RowTimes:
         if not 0 <= began < STARTED or before - began < NEAR_STEPS * self._usual:
             return 0.0
         self._anew.append(before + self._offset)
-        first, *others = self._anew
-        again = f" (and {len(others)} times more)" if others else ""
-        self.says[:] = [one for one in self.says if not one.endswith(ANEW)]
-        self.says.append(f"its clock begins anew at {first:.4g} s{again}{ANEW}")
+        self._say_starts()
         return before - began + max(BETWEEN, BETWEEN * self._usual)
+
+    def _say_starts(self) -> None:
+        """Say where the clock began anew, in one sentence."""
+        self.says[:] = [one for one in self.says if not one.endswith(ANEW)]
+        if self._anew:
+            first, *others = self._anew
+            many = "once" if len(others) == 1 else f"{len(others)} times"
+            again = f" (and {many} more)" if others else ""
+            where = f"{first - self._began:.4g} s behind its first row"
+            self.says.append(f"its clock begins anew {where}{again}{ANEW}")
 
 
 def _lasts(t: Array, before: float) -> bool:

@@ -86,6 +86,9 @@ def closing_scale(t: Array, up: Array, gyr: Array, rough: float) -> float | None
 
 def _turns(t: Array, up: Array, gyr: Array) -> Iterator[TurnBetweenRests]:
     step = float(np.median(np.diff(t)))
+    if step <= 0:
+        # most rows share the time of the row before: nothing says how long a rest is
+        return
     rests = [
         _inner_part(*rest, step)
         for rest in _rests(up, max(4, round(GROUP_S / step)), step)

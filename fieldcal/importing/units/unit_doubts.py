@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -18,6 +18,13 @@ from fieldcal.session.units import UNSCALED
 
 MAX_LOG_SCALE = 0.25
 """Logarithm of what no sensor in the unit that is said is out by."""
+
+OTHER_UNIT = 3.0
+"""Ratio of what gravity reads in two files from which their units differ: those of
+m/s^2 and g by ten, and what biases make of it by less than two."""
+
+FIRST_ROWS = 1 << 14
+"""Rows at the beginning of a file by which that is told."""
 
 NO_GRAVITY = 0.05
 """Part of g below which gravity was taken out; mg and g in m/s^2 read otherwise."""
@@ -43,6 +50,35 @@ def check_format_units(recording: Recording, block: Block) -> None:
     if answer := recording.rescaled(gravity.size / G0, turned or 1.0):
         raise InputError(f"{recording.path}: {odd}: add {answer}")
     recording.says.append(odd)
+
+
+def check_one_unit(parts: Sequence[Recording]) -> None:
+    """Check that several files have their accelerations in one unit, as far as told.
+
+    Raises
+    ------
+    InputError
+        Naming two files that do not.
+
+    """
+    sizes = {
+        part.path.name: gravity.size
+        for part in parts if len(parts) > 1
+        if (gravity := _gravity_of_file(part)) is not None
+    }  # fmt: skip
+    low, high = (f(sizes, key=sizes.__getitem__, default="") for f in (min, max))
+    if sizes and sizes[high] > OTHER_UNIT * sizes[low]:
+        raise InputError(
+            f"{high}: |a| at rest is {sizes[high]:.4g}, and {sizes[low]:.4g} in {low}:"
+            " their units differ; import each alone, or write one unit into all"
+        )
+
+
+def _gravity_of_file(part: Recording) -> GravityReading | None:
+    """Gravity at the beginning of a file, in the unit that is stated of it or none."""
+    name = part.streams()[0].name
+    acc = part.alone(name).first_rows(name, FIRST_ROWS).acc
+    return estimate_gravity(acc - part.wanted.acc_scale * part.wanted.zero)
 
 
 class StatedUnits:

@@ -42,7 +42,12 @@ from fieldcal.importing.units.unit_answers import (
     unit_options,
     zero_options,
 )
-from fieldcal.importing.units.unit_doubts import StatedUnits, check_format_units
+from fieldcal.importing.units.unit_doubts import (
+    StatedUnits,
+    check_format_units,
+    check_one_unit,
+)
+from fieldcal.session.units import UNSCALED
 
 ROWS = 1 << 17
 """Rows at the beginning by which units are told."""
@@ -87,6 +92,8 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
         check_format_units(recording, block)
         return AssumedUnits(heard.guessed)
     guess = _Guess(str(recording.path), _stated_units(parts), block)
+    if guess.said.acc_unit not in UNSCALED and guess.acc_bias is None:
+        check_one_unit(parts)
     for part in parts:
         part.wanted = guess.on(part.wanted)
     parts[0].says += guess.doubts

@@ -1,17 +1,14 @@
-"""Validation of imported samples: bad rows are left out, good ones written.
+"""Validation of imported samples: bad rows are refused, or left out and said.
 
 A row is refused whose time is not later than that of the row before, whose numbers are
 infinite or larger than any sensor's, or which holds nothing but zeros (a buffer that
 was never filled): a missing value is no zero. Rows without any number are no samples,
-and are left out as if they were not there. Rows are written a group at a time, and
-found again by their time.
+and are left out as if they were not there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +16,6 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Block, Index, concat, runs_of_true
 from fieldcal.importing.recording import MAX_LISTED_FAULTS, MAX_READING
-
-MIN_GROUP_ROWS, MAX_GROUP_ROWS = 1 << 13, 1 << 15
-"""Fewest and most rows of a row group."""
 
 Rows = NDArray[np.bool_]
 
@@ -205,98 +199,3 @@ def _without_numbers(block: Block) -> Rows:
     if none.any():
         none &= np.isnan(block.six).all(axis=1) & np.isnan(block.temperature)
     return none
-
-
-class SampleWriter:
-    """A samples.parquet that is written piece by piece, and read back by time.
-
-    A context manager; memory holds one group of rows.
-    """
-
-    def __init__(self, path: Path) -> None:
-        import pyarrow.parquet
-
-        from fieldcal.session.sample_files import samples_schema
-
-        self._path = path
-        # no two samples are alike: a dictionary of them only takes time
-        self._writer = pyarrow.parquet.ParquetWriter(
-            path,
-            samples_schema(),
-            compression="lz4",
-            use_dictionary=False,
-            use_byte_stream_split=True,
-            write_statistics=False,
-            write_page_checksum=True,
-        )
-        self._waiting: list[Block] = []
-        self._many = 0
-        self._groups: list[tuple[float, float]] = []
-        self._file: Any = None
-        self._read = (-1, concat([]))
-
-    def add(self, block: Block) -> None:
-        """Take in the block that follows."""
-        self._waiting.append(block)
-        self._many += len(block)
-        if self._many >= MIN_GROUP_ROWS:
-            self._put()
-
-    def _put(self) -> None:
-        """Write the rows that wait, in groups."""
-        from fieldcal.session.sample_files import to_record_batch
-
-        one = len(self._waiting) == 1
-        whole = self._waiting[0] if one else concat(self._waiting)
-        self._waiting, self._many = [], 0
-        for first in range(0, len(whole), MAX_GROUP_ROWS):
-            part = whole[first : first + MAX_GROUP_ROWS]
-            self._writer.write_batch(
-                to_record_batch(part, nulls=True), row_group_size=MAX_GROUP_ROWS
-            )
-            self._groups.append((float(part.t[0]), float(part.t[-1])))
-
-    def close(self) -> None:
-        """Write what waits, and end the file."""
-        if self._many:
-            self._put()
-        self._writer.close()
-
-    def between(self, start: float, end: float) -> Iterator[Block]:
-        """Times and channels with start <= t < end, of a file that was closed."""
-        for i, (first, last) in enumerate(self._groups):
-            if first < end and last >= start:
-                yield self._group(i).between(start, end)
-
-    def _group(self, i: int) -> Block:
-        """One group of rows; stretches that follow each other are in one."""
-        import pyarrow.parquet
-
-        from fieldcal.session.sample_files import block_from_table
-
-        if self._file is None:
-            self._file = pyarrow.parquet.ParquetFile(self._path, pre_buffer=False)
-        if self._read[0] != i:
-            # one thread: each of several would keep memory of its own
-            group = self._file.read_row_group(i, ("t", *CHANNELS), use_threads=False)
-            self._read = (i, block_from_table(group))
-        return self._read[1]
-
-    def __enter__(self) -> SampleWriter:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self._writer.close()
-        if self._file is not None:
-            self._file.close()
-
-
-def file_record(path: Path) -> dict[str, Any]:
-    """Name, size and SHA-256 of a file."""
-    import hashlib
-
-    with path.open("rb") as file:
-        hashed = hashlib.file_digest(file, "sha256")
-    return {
-        "name": path.name, "sha256": hashed.hexdigest(), "bytes": path.stat().st_size
-    }  # fmt: skip

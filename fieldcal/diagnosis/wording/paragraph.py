@@ -22,12 +22,17 @@ MAX_LISTED_OCCURRENCES = 3
 MAX_LISTED_PLACES = 6
 """Most places that a paragraph lists, and positions that a sentence lists."""
 
+MAX_DECIMALS = 6
+"""Decimal places above which an uncertainty is written with an exponent."""
+
 
 def with_uncertainty(quantity: Quantity) -> str:
-    """A value with its uncertainty and unit.
+    """A value with its uncertainty and unit, to the second digit of the uncertainty.
 
     >>> with_uncertainty(Quantity(0.00312, 0.00011, "1"))
     '0.00312 ± 0.00011'
+    >>> with_uncertainty(Quantity(1.0040123, 4.2e-6, "1"))
+    '1.0040123 ± 4.2e-06'
     """
     if isinstance(quantity.value, str):
         return quantity.value
@@ -36,8 +41,10 @@ def with_uncertainty(quantity: Quantity) -> str:
     if sigma is None or not math.isfinite(sigma) or sigma <= 0:
         return f"{quantity.value:.4g}{unit}"
     digits = 1 - math.floor(math.log10(sigma))
-    if digits > 6:
-        return f"{quantity.value:.3g} ± {sigma:.2g}{unit}"
+    if digits > MAX_DECIMALS:
+        size = abs(quantity.value) or sigma
+        significant = max(math.floor(math.log10(size)) + digits + 1, 2)
+        return f"{quantity.value:#.{significant}g} ± {sigma:#.2g}{unit}"
     return f"{quantity.value:.{max(digits, 0)}f} ± {sigma:.{max(digits, 0)}f}{unit}"
 
 

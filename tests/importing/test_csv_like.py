@@ -22,9 +22,9 @@ from fieldcal.session.folder import Session
 ACC = ("ax", "ay", "az")
 
 
-def read(path: Path, layout: Layout) -> Block:
+def read(path: Path, layout: Layout, repair: bool = False) -> Block:
     recording = TextColumns(path, layout)
-    judge = RowValidator(str(path), recording.place, repair=False)
+    judge = RowValidator(str(path), recording.place, repair)
     return concat(judge.through(recording.blocks("0")))
 
 
@@ -142,6 +142,28 @@ def test_what_cannot_be_used_is_refused_in_words(
     with pytest.raises(InputError) as error:
         read(file(tmp_path, text), layout)
     assert says in str(error.value)
+
+
+@pytest.mark.parametrize("repair", [False, True])
+def test_a_file_written_newest_first_is_to_be_sorted(
+    tmp_path: Path, repair: bool
+) -> None:
+    lines = [f"{t},1,2,3\n" for t in range(300, 0, -1)]
+    path = file(tmp_path, "".join(lines))
+    with pytest.raises(InputError, match="newest first; sort its rows"):
+        read(path, Layout(("t", *ACC)), repair)
+
+
+def test_what_is_left_of_a_file_is_most_of_it(tmp_path: Path) -> None:
+    """Leaving rows out does not mend a file of which few remain."""
+    good = [f"{t},1,2,{3 + t % 2}\n" for t in range(40)]
+    bad = [f"{t},1,2,inf\n" for t in range(40, 100)]
+    path, layout = file(tmp_path, "".join(good + bad)), Layout(("t", *ACC))
+    with pytest.raises(InputError, match="60 of 100 rows cannot be used"):
+        read(path, layout, repair=True)
+    assert (
+        len(read(file(tmp_path, "".join(good + bad[:40])), layout, repair=True)) == 40
+    )
 
 
 @given(st.text(alphabet="0123456789.,;-+e \t\nabc\0é", max_size=80))

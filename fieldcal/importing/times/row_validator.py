@@ -19,6 +19,12 @@ from fieldcal.importing.recording import MAX_LISTED_FAULTS, MAX_READING
 
 Rows = NDArray[np.bool_]
 
+MIN_FALLING_ROWS = 10
+"""Number of rows from which times that only fall show a file written newest first."""
+
+MAX_LEFT_OUT = 0.5
+"""Share of rows that may be left out: of a file with more, the rest is no recording."""
+
 
 class RowValidator:
     """Validates rows block by block, whatever the blocks.
@@ -61,13 +67,19 @@ class RowValidator:
         ------
         InputError
             For the first row that cannot, where no repair was asked for; names file,
-            row and column.
+            row and column. Also for a file that leaving rows out does not mend.
 
         """
         for block in blocks:
             yield self._add(block)
         if len(self._held):
             yield self._of_time_order(self._held, np.array([self._held_row]), np.inf)
+        if self.left_out > MAX_LEFT_OUT * self._seen:
+            raise InputError(
+                f"{self._name}: {self.left_out} of {self._seen} rows cannot be used"
+                f" ({self._sentence(*self._runs[0])}): mend the file itself, or name"
+                " its columns and their units by --columns and --time-unit"
+            )
 
     def _add(self, block: Block) -> Block:
         """Rows that can be used, up to the last one with a time."""
@@ -131,8 +143,15 @@ class RowValidator:
         `numbers` (n,) are theirs in the file, `following` is the time of the next row.
         """
         t = block.t
+        steps = np.diff(t, append=following)
+        if len(t) >= MIN_FALLING_ROWS and (np.diff(t) < 0).all():
+            raise InputError(
+                f"{self._name}: its times fall from row to row from"
+                f" {self._place(int(numbers[0]))} on: it is written newest first; sort"
+                " its rows by their time"
+            )
         before, self._before = self._before, float(t[-1]) if len(t) else self._before
-        if len(t) and self._newest < t[0] and (np.diff(t, append=following) > 0).all():
+        if len(t) and self._newest < t[0] and (steps > 0).all():
             self._newest = float(t[-1])
             return _rows_of(block, ~_without_numbers(block))
         # one time that leaps ahead is wrong itself, not all that come after it

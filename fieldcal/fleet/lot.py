@@ -18,6 +18,7 @@ import numpy as np
 from scipy.stats import beta
 
 from fieldcal.calibration.limits import GradeLimits
+from fieldcal.calibration.names import TILTS, group_of
 from fieldcal.core.errors import InputError
 from fieldcal.fleet.capability import LotParameter, lot_parameter
 from fieldcal.fleet.levels import Grouping, groupings
@@ -239,10 +240,12 @@ def _time_order(one: StoredSession) -> tuple[str, str]:
 def _find_odd_units(
     useful: Sequence[StoredSession], parameters: Mapping[str, LotParameter], rate: float
 ) -> list[OddUnit]:
-    names = list(parameters)
+    """Odd units; how the base stood in a session is no property of the unit."""
+    names = [n for n in parameters if group_of(n) not in TILTS]
     chances = np.full((len(useful), len(names)), np.nan)
     off, sigma = chances.copy(), chances.copy()
-    for k, one in enumerate(parameters.values()):
+    for k, name in enumerate(names):
+        one = parameters[name]
         chances[one.unit_numbers, k] = one.distribution.tail_probabilities(one.x)
         off[one.unit_numbers, k], sigma[one.unit_numbers, k] = (
             one.x - one.distribution.mean,

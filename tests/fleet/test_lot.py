@@ -206,6 +206,21 @@ def test_a_lot_says_what_it_was_drawn_from() -> None:
     assert capable == pytest.approx(0.3 / 0.06, rel=0.25)
 
 
+def test_a_base_that_stood_askew_makes_no_unit_odd() -> None:
+    """It was that session's; a station whose base is tilted is still named."""
+    rng, some = np.random.default_rng(8), []
+    for i, one in enumerate(units()):
+        tilt = 0.01 * rng.standard_normal() + 0.5 * (i == 40)
+        tilt += 0.05 * (one.levels["station"] == "R")
+        tilts = {"angle_offset.alpha0_deg": (tilt, 5e-3, "deg")}
+        some.append(replace(one, parameters={**one.parameters, **tilts}))
+    found = of(some)
+    assert found.odd == of(units()).odd
+    assert [(s.parameter, s.level) for s in found.shifts] == [
+        ("angle_offset.alpha0_deg", "station")
+    ]
+
+
 def test_a_lot_that_drifts_says_since_when() -> None:
     found = of(units(drift=1.5))
     assert {a.parameter for a in found.alarms} == {"acc_bias.z"}

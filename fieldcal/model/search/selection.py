@@ -219,14 +219,25 @@ class Search(Offers):
         """The best set with two or three causes instead of an unknown function.
 
         A function of many columns may replace several effects, none of which alone is
-        worth as much. The function with the most columns is replaced.
+        worth as much, and parameters of effects that the set contains. The function
+        with the most columns is replaced.
         """
         width = [len(g.columns) * is_function((c, g)) for c, g in there.members]
         if not any(width):
             return there
         less = self.without(there, int(np.argmax(width)))
         two = self._with_two_more(less, there.score)
-        return max([there, two, self._with_one_more(two, there.score)], key=_score)
+        found = [there, two, self._with_one_more(two, there.score)]
+        whole = self._with_all_their_parameters(less)
+        if whole is not less:
+            two = self._with_two_more(whole, there.score)
+            found += [self._with_one_more(whole, there.score), two]
+        return max(found, key=_score)
+
+    def _with_all_their_parameters(self, there: Set) -> Set:
+        """The set of the same causes, each with all the parameters that it has."""
+        members = tuple((c, _full_variant(c, g)) for c, g in there.members)
+        return self.evaluate(members, there.sizes)
 
     def _with_one_more(
         self, there: Set, level: float | None = None, beside: Sizes | None = None

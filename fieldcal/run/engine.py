@@ -118,6 +118,8 @@ class Engine:
         """
         reply: object = None
         error: FieldcalError | None = None
+        if self._before not in self._taken:  # discarded: others are not judged by it
+            self._held = self._before = None
         try:
             while True:
                 step = plan.throw(error) if error else plan.send(reply)

@@ -446,6 +446,25 @@ def _then_repeat(turner: Turner) -> Plan[None]:
     yield from hold(1, TWO_POSITIONS[1], 5.0)
 
 
+def test_a_first_position_that_was_set_wrongly_may_be_set_right(bench: Bench) -> None:
+    """What was discarded is no measure of where the device is."""
+    turner, taken = bench.turner, dict[int, Average]()
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, 60.0, taken)
+    turner.slips, turner.corrects = [(6.0, 0.0)], False
+    with pytest.raises(RepeatPosition):
+        engine.run(_then_repeat(turner))
+    wrong = taken.pop(0)
+    right = engine.run(hold(0, TWO_POSITIONS[0], 5.0))
+    turned = abs(wrong.mean - right.mean)[0]
+    assert turned == pytest.approx(ABOUT.gravity * np.sin(np.deg2rad(6.0)), abs=0.02)
+    assert not turner.told
+    turner.wishes = ["repeat"]
+    taken.clear()
+    engine.run(hold(0, TWO_POSITIONS[0], 5.0))
+    assert turner.told == ["nothing was taken yet that could be repeated"]
+    assert events(bench).count("repeated") == 1
+
+
 def test_an_operator_may_stop(bench: Bench) -> None:
     bench.turner.wishes = ["stop"]
     with pytest.raises(Stopped):

@@ -438,5 +438,11 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
             assert keyboard.pressed() == "repeat"
             os.write(hand, b"rs")
             assert keyboard.pressed() == "skip" and keyboard.pressed() is None
+            os.write(hand, b"rs")
+            keyboard.forget()
+            assert keyboard.pressed() is None
+            os.write(hand, b"q")
+            keyboard.forget()  # a position is asked for: who wants to stop still does
+            assert keyboard.pressed() == "stop" and keyboard.pressed() is None
         assert termios.tcgetattr(terminal_file) == before
     os.close(hand)

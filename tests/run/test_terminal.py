@@ -336,6 +336,17 @@ def test_each_position_is_left_out_by_two_presses_of_its_own() -> None:
     assert [operator.wish() for _ in range(4)] == [None, "skip", None, "skip"]
 
 
+def test_a_press_for_a_position_that_was_taken_leaves_out_no_other_one() -> None:
+    operator = sized(80, 24, "skip", "skip", "skip")
+    assert operator.wish() is None
+    operator.show(view("taken"))
+    operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))
+    assert operator.wish() is None
+    assert f"press s once more to leave {FIVE_POSITIONS[2].name}" in screen(operator)
+    operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))  # again, after a disturbance
+    assert operator.wish() == "skip"
+
+
 def test_what_a_second_press_no_longer_does_is_not_shown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -237,6 +237,7 @@ class Engine:
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
+        shown = WaitState.NOTHING
         away = self._incoming.breaks
         for block in self._incoming.pieces:
             if self._incoming.breaks != away:  # its position is unknown now
@@ -248,8 +249,8 @@ class Engine:
             wish = self._desk.wish(hold)
             if wish == "repeat":
                 self._desk.repeat(self._before)
-            if wish == "confirm" and self._warm_up and self._warm_up.must_wait:
-                self._warm_up.waived = True
+            if wish == "confirm" and shown is WaitState.WARMING_UP and self._warm_up:
+                self._warm_up.waived = True  # only what was read can be waived
             elif wish == "confirm" and not waiting.arrived:
                 if insisted and waiting.may_insist:
                     self._desk.record_insistence(hold, waiting.problem)
@@ -262,6 +263,7 @@ class Engine:
             if waiting.arrived and self._warm_up and self._warm_up.notice and waits:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
+            shown = reason.state
             self._warn_of_unit()
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True

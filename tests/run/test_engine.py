@@ -530,6 +530,26 @@ def test_nothing_is_known_of_a_time_without_samples() -> None:
     assert waiting.seconds < 1.5 and not waiting.arrived
 
 
+@pytest.mark.parametrize(("read", "begins"), [(False, 39.0), (True, 8.0)])
+def test_enter_waives_a_warm_up_only_if_it_was_said(
+    tmp_path: Path, read: bool, begins: float
+) -> None:
+    """An Enter in the first seconds says that the device was turned."""
+
+    class Hasty(Turner):
+        def wish(self) -> Wish | None:
+            pressed = bool(self.told) if read else self.driver.device.time < 2.0
+            return "confirm" if pressed else None
+
+    warming = replace(Climate(), self_heating_k=20.0, warm_up_s=60.0)
+    driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        warm_up = WarmUpWatch(0.5, 40.0)
+        engine = Engine(driver, Hasty(driver), ABOUT, recorder, warm_up=warm_up)
+        (average,) = engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    assert begins - 3.0 < average.start < begins + 4.0
+
+
 def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:
     warming = replace(Climate(), self_heating_k=20.0, warm_up_s=60.0)
     driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))

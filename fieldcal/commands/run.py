@@ -252,7 +252,7 @@ def _record_and_solve(
     Returns the calibration, the truth of a virtual device, and the further devices.
     """
     from fieldcal.commands.run_device import device_and_mover
-    from fieldcal.run.companions import record_companions
+    from fieldcal.run.companions import record_companions, refuse_recorded_companions
     from fieldcal.run.resuming import recorded_averages
     from fieldcal.run.retrying_mover import RetryingMover
     from fieldcal.run.session_run import SessionRun
@@ -264,6 +264,8 @@ def _record_and_solve(
         stack.callback(driver.close)
         known = Session.open(folder) if args.resume else None
         taken = recorded_averages(known, task) if known else {}
+        if not args.resume:
+            refuse_recorded_companions(folder, len(task.further))
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )

@@ -11,11 +11,18 @@ import numpy as np
 import pytest
 from processes import RUN, steady, turned
 
+from fieldcal.cli import main
 from fieldcal.commands.virtual_address import driver_address
+from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
-from fieldcal.run.companions import ArrivalTimes, Companion, LeadRecorder
+from fieldcal.run.companions import (
+    ArrivalTimes,
+    Companion,
+    LeadRecorder,
+    refuse_recorded_companions,
+)
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
@@ -152,6 +159,27 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
     assert result["verdict"] == "good" and set(result["further"]) == {"device-3"}
     marks = Session.open(tmp_path / "s" / "device-2").marks()
     assert "failed" in {mark["event"] for mark in marks}
+
+
+def test_a_first_device_that_says_nothing_leaves_no_session_of_the_others(
+    tmp_path: Path,
+) -> None:
+    """The next attempt may have another device there, or another site."""
+    call = ["run", "two_position", "--headless", "--level=0.01", "--angles=0.01"]
+    call += ["-o", str(tmp_path / "s")]
+    with ExitStack() as stack:
+        devices, urls = started(stack, tmp_path)
+        devices[0].ask(fault={"silence_s": 1e6})
+        for url in urls[:2]:
+            call += ["--device", url]
+        assert main([*call, "--latitude=50.45"]) == 3
+    assert not (tmp_path / "s").exists()
+    with Recorder(tmp_path / "s" / "device-2", {"format": 1}) as recorder:
+        recorder.append(Block.of(np.arange(9.0), np.zeros((9, 3))))
+    with pytest.raises(SessionError, match="device-2: holds a session already"):
+        refuse_recorded_companions(tmp_path / "s", 1)
+    refuse_recorded_companions(tmp_path / "s", 0)
+    assert len(Session.open(tmp_path / "s" / "device-2").block) == 9
 
 
 def test_times_go_over_the_hosts_clock() -> None:

@@ -84,7 +84,7 @@ class SessionRun:
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
         self._so_far: InterimResult | None = None
-        self._judged_windows = 0
+        self._judged_changes = 0
         self._remedies = 0
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
@@ -139,11 +139,12 @@ class SessionRun:
     def _judge(self, quick: bool) -> InterimResult:
         """Judge the windows taken so far."""
         folder, so_far = self._recorder.folder, self._so_far
-        windows = [m for m in read_marks(folder / MARKS) if m.get("event") == "window"]
-        known = len(windows) == self._judged_windows
+        events = [m.get("event") for m in read_marks(folder / MARKS)]
+        changes = events.count("window") + events.count("repeated")
+        known = changes == self._judged_changes
         if not so_far or not known or (so_far.incremental and not quick):
             so_far = judge_session(folder, self._limits, so_far if quick else None)
-        self._so_far, self._judged_windows = so_far, len(windows)
+        self._so_far, self._judged_changes = so_far, changes
         return so_far
 
     def _plan(self) -> Plan[Calibration]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -144,6 +144,36 @@ def test_it_ends_at_go_also_if_it_was_stopped_on_the_way(bench: Bench) -> None:
     assert bench.hand.told[-1].endswith("all is known that was asked for")
     added = [m["position"] for m in bench.marks if m["event"] == "added"]
     assert added == list(range(2, max(bench.numbers) + 1))
+
+
+class Fickle(Hand):
+    """Discards the third position, leaves it and the next one out, and stops then."""
+
+    def __init__(self, driver: InProcess) -> None:
+        super().__init__(driver)
+        self.left = [(3, "repeat"), (2, "skip"), (3, "skip"), (4, "stop")]
+
+    def wish(self) -> Wish | None:
+        now = self.asked[-1][0] if self.asked else None
+        return cast(Wish, self.left.pop(0)[1]) if now == self.left[0][0] else None
+
+
+def test_what_was_discarded_is_not_judged_any_more(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[tuple[int, ...]] = []
+
+    def noted(folder: Path, *given: Any) -> InterimResult:
+        so_far = judge_session(folder, *given)
+        judged.append(so_far.prepared_session.windows.position_numbers)
+        return so_far
+
+    monkeypatch.setattr(session_run, "judge_session", noted)
+    bench.hand = Fickle(bench.hand.driver)
+    with pytest.raises(Stopped):
+        bench.run(ADAPTIVE)
+    assert bench.numbers == [0, 1, 2, 3, 2, 3, 4]
+    assert judged == [(0, 1), (0, 1, 2), (0, 1)]
 
 
 class Content(Hand):

@@ -94,7 +94,7 @@ class Engine:
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver)
         self._incoming = IncomingSamples(
-            driver, recorder, self._on_samples, self._units.add
+            driver, recorder, self._on_samples, self._on_piece
         )
         self._windows = WindowTaker(
             driver, about, recorder, self._desk, self._display, self._incoming,
@@ -215,11 +215,16 @@ class Engine:
     def _on_samples(self, block: Block) -> None:
         """Look at samples that have just been recorded."""
         self._display.note_samples(block)
-        if self._warm_up:
-            if self._restarts != self._driver.health.restarts:
-                self._restarts = self._driver.health.restarts
+        if self._restarts != self._driver.health.restarts:
+            self._restarts = self._driver.health.restarts
+            if self._warm_up:
                 self._warm_up.forget()
-            self._warm_up.add(block)
+
+    def _on_piece(self, piece: Block) -> None:
+        """Look at a short stretch of samples, however long the block that it is of."""
+        self._units.add(piece)
+        if self._warm_up:
+            self._warm_up.add(piece)
 
     def _on_silence(self) -> None:
         """Report that no samples arrive, and why."""

@@ -530,6 +530,27 @@ def test_nothing_is_known_of_a_time_without_samples() -> None:
     assert waiting.seconds < 1.5 and not waiting.arrived
 
 
+class Behind(InProcess):
+    """A link that is read by a computer so busy that half a minute comes at once."""
+
+    def __init__(self, device: VirtualDevice) -> None:
+        super().__init__(device)
+        self._n = round(30.0 * device.rate)
+
+
+@pytest.mark.parametrize("kind", [InProcess, Behind])
+def test_a_temperature_is_known_after_seconds_however_samples_come(
+    tmp_path: Path, kind: type[InProcess]
+) -> None:
+    steady = replace(Climate(), self_heating_k=0.0)
+    driver = kind(VirtualDevice(replace(Profile(), temperature=steady), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner, warm_up = Turner(driver), WarmUpWatch(0.5, 300.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
+        (average,) = engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    assert average.start < 7.0 and not turner.told
+
+
 @pytest.mark.parametrize(("read", "begins"), [(False, 39.0), (True, 8.0)])
 def test_enter_waives_a_warm_up_only_if_it_was_said(
     tmp_path: Path, read: bool, begins: float

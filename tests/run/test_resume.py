@@ -159,8 +159,31 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
             start = 10.0 + 10.0 * i
             recorder.mark("window", position=i, start_s=start, end_s=start + 2.0)
         recorder.mark("finished")
+    (folder / "result.json").write_text(json.dumps({"decision": {"go": False}}))
     with pytest.raises(SessionError, match="no position taken besides would"):
         open_for_resume(folder)
+
+
+def test_a_remedy_that_was_taken_is_not_taken_again_if_solving_was_broken_off(
+    tmp_path: Path,
+) -> None:
+    """The result is that of the run before, and its windows in doubt are new ones."""
+    folder = tmp_path / "s"
+    recorded(folder)
+    besides = {"alpha_deg": 45.0, "beta_deg": -5.0}
+    remedy = {"says": "", "again": [0], "positions": [besides], "seconds": 20.0}
+    result = folder / "result.json"
+    result.write_text(json.dumps({"decision": {"go": False, "remedy": remedy}}))
+    before = time() - 30.0
+    os.utime(result, (before, before))
+    with Recorder(folder, None) as recorder:
+        recorder.mark("finished")
+    session, tables, again = open_for_resume(folder)
+    assert again == () and len(tables["position"]) == len(session.positions)
+    taken = recorded_averages(session, plan_file.task_from_tables(tables, "s"))
+    assert list(taken) == [0]
+    result.touch()  # solved meanwhile
+    assert open_for_resume(folder)[2] == (0,)
 
 
 def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:

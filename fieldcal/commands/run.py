@@ -333,5 +333,5 @@ def _mark_remedy_positions(
         taken.pop(number, None)
     for number, position in enumerate(task.about.positions[known:], known):
         alpha, beta = position.degrees or (0.0, 0.0)
-        angles = {"alpha_deg": alpha, "beta_deg": beta}
-        recorder.mark(POSITION_ADDED, position=number, name=position.name, **angles)
+        where = {"alpha_deg": alpha, "beta_deg": beta, "seconds": task.seconds}
+        recorder.mark(POSITION_ADDED, position=number, name=position.name, **where)

@@ -151,24 +151,27 @@ class Engine:
             case Note(text):
                 self._desk.tell(text)
                 return None
-            case Add(position):
-                return self._add_position(position)
+            case Add():
+                return self._add_position(step)
             case Repeat(index):
                 self._desk.repeat(index)
                 return None
             case Judge(quick):
                 return self._judge(quick)
 
-    def _add_position(self, position: Position) -> int:
+    def _add_position(self, step: Add) -> int:
         """Add a position to the session; returns its number."""
+        position = step.position
         number = len(self._about.positions) + len(self._added)
         alpha, beta = position.degrees or (0.0, 0.0)
-        angles = {"alpha_deg": alpha, "beta_deg": beta}
+        where = {"alpha_deg": alpha, "beta_deg": beta}
+        if step.seconds is not None:
+            where["seconds"] = step.seconds
         if self._taken.pop(number, None) is not None:
             # what was to verify was held behind fewer positions, at other angles
             self._recorder.mark("repeated", position=number)
         self._recorder.mark(
-            POSITION_ADDED, position=number, name=position.name, **angles
+            POSITION_ADDED, position=number, name=position.name, **where
         )
         self._added.append(position)
         return number

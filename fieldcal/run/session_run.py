@@ -26,7 +26,7 @@ from fieldcal.core.errors import (
 from fieldcal.core.positions import Position
 from fieldcal.drivers.driver import Driver
 from fieldcal.evaluation.interim_result import InterimResult
-from fieldcal.planning.holding import hold_until_still
+from fieldcal.planning.holding import hold_until_still, with_own_lengths
 from fieldcal.planning.steps import Judge, Plan, Repeat, add, note
 from fieldcal.run.companions import LeadRecorder
 from fieldcal.run.engine import Engine
@@ -36,7 +36,7 @@ from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import with_added_positions
-from fieldcal.session.marks import MARKS, read_marks
+from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average
 
@@ -153,7 +153,8 @@ class SessionRun:
         if self._added and procedures.max_positions(about, name) is None:
             name = "positions"  # whatever set it was, it has more now
         plan = procedures.load_procedure(name).plan
-        found = yield from plan(about, task.seconds, task.sigma)
+        steps = plan(about, task.seconds, task.sigma)
+        found = yield from with_own_lengths(steps, self._own_lengths())
         about = with_added_positions(task.about, self._added)
         verification = planned_verification(about)
         if verification is not None:
@@ -161,6 +162,17 @@ class SessionRun:
         elif self._until_go:
             yield from self._take_remedies()
         return found
+
+    def _own_lengths(self) -> dict[int, float]:
+        """Length of the window of each added position that has its own, s.
+
+        What a remedy promises holds for that length, also behind a break.
+        """
+        marks = read_marks(self._recorder.folder / MARKS)
+        added = [m for m in marks if m.get("event") == POSITION_ADDED]
+        return {
+            int(m["position"]): float(m["seconds"]) for m in added if "seconds" in m
+        }
 
     def _hold_verification(self, number: int, position: Position) -> Plan[None]:
         """Hold the verification position, which is not fitted."""
@@ -185,7 +197,7 @@ class SessionRun:
                 yield Repeat(number)
             for place in remedy["positions"]:
                 one = Position.deg(place["alpha_deg"], place["beta_deg"])
-                number = yield from add(one)
+                number = yield from add(one, remedy["seconds"])
                 try:
                     yield from hold_until_still(number, one, remedy["seconds"], None)
                 except Skipped as skipped:

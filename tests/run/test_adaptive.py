@@ -236,6 +236,27 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     assert all("one position more" in t and "then GO is expected" in t for t in said)
 
 
+def test_a_window_that_a_remedy_wants_longer_is_so_also_behind_a_break(
+    bench: Bench,
+) -> None:
+    class Timed(Hand):
+        def place(self, hold: Hold) -> None:
+            super().place(hold)
+            seconds[hold.index] = hold.seconds
+
+    seconds: dict[int, float] = {}
+    bench.hand = Timed(bench.hand.driver)
+    start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+    bench.run({"procedure": "positions", "seconds": 5.0}, position=start)
+    with Recorder(bench.folder, None) as recorder:
+        for number, more in ((3, {"seconds": 8.0}), (4, {})):
+            where = {"alpha_deg": -45.0, "beta_deg": 5.0 * (number - 3)}
+            recorder.mark("added", position=number, name="", **where, **more)
+    bench.hand.wants = {3: "skip"}
+    bench.resumed()
+    assert seconds == {0: 5.0, 1: 5.0, 2: 5.0, 3: 8.0, 4: 5.0}
+
+
 @pytest.mark.thorough
 def test_two_positions_and_those_of_a_remedy_are_solved_together(
     tmp_path: Path,

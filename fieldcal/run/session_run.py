@@ -86,6 +86,7 @@ class SessionRun:
         self._so_far: InterimResult | None = None
         self._judged_changes = 0
         self._remedies = 0
+        self._wanted_again: int | None = None
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
@@ -186,6 +187,8 @@ class SessionRun:
 
     def _take_remedies(self) -> Plan[None]:
         """Take the positions that would turn a NO-GO into GO, while there are any."""
+        if self._wanted_again is not None and self._wanted_again not in self._taken:
+            return  # the operator left it out
         while self._remedies < MOST_REMEDIES:
             so_far: InterimResult = yield Judge()
             remedy = so_far.remedy
@@ -194,6 +197,7 @@ class SessionRun:
             self._remedies += 1
             yield from note(f"NO-GO so far: {so_far.reasons[0]}; {remedy['says']}")
             for number in remedy["again"]:
+                self._wanted_again = int(number)
                 yield Repeat(number)
             for place in remedy["positions"]:
                 one = Position.deg(place["alpha_deg"], place["beta_deg"])

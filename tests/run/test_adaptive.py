@@ -236,6 +236,31 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     assert all("one position more" in t and "then GO is expected" in t for t in said)
 
 
+class Doubtful:
+    """A judgement that wants the second position once more, whatever there is."""
+
+    incremental = False
+    reasons = ("the second position disagrees",)
+    remedy = {"says": "take it again", "again": [1], "positions": [], "seconds": 5.0}
+
+
+@pytest.mark.parametrize("left_out", [False, True])
+def test_who_leaves_out_what_a_remedy_wants_again_is_asked_for_nothing_more(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, left_out: bool
+) -> None:
+    class Tired(Hand):
+        def wish(self) -> Wish | None:
+            again = [number for number, _ in self.asked].count(1) > 1
+            return "skip" if left_out and again and self.asked[-1][0] == 1 else None
+
+    monkeypatch.setattr(session_run, "judge_session", lambda *_: Doubtful())
+    bench.hand = Tired(bench.hand.driver)
+    start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+    run = {"procedure": "positions", "seconds": 5.0}
+    bench.run(run, until_go=True, position=start)
+    assert bench.numbers == [0, 1, 2] + ([1] if left_out else [1, 1, 1])
+
+
 def test_a_window_that_a_remedy_wants_longer_is_so_also_behind_a_break(
     bench: Bench,
 ) -> None:

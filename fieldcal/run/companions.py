@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
@@ -129,7 +129,8 @@ class Companion:
             # what was only just silent when all was over has been heard enough
             if not (self._ends and self._times.known):
                 self.failed = fault
-                self.mark("failed", text=str(fault))
+                with suppress(SessionError):  # a disk that is full takes no mark either
+                    self.mark("failed", text=str(fault))
 
 
 class LeadRecorder:

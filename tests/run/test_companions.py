@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -27,6 +28,8 @@ from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
 from fieldcal.session.recorder import Recorder
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.in_process import InProcess
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
 BIASES = ["0.2,-0.3,0.1", "-0.1,0.3,0.2", "0.3,0.1,-0.2"]
@@ -198,6 +201,28 @@ def test_whoever_records_may_be_late() -> None:
     assert times.device_time(501.75) == pytest.approx(2.5)
     assert times.host_time(1.5) == pytest.approx(500.5)
     assert times.device_time(times.host_time(2.7)) == pytest.approx(2.7)
+
+
+class Full(Recorder):
+    """A session on a disk that is full."""
+
+    def append(self, block: Block) -> Block:
+        raise SessionError("the disk is full")
+
+    def mark(self, event: str, **what: Any) -> None:
+        raise SessionError("the disk is full")
+
+
+def test_a_full_disk_ends_the_recording_of_a_device_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which would be written across the screen of the operator."""
+    broken: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", broken.append)
+    with Full(tmp_path / "s", {"format": 1}) as recorder:
+        companion = Companion(InProcess(VirtualDevice(seed=1)), recorder)
+        companion.end()
+    assert str(companion.failed) == "the disk is full" and not broken
 
 
 class Recorded:

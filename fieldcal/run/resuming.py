@@ -63,7 +63,8 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
     Raises
     ------
     SessionError
-        If it is none, has nothing left to take, or was not recorded by a run.
+        If it is none, has nothing left to take, was not recorded by a run, or is that
+        of a further device.
 
     """
     from fieldcal.acceptance.assessment import verification_window
@@ -77,6 +78,11 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
         )
     marks, again = list(session.marks()), tuple[int, ...]()
     run = dict(tables["run"])
+    if session.about.device.get("address") in run.get("further", ()):
+        raise SessionError(
+            f"{folder}: is the session of a further device of a run: go on with that"
+            f" one, --resume {folder.absolute().parent}"
+        )
     if _is_finished(marks) and _has_result(folder, marks):
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])

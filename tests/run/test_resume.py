@@ -121,6 +121,22 @@ def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
         open_for_resume(tmp_path / "s")
 
 
+def test_a_further_device_is_not_gone_on_with_by_itself(tmp_path: Path) -> None:
+    """Its session would get the samples of the first device."""
+    run: dict[str, object] = {
+        "procedure": "two_position",
+        "device": "can:can0",
+        "further": ["can:can1"],
+    }
+    lead, other = {"name": "one"}, {"name": "device 2", "address": "can:can1"}
+    for folder, device in ((tmp_path, lead), (tmp_path / "device-2", other)):
+        with Recorder(folder, {**TABLES, "run": run, "device": device}) as recorder:
+            recorder.append(still(0.0, 1.0, 1000.0))
+    assert open_for_resume(tmp_path)[1]["run"] == run
+    with pytest.raises(SessionError, match=f"--resume {tmp_path}$"):
+        open_for_resume(tmp_path / "device-2")
+
+
 def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
     """Positions besides are added, those in doubt taken once more, and only once."""
     folder = tmp_path / "s"

@@ -3,7 +3,8 @@
 To add one, write procedures/<name>.py with ``POSITIONS``, the default positions, and
 ``plan``, a generator of steps (`fieldcal.planning.steps`) that returns a `Calibration`.
 A plan uses no device, no clock and no screen. If it chooses positions during the run
-(`Add`), ``MOST`` is their largest number.
+(`Add`), ``MOST`` is their largest number. If its method wants a certain number of
+positions, ``COUNT`` is that number.
 """
 
 from __future__ import annotations
@@ -39,6 +40,12 @@ def max_positions(about: Description, name: str) -> int | None:
         return None
     said = about.raw.get("run", {}).get("most")
     return int(said or vars(load_procedure(name))["MOST"])
+
+
+def position_count(name: str) -> int | None:
+    """Number of positions that a procedure is for; None if it takes any number."""
+    count: int | None = vars(load_procedure(name)).get("COUNT")
+    return count
 
 
 def load_procedure(name: str) -> Procedure:

@@ -19,6 +19,9 @@ from fieldcal.solve import solve
 
 POSITIONS: tuple[Position, ...] = TWO_POSITIONS
 
+COUNT = 2
+"""Number of positions that its method takes."""
+
 
 def plan(
     about: Description, seconds: float = 30.0, sigma: float | None = None

@@ -252,7 +252,7 @@ def _record_and_solve(
     Returns the calibration, the truth of a virtual device, and the further devices.
     """
     from fieldcal.commands.run_device import device_and_mover
-    from fieldcal.run.companions import record_companions
+    from fieldcal.run.companions import record_companions, refuse_recorded_companions
     from fieldcal.run.resuming import recorded_averages
     from fieldcal.run.retrying_mover import RetryingMover
     from fieldcal.run.session_run import SessionRun
@@ -264,6 +264,8 @@ def _record_and_solve(
         stack.callback(driver.close)
         known = Session.open(folder) if args.resume else None
         taken = recorded_averages(known, task) if known else {}
+        if not args.resume:
+            refuse_recorded_companions(folder, len(task.further))
         own = stack.enter_context(
             Recorder(folder, None if args.resume else task.tables)
         )
@@ -331,5 +333,5 @@ def _mark_remedy_positions(
         taken.pop(number, None)
     for number, position in enumerate(task.about.positions[known:], known):
         alpha, beta = position.degrees or (0.0, 0.0)
-        angles = {"alpha_deg": alpha, "beta_deg": beta}
-        recorder.mark(POSITION_ADDED, position=number, name=position.name, **angles)
+        where = {"alpha_deg": alpha, "beta_deg": beta, "seconds": task.seconds}
+        recorder.mark(POSITION_ADDED, position=number, name=position.name, **where)

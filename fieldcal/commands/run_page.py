@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, Stopped
 
 if TYPE_CHECKING:
     from fieldcal.calibration import Calibration
@@ -81,10 +81,10 @@ def _announce_page(server: PageServer, args: argparse.Namespace) -> None:
     segno.make(server.address, error="l").terminal(sys.stderr, compact=True)
     sys.stderr.write("scan it, or press Enter to go on without\n")
     sys.stderr.flush()
-    _wait_for_page(server)
+    wait_for_page(server)
 
 
-def _wait_for_page(server: PageServer) -> None:
+def wait_for_page(server: PageServer) -> None:
     """Wait until the page is opened, a key is pressed, or the time is over."""
     from time import monotonic, sleep
 
@@ -93,7 +93,10 @@ def _wait_for_page(server: PageServer) -> None:
     until = monotonic() + SCAN_WAIT_S
     with Keyboard() as keyboard:
         while keyboard.has_keys and not server.watched and monotonic() < until:
-            if keyboard.pressed() == "confirm":
+            pressed = keyboard.pressed()
+            if pressed == "stop":
+                raise Stopped("stopped by the operator")
+            if pressed == "confirm":
                 return
             sleep(0.05)
 

@@ -134,7 +134,7 @@ def report_broken_run(
         return
     if args.junit:
         write_junit(args.junit, task, folder, None, str(error) or "interrupted")
-    if args.resume or not _discard_if_empty(folder):
+    if args.resume or not _discard_if_empty(folder, len(task.further)):
         moved = ", with --device if its port is another now (fieldcal ports)"
         sys.stderr.write(
             f"what was recorded is kept in {folder}; to go on:"
@@ -143,11 +143,13 @@ def report_broken_run(
         )
 
 
-def _discard_if_empty(folder: Path) -> bool:
+def _discard_if_empty(folder: Path, further: int) -> bool:
     """Remove a session without samples; returns whether it was removed.
 
-    Its folder would block the next attempt.
+    Its folder would block the next attempt, and so would those of the further devices,
+    which have no window without the first one.
     """
+    from fieldcal.run.companions import companion_folders
     from fieldcal.session.arrow_stream import end_of_whole_batches
     from fieldcal.session.folder import DESCRIPTION
     from fieldcal.session.marks import MARKS
@@ -156,9 +158,10 @@ def _discard_if_empty(folder: Path) -> bool:
     with contextlib.suppress(OSError):
         if end_of_whole_batches((folder / SAMPLES).read_bytes()):
             return False
-        for name in (SAMPLES, MARKS, DESCRIPTION):
-            (folder / name).unlink()
-        with contextlib.suppress(OSError):
-            folder.rmdir()  # whatever else is there stays
+        for each in (*companion_folders(folder, further), folder):
+            for name in (SAMPLES, MARKS, DESCRIPTION):
+                (each / name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                each.rmdir()  # whatever else is there stays
         return True
     return False

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from fieldcal.calibration import Calibration
-from fieldcal.core.errors import CalibrationFailed, Moved, Skipped
+from fieldcal.core.errors import CalibrationFailed, FieldcalError, Moved, Skipped
 from fieldcal.core.positions import Position
-from fieldcal.planning.steps import Plan, hold, note
+from fieldcal.planning.steps import Hold, Plan, hold, note
 from fieldcal.windows import Average
+
+R = TypeVar("R")
 
 MAX_TRIES = 5
 """Largest number of windows started in a position."""
@@ -30,6 +33,25 @@ def hold_each(
     if not averages:
         raise CalibrationFailed("every position was left out: nothing to calibrate by")
     return averages
+
+
+def with_own_lengths(plan: Plan[R], lengths: Mapping[int, float]) -> Plan[R]:
+    """The plan with windows of a length of their own, s, by number of the position."""
+    reply: object = None
+    error: FieldcalError | None = None
+    while True:
+        try:
+            step = plan.throw(error) if error else plan.send(reply)
+        except StopIteration as done:
+            result: R = done.value
+            return result
+        if isinstance(step, Hold) and step.index in lengths:
+            step = replace(step, seconds=lengths[step.index], sigma=None)
+        reply, error = None, None
+        try:
+            reply = yield step
+        except FieldcalError as failed:
+            error = failed
 
 
 def with_skipped_positions(

@@ -51,10 +51,12 @@ class Add:
     Attributes
     ----------
     position : the position, with known angles
+    seconds : length of its window, s; None for that of the others
 
     """
 
     position: Position
+    seconds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +97,9 @@ def hold(
     return reply
 
 
-def add(position: Position) -> Plan[int]:
+def add(position: Position, seconds: float | None = None) -> Plan[int]:
     """Yield an `Add`; the reply is the number that the position has."""
-    reply: int = yield Add(position)
+    reply: int = yield Add(position, seconds)
     return reply
 
 

@@ -16,14 +16,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
 import numpy as np
 
-from fieldcal.core.errors import FieldcalError
+from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
@@ -129,7 +129,8 @@ class Companion:
             # what was only just silent when all was over has been heard enough
             if not (self._ends and self._times.known):
                 self.failed = fault
-                self.mark("failed", text=str(fault))
+                with suppress(SessionError):  # a disk that is full takes no mark either
+                    self.mark("failed", text=str(fault))
 
 
 class LeadRecorder:
@@ -188,6 +189,27 @@ class LeadRecorder:
             self._recorder.mark(event, **what)
 
 
+def companion_folders(folder: Path, number: int) -> list[Path]:
+    """Sessions of so many further devices in the session of the first one."""
+    return [folder / f"device-{2 + i}" for i in range(number)]
+
+
+def refuse_recorded_companions(folder: Path, number: int) -> None:
+    """Refuse a folder for a new run in which a further device has a session already.
+
+    Raises
+    ------
+    SessionError
+        Naming that session: its device and site may be others.
+
+    """
+    for each in companion_folders(folder, number):
+        if (each / DESCRIPTION).exists():
+            raise SessionError(
+                f"{each}: holds a session already; name another folder (-o)"
+            )
+
+
 @contextmanager
 def record_companions(
     further: Mapping[str, str], recorder: Recorder, about: Mapping[str, Any]
@@ -209,15 +231,18 @@ def record_companions(
 
     """
     with ExitStack() as stack:
-        others = []
-        for number, (url, serial) in enumerate(further.items(), 2):
+        others: list[Companion] = []
+        folders = companion_folders(recorder.folder, len(further))
+        for folder, (url, serial) in zip(folders, further.items(), strict=True):
             driver = stack.enter_context(open_driver(url))
-            device: dict[str, Any] = {"name": f"device {number}", "address": url}
+            device: dict[str, Any] = {
+                "name": folder.name.replace("-", " "),
+                "address": url,
+            }
             if serial:
                 device["serial"] = serial
             lead = about.get("device", {})
             device |= {key: lead[key] for key in SHARED_KEYS if key in lead}
-            folder = recorder.folder / f"device-{number}"
             known = (folder / DESCRIPTION).exists()
             tables = None if known else {**about, "device": device}
             own = stack.enter_context(Recorder(folder, tables))

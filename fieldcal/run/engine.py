@@ -94,7 +94,7 @@ class Engine:
         self._desk = OperatorDesk(operator, recorder)
         self._display = Display(operator, driver)
         self._incoming = IncomingSamples(
-            driver, recorder, self._on_samples, self._units.add
+            driver, recorder, self._on_samples, self._on_piece
         )
         self._windows = WindowTaker(
             driver, about, recorder, self._desk, self._display, self._incoming,
@@ -118,6 +118,8 @@ class Engine:
         """
         reply: object = None
         error: FieldcalError | None = None
+        if self._before not in self._taken:  # discarded: others are not judged by it
+            self._held = self._before = None
         try:
             while True:
                 step = plan.throw(error) if error else plan.send(reply)
@@ -149,24 +151,27 @@ class Engine:
             case Note(text):
                 self._desk.tell(text)
                 return None
-            case Add(position):
-                return self._add_position(position)
+            case Add():
+                return self._add_position(step)
             case Repeat(index):
                 self._desk.repeat(index)
                 return None
             case Judge(quick):
                 return self._judge(quick)
 
-    def _add_position(self, position: Position) -> int:
+    def _add_position(self, step: Add) -> int:
         """Add a position to the session; returns its number."""
+        position = step.position
         number = len(self._about.positions) + len(self._added)
         alpha, beta = position.degrees or (0.0, 0.0)
-        angles = {"alpha_deg": alpha, "beta_deg": beta}
+        where = {"alpha_deg": alpha, "beta_deg": beta}
+        if step.seconds is not None:
+            where["seconds"] = step.seconds
         if self._taken.pop(number, None) is not None:
             # what was to verify was held behind fewer positions, at other angles
             self._recorder.mark("repeated", position=number)
         self._recorder.mark(
-            POSITION_ADDED, position=number, name=position.name, **angles
+            POSITION_ADDED, position=number, name=position.name, **where
         )
         self._added.append(position)
         return number
@@ -213,11 +218,16 @@ class Engine:
     def _on_samples(self, block: Block) -> None:
         """Look at samples that have just been recorded."""
         self._display.note_samples(block)
-        if self._warm_up:
-            if self._restarts != self._driver.health.restarts:
-                self._restarts = self._driver.health.restarts
+        if self._restarts != self._driver.health.restarts:
+            self._restarts = self._driver.health.restarts
+            if self._warm_up:
                 self._warm_up.forget()
-            self._warm_up.add(block)
+
+    def _on_piece(self, piece: Block) -> None:
+        """Look at a short stretch of samples, however long the block that it is of."""
+        self._units.add(piece)
+        if self._warm_up:
+            self._warm_up.add(piece)
 
     def _on_silence(self) -> None:
         """Report that no samples arrive, and why."""
@@ -235,6 +245,7 @@ class Engine:
         waiting = PositionWait(hold, self._about, self._held, left, self._units)
         asked = self._driver.host_time()
         insisted = warned = False
+        shown = WaitState.NOTHING
         away = self._incoming.breaks
         for block in self._incoming.pieces:
             if self._incoming.breaks != away:  # its position is unknown now
@@ -246,8 +257,8 @@ class Engine:
             wish = self._desk.wish(hold)
             if wish == "repeat":
                 self._desk.repeat(self._before)
-            if wish == "confirm" and self._warm_up and self._warm_up.must_wait:
-                self._warm_up.waived = True
+            if wish == "confirm" and shown is WaitState.WARMING_UP and self._warm_up:
+                self._warm_up.waived = True  # only what was read can be waived
             elif wish == "confirm" and not waiting.arrived:
                 if insisted and waiting.may_insist:
                     self._desk.record_insistence(hold, waiting.problem)
@@ -260,6 +271,7 @@ class Engine:
             if waiting.arrived and self._warm_up and self._warm_up.notice and waits:
                 reason = WaitReason(WaitState.WARMING_UP, self._warm_up.notice)
             self._display.show_turning(hold, waiting, reason)
+            shown = reason.state
             self._warn_of_unit()
             if reason.state is WaitState.WARMING_UP and not warned:
                 warned = True

@@ -75,16 +75,18 @@ def _add_position_case(
 ) -> None:
     mine = [m for m in marks if m.get("position") == number]
     events = [m["event"] for m in mine]
-    asked = [m["host_s"] for m in mine if m["event"] == "asked"]
-    taken = [m["host_s"] for m in mine if m["event"] == "window"]
+    begun = max((i for i, e in enumerate(events) if e == "repeated"), default=-1) + 1
+    valid = mine[begun:]  # a window before was discarded
+    asked = [m["host_s"] for m in valid if m["event"] == "asked"]
+    taken = [m["host_s"] for m in valid if m["event"] == "window"]
     label = f"{number + 1}: {position.name}"
     case = SubElement(suite, "testcase", classname="position", name=label)
     if taken:
         case.set("time", f"{max(0.0, taken[-1] - asked[0]) if asked else 0:.3f}")
-    elif "skipped" in events:
+    elif "skipped" in events[begun:]:
         SubElement(case, "skipped", message="left out by the operator")
     else:
-        said = [str(m["text"]) for m in mine if m["event"] in TROUBLE_MARKS]
+        said = [str(m["text"]) for m in valid if m["event"] in TROUBLE_MARKS]
         message = said[-1] if said else "it was not taken"
         SubElement(case, "failure", message=message)
     trouble = [str(m["text"]) for m in mine if m["event"] in TROUBLE_MARKS]

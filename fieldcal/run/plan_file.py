@@ -148,6 +148,7 @@ def task_from_tables(tables: Mapping[str, Any], name: str) -> PlanTask:
     except InputError as error:
         raise PlanError(f"{name}: {error}") from error
     _check_positions(about, name)
+    _check_count(about, run, name)
     _check_further(about, run, name)
     made = PlanTask(tables, about, run, planned_verification(about))
     _check_mover(made, name)
@@ -182,6 +183,17 @@ def _check_positions(about: Description, name: str) -> None:
             f"{name}: all {len(positions)} positions are the same"
             f" ({positions[0].name}): no scale factor can be determined; turn the"
             " device between them"
+        )
+
+
+def _check_count(about: Description, run: Mapping[str, Any], name: str) -> None:
+    """Refuse positions that are too many for the method of the procedure."""
+    procedure, given = str(run.get("procedure", "positions")), len(about.positions)
+    count = procedures.position_count(procedure)
+    if count is not None and given != count:
+        raise PlanError(
+            f'{name}: [run] procedure = "{procedure}" is for {count} positions, not'
+            f' {given}: write procedure = "positions"'
         )
 
 

@@ -20,6 +20,9 @@ from fieldcal.session.folder import RESULT, Session
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.windows import Average, average
 
+CLOCK_TOLERANCE_S = 1.0
+"""Difference between the time of a file and that of a mark of the same instant, s."""
+
 
 def recorded_averages(session: Session, task: PlanTask) -> dict[int, Average]:
     """Averages of the positions with a complete window in a session, by number."""
@@ -60,7 +63,8 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
     Raises
     ------
     SessionError
-        If it is none, has nothing left to take, or was not recorded by a run.
+        If it is none, has nothing left to take, was not recorded by a run, or is that
+        of a further device.
 
     """
     from fieldcal.acceptance.assessment import verification_window
@@ -74,7 +78,12 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
         )
     marks, again = list(session.marks()), tuple[int, ...]()
     run = dict(tables["run"])
-    if _is_finished(marks) and (folder / RESULT).exists():
+    if session.about.device.get("address") in run.get("further", ()):
+        raise SessionError(
+            f"{folder}: is the session of a further device of a run: go on with that"
+            f" one, --resume {folder.absolute().parent}"
+        )
+    if _is_finished(marks) and _has_result(folder, marks):
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
         last = len(session.positions)
@@ -123,6 +132,20 @@ def _is_finished(marks: Sequence[Mapping[str, Any]]) -> bool:
     return bool(ends) and not {POSITION_ADDED, "repeated", "asked"} & set(
         told[ends[-1] :]
     )
+
+
+def _has_result(folder: Path, marks: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether there is a result of the last run, and not of one that it went on with.
+
+    One that was ended while it was being solved has left the result before it, whose
+    remedy was taken already.
+    """
+    ends = [m for m in marks if m.get("event") == "finished"]
+    try:
+        written = (folder / RESULT).stat().st_mtime
+    except OSError:
+        return False
+    return written > float(ends[-1].get("host_s") or 0.0) - CLOCK_TOLERANCE_S
 
 
 def _remedy(folder: Path, session: Session) -> Mapping[str, Any]:

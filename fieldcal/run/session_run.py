@@ -26,7 +26,7 @@ from fieldcal.core.errors import (
 from fieldcal.core.positions import Position
 from fieldcal.drivers.driver import Driver
 from fieldcal.evaluation.interim_result import InterimResult
-from fieldcal.planning.holding import hold_until_still
+from fieldcal.planning.holding import hold_until_still, with_own_lengths
 from fieldcal.planning.steps import Judge, Plan, Repeat, add, note
 from fieldcal.run.companions import LeadRecorder
 from fieldcal.run.engine import Engine
@@ -36,7 +36,7 @@ from fieldcal.run.operator.protocol import Operator
 from fieldcal.run.plan_file import WARM_UP, PlanTask
 from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.session.description import with_added_positions
-from fieldcal.session.marks import MARKS, read_marks
+from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
 from fieldcal.session.recorder import Recorder
 from fieldcal.windows import Average
 
@@ -84,8 +84,9 @@ class SessionRun:
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
         self._so_far: InterimResult | None = None
-        self._judged_windows = 0
+        self._judged_changes = 0
         self._remedies = 0
+        self._wanted_again: int | None = None
         self._warm_up = WarmUpWatch(limits.temperature_rate_k_min, wait)
 
     def run(self, driver: Driver) -> Calibration:
@@ -139,11 +140,12 @@ class SessionRun:
     def _judge(self, quick: bool) -> InterimResult:
         """Judge the windows taken so far."""
         folder, so_far = self._recorder.folder, self._so_far
-        windows = [m for m in read_marks(folder / MARKS) if m.get("event") == "window"]
-        known = len(windows) == self._judged_windows
+        events = [m.get("event") for m in read_marks(folder / MARKS)]
+        changes = events.count("window") + events.count("repeated")
+        known = changes == self._judged_changes
         if not so_far or not known or (so_far.incremental and not quick):
             so_far = judge_session(folder, self._limits, so_far if quick else None)
-        self._so_far, self._judged_windows = so_far, len(windows)
+        self._so_far, self._judged_changes = so_far, changes
         return so_far
 
     def _plan(self) -> Plan[Calibration]:
@@ -152,7 +154,8 @@ class SessionRun:
         if self._added and procedures.max_positions(about, name) is None:
             name = "positions"  # whatever set it was, it has more now
         plan = procedures.load_procedure(name).plan
-        found = yield from plan(about, task.seconds, task.sigma)
+        steps = plan(about, task.seconds, task.sigma)
+        found = yield from with_own_lengths(steps, self._own_lengths())
         about = with_added_positions(task.about, self._added)
         verification = planned_verification(about)
         if verification is not None:
@@ -160,6 +163,17 @@ class SessionRun:
         elif self._until_go:
             yield from self._take_remedies()
         return found
+
+    def _own_lengths(self) -> dict[int, float]:
+        """Length of the window of each added position that has its own, s.
+
+        What a remedy promises holds for that length, also behind a break.
+        """
+        marks = read_marks(self._recorder.folder / MARKS)
+        added = [m for m in marks if m.get("event") == POSITION_ADDED]
+        return {
+            int(m["position"]): float(m["seconds"]) for m in added if "seconds" in m
+        }
 
     def _hold_verification(self, number: int, position: Position) -> Plan[None]:
         """Hold the verification position, which is not fitted."""
@@ -173,6 +187,8 @@ class SessionRun:
 
     def _take_remedies(self) -> Plan[None]:
         """Take the positions that would turn a NO-GO into GO, while there are any."""
+        if self._wanted_again is not None and self._wanted_again not in self._taken:
+            return  # the operator left it out
         while self._remedies < MOST_REMEDIES:
             so_far: InterimResult = yield Judge()
             remedy = so_far.remedy
@@ -181,10 +197,11 @@ class SessionRun:
             self._remedies += 1
             yield from note(f"NO-GO so far: {so_far.reasons[0]}; {remedy['says']}")
             for number in remedy["again"]:
+                self._wanted_again = int(number)
                 yield Repeat(number)
             for place in remedy["positions"]:
                 one = Position.deg(place["alpha_deg"], place["beta_deg"])
-                number = yield from add(one)
+                number = yield from add(one, remedy["seconds"])
                 try:
                     yield from hold_until_still(number, one, remedy["seconds"], None)
                 except Skipped as skipped:

@@ -47,7 +47,7 @@ class WarmUpWatch:
         self.waived = False
 
     def add(self, block: Block) -> None:
-        """Take in the block that follows; costs as much as the block is long."""
+        """Take in the block that follows, shorter than a second."""
         known = np.isfinite(block.temperature)
         if not known.any():
             return

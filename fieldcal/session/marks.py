@@ -18,7 +18,8 @@ from fieldcal.core.errors import SessionError
 MARKS = "marks.jsonl"
 
 POSITION_ADDED = "added"
-"""Mark of a position that was added to the planned ones, with its angles."""
+"""Mark of a position that was added to the planned ones, with its angles, and with the
+length of its window where that is its own."""
 
 
 def mark_line(mark: Mapping[str, Any]) -> str:

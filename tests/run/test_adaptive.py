@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -146,6 +146,36 @@ def test_it_ends_at_go_also_if_it_was_stopped_on_the_way(bench: Bench) -> None:
     assert added == list(range(2, max(bench.numbers) + 1))
 
 
+class Fickle(Hand):
+    """Discards the third position, leaves it and the next one out, and stops then."""
+
+    def __init__(self, driver: InProcess) -> None:
+        super().__init__(driver)
+        self.left = [(3, "repeat"), (2, "skip"), (3, "skip"), (4, "stop")]
+
+    def wish(self) -> Wish | None:
+        now = self.asked[-1][0] if self.asked else None
+        return cast(Wish, self.left.pop(0)[1]) if now == self.left[0][0] else None
+
+
+def test_what_was_discarded_is_not_judged_any_more(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[tuple[int, ...]] = []
+
+    def noted(folder: Path, *given: Any) -> InterimResult:
+        so_far = judge_session(folder, *given)
+        judged.append(so_far.prepared_session.windows.position_numbers)
+        return so_far
+
+    monkeypatch.setattr(session_run, "judge_session", noted)
+    bench.hand = Fickle(bench.hand.driver)
+    with pytest.raises(Stopped):
+        bench.run(ADAPTIVE)
+    assert bench.numbers == [0, 1, 2, 3, 2, 3, 4]
+    assert judged == [(0, 1), (0, 1, 2), (0, 1)]
+
+
 class Content(Hand):
     """Leaves out what is asked for beyond GO."""
 
@@ -204,6 +234,52 @@ def test_of_a_fixed_plan_what_a_no_go_wants_is_asked_for_at_once(bench: Bench) -
     said = [t for t in bench.hand.told if t.startswith("NO-GO so far")]
     assert len(said) == max(bench.numbers) - 2
     assert all("one position more" in t and "then GO is expected" in t for t in said)
+
+
+class Doubtful:
+    """A judgement that wants the second position once more, whatever there is."""
+
+    incremental = False
+    reasons = ("the second position disagrees",)
+    remedy = {"says": "take it again", "again": [1], "positions": [], "seconds": 5.0}
+
+
+@pytest.mark.parametrize("left_out", [False, True])
+def test_who_leaves_out_what_a_remedy_wants_again_is_asked_for_nothing_more(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, left_out: bool
+) -> None:
+    class Tired(Hand):
+        def wish(self) -> Wish | None:
+            again = [number for number, _ in self.asked].count(1) > 1
+            return "skip" if left_out and again and self.asked[-1][0] == 1 else None
+
+    monkeypatch.setattr(session_run, "judge_session", lambda *_: Doubtful())
+    bench.hand = Tired(bench.hand.driver)
+    start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+    run = {"procedure": "positions", "seconds": 5.0}
+    bench.run(run, until_go=True, position=start)
+    assert bench.numbers == [0, 1, 2] + ([1] if left_out else [1, 1, 1])
+
+
+def test_a_window_that_a_remedy_wants_longer_is_so_also_behind_a_break(
+    bench: Bench,
+) -> None:
+    class Timed(Hand):
+        def place(self, hold: Hold) -> None:
+            super().place(hold)
+            seconds[hold.index] = hold.seconds
+
+    seconds: dict[int, float] = {}
+    bench.hand = Timed(bench.hand.driver)
+    start = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+    bench.run({"procedure": "positions", "seconds": 5.0}, position=start)
+    with Recorder(bench.folder, None) as recorder:
+        for number, more in ((3, {"seconds": 8.0}), (4, {})):
+            where = {"alpha_deg": -45.0, "beta_deg": 5.0 * (number - 3)}
+            recorder.mark("added", position=number, name="", **where, **more)
+    bench.hand.wants = {3: "skip"}
+    bench.resumed()
+    assert seconds == {0: 5.0, 1: 5.0, 2: 5.0, 3: 8.0, 4: 5.0}
 
 
 @pytest.mark.thorough

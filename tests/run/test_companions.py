@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,15 +12,24 @@ import numpy as np
 import pytest
 from processes import RUN, steady, turned
 
+from fieldcal.cli import main
 from fieldcal.commands.virtual_address import driver_address
+from fieldcal.core.errors import SessionError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
-from fieldcal.run.companions import ArrivalTimes, Companion, LeadRecorder
+from fieldcal.run.companions import (
+    ArrivalTimes,
+    Companion,
+    LeadRecorder,
+    refuse_recorded_companions,
+)
 from fieldcal.run.movers import VirtualMover
 from fieldcal.session.folder import Session
 from fieldcal.session.marks import read_marks
 from fieldcal.session.recorder import Recorder
+from fieldcal.sim_device import VirtualDevice
+from fieldcal.sim_device.in_process import InProcess
 
 LINKS = ["--serial xsens --rate 200", "--can slcan", "--mavlink tcpin:127.0.0.1:0"]
 BIASES = ["0.2,-0.3,0.1", "-0.1,0.3,0.2", "0.3,0.1,-0.2"]
@@ -154,6 +164,27 @@ def test_a_further_device_that_fails_costs_the_others_nothing(tmp_path: Path) ->
     assert "failed" in {mark["event"] for mark in marks}
 
 
+def test_a_first_device_that_says_nothing_leaves_no_session_of_the_others(
+    tmp_path: Path,
+) -> None:
+    """The next attempt may have another device there, or another site."""
+    call = ["run", "two_position", "--headless", "--level=0.01", "--angles=0.01"]
+    call += ["-o", str(tmp_path / "s")]
+    with ExitStack() as stack:
+        devices, urls = started(stack, tmp_path)
+        devices[0].ask(fault={"silence_s": 1e6})
+        for url in urls[:2]:
+            call += ["--device", url]
+        assert main([*call, "--latitude=50.45"]) == 3
+    assert not (tmp_path / "s").exists()
+    with Recorder(tmp_path / "s" / "device-2", {"format": 1}) as recorder:
+        recorder.append(Block.of(np.arange(9.0), np.zeros((9, 3))))
+    with pytest.raises(SessionError, match="device-2: holds a session already"):
+        refuse_recorded_companions(tmp_path / "s", 1)
+    refuse_recorded_companions(tmp_path / "s", 0)
+    assert len(Session.open(tmp_path / "s" / "device-2").block) == 9
+
+
 def test_times_go_over_the_hosts_clock() -> None:
     times = ArrivalTimes()
     assert np.isnan(times.device_time(0.0))
@@ -170,6 +201,28 @@ def test_whoever_records_may_be_late() -> None:
     assert times.device_time(501.75) == pytest.approx(2.5)
     assert times.host_time(1.5) == pytest.approx(500.5)
     assert times.device_time(times.host_time(2.7)) == pytest.approx(2.7)
+
+
+class Full(Recorder):
+    """A session on a disk that is full."""
+
+    def append(self, block: Block) -> Block:
+        raise SessionError("the disk is full")
+
+    def mark(self, event: str, **what: Any) -> None:
+        raise SessionError("the disk is full")
+
+
+def test_a_full_disk_ends_the_recording_of_a_device_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which would be written across the screen of the operator."""
+    broken: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", broken.append)
+    with Full(tmp_path / "s", {"format": 1}) as recorder:
+        companion = Companion(InProcess(VirtualDevice(seed=1)), recorder)
+        companion.end()
+    assert str(companion.failed) == "the disk is full" and not broken
 
 
 class Recorded:

@@ -446,6 +446,25 @@ def _then_repeat(turner: Turner) -> Plan[None]:
     yield from hold(1, TWO_POSITIONS[1], 5.0)
 
 
+def test_a_first_position_that_was_set_wrongly_may_be_set_right(bench: Bench) -> None:
+    """What was discarded is no measure of where the device is."""
+    turner, taken = bench.turner, dict[int, Average]()
+    engine = Engine(turner.driver, turner, ABOUT, bench.recorder, 60.0, taken)
+    turner.slips, turner.corrects = [(6.0, 0.0)], False
+    with pytest.raises(RepeatPosition):
+        engine.run(_then_repeat(turner))
+    wrong = taken.pop(0)
+    right = engine.run(hold(0, TWO_POSITIONS[0], 5.0))
+    turned = abs(wrong.mean - right.mean)[0]
+    assert turned == pytest.approx(ABOUT.gravity * np.sin(np.deg2rad(6.0)), abs=0.02)
+    assert not turner.told
+    turner.wishes = ["repeat"]
+    taken.clear()
+    engine.run(hold(0, TWO_POSITIONS[0], 5.0))
+    assert turner.told == ["nothing was taken yet that could be repeated"]
+    assert events(bench).count("repeated") == 1
+
+
 def test_an_operator_may_stop(bench: Bench) -> None:
     bench.turner.wishes = ["stop"]
     with pytest.raises(Stopped):
@@ -509,6 +528,47 @@ def test_nothing_is_known_of_a_time_without_samples() -> None:
     assert waiting.seconds > 1.0
     waiting.add(block[300:], 3.0)
     assert waiting.seconds < 1.5 and not waiting.arrived
+
+
+class Behind(InProcess):
+    """A link that is read by a computer so busy that half a minute comes at once."""
+
+    def __init__(self, device: VirtualDevice) -> None:
+        super().__init__(device)
+        self._n = round(30.0 * device.rate)
+
+
+@pytest.mark.parametrize("kind", [InProcess, Behind])
+def test_a_temperature_is_known_after_seconds_however_samples_come(
+    tmp_path: Path, kind: type[InProcess]
+) -> None:
+    steady = replace(Climate(), self_heating_k=0.0)
+    driver = kind(VirtualDevice(replace(Profile(), temperature=steady), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        turner, warm_up = Turner(driver), WarmUpWatch(0.5, 300.0)
+        engine = Engine(driver, turner, ABOUT, recorder, warm_up=warm_up)
+        (average,) = engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    assert average.start < 7.0 and not turner.told
+
+
+@pytest.mark.parametrize(("read", "begins"), [(False, 39.0), (True, 8.0)])
+def test_enter_waives_a_warm_up_only_if_it_was_said(
+    tmp_path: Path, read: bool, begins: float
+) -> None:
+    """An Enter in the first seconds says that the device was turned."""
+
+    class Hasty(Turner):
+        def wish(self) -> Wish | None:
+            pressed = bool(self.told) if read else self.driver.device.time < 2.0
+            return "confirm" if pressed else None
+
+    warming = replace(Climate(), self_heating_k=20.0, warm_up_s=60.0)
+    driver = InProcess(VirtualDevice(replace(Profile(), temperature=warming), seed=3))
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        warm_up = WarmUpWatch(0.5, 40.0)
+        engine = Engine(driver, Hasty(driver), ABOUT, recorder, warm_up=warm_up)
+        (average,) = engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    assert begins - 3.0 < average.start < begins + 4.0
 
 
 def test_a_device_that_warms_up_is_waited_for_and_said(tmp_path: Path) -> None:

@@ -106,6 +106,10 @@ def test_a_procedure_brings_its_positions(name: str) -> None:
         ({"run": {}, "position": POSITIONS[:1] * 3}, "are the same"),
         ({"run": {}}, "are not enough"),
         (
+            {**plan(procedure="two_position"), "position": [*POSITIONS, POSITIONS[0]]},
+            'is for 2 positions, not 3: write procedure = "positions"',
+        ),
+        (
             {"run": {}, "position": [*POSITIONS, TABLE]},
             "number 3 has rate_deg_s, and a run holds",
         ),

@@ -121,6 +121,22 @@ def test_what_cannot_be_gone_on_with_is_said(tmp_path: Path) -> None:
         open_for_resume(tmp_path / "s")
 
 
+def test_a_further_device_is_not_gone_on_with_by_itself(tmp_path: Path) -> None:
+    """Its session would get the samples of the first device."""
+    run: dict[str, object] = {
+        "procedure": "two_position",
+        "device": "can:can0",
+        "further": ["can:can1"],
+    }
+    lead, other = {"name": "one"}, {"name": "device 2", "address": "can:can1"}
+    for folder, device in ((tmp_path, lead), (tmp_path / "device-2", other)):
+        with Recorder(folder, {**TABLES, "run": run, "device": device}) as recorder:
+            recorder.append(still(0.0, 1.0, 1000.0))
+    assert open_for_resume(tmp_path)[1]["run"] == run
+    with pytest.raises(SessionError, match=f"--resume {tmp_path}$"):
+        open_for_resume(tmp_path / "device-2")
+
+
 def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
     """Positions besides are added, those in doubt taken once more, and only once."""
     folder = tmp_path / "s"
@@ -159,8 +175,31 @@ def test_a_finished_no_go_is_gone_on_with_by_its_remedy(tmp_path: Path) -> None:
             start = 10.0 + 10.0 * i
             recorder.mark("window", position=i, start_s=start, end_s=start + 2.0)
         recorder.mark("finished")
+    (folder / "result.json").write_text(json.dumps({"decision": {"go": False}}))
     with pytest.raises(SessionError, match="no position taken besides would"):
         open_for_resume(folder)
+
+
+def test_a_remedy_that_was_taken_is_not_taken_again_if_solving_was_broken_off(
+    tmp_path: Path,
+) -> None:
+    """The result is that of the run before, and its windows in doubt are new ones."""
+    folder = tmp_path / "s"
+    recorded(folder)
+    besides = {"alpha_deg": 45.0, "beta_deg": -5.0}
+    remedy = {"says": "", "again": [0], "positions": [besides], "seconds": 20.0}
+    result = folder / "result.json"
+    result.write_text(json.dumps({"decision": {"go": False, "remedy": remedy}}))
+    before = time() - 30.0
+    os.utime(result, (before, before))
+    with Recorder(folder, None) as recorder:
+        recorder.mark("finished")
+    session, tables, again = open_for_resume(folder)
+    assert again == () and len(tables["position"]) == len(session.positions)
+    taken = recorded_averages(session, plan_file.task_from_tables(tables, "s"))
+    assert list(taken) == [0]
+    result.touch()  # solved meanwhile
+    assert open_for_resume(folder)[2] == (0,)
 
 
 def test_a_remedy_that_was_left_out_is_asked_for_once(tmp_path: Path) -> None:

@@ -336,6 +336,17 @@ def test_each_position_is_left_out_by_two_presses_of_its_own() -> None:
     assert [operator.wish() for _ in range(4)] == [None, "skip", None, "skip"]
 
 
+def test_a_press_for_a_position_that_was_taken_leaves_out_no_other_one() -> None:
+    operator = sized(80, 24, "skip", "skip", "skip")
+    assert operator.wish() is None
+    operator.show(view("taken"))
+    operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))
+    assert operator.wish() is None
+    assert f"press s once more to leave {FIVE_POSITIONS[2].name}" in screen(operator)
+    operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))  # again, after a disturbance
+    assert operator.wish() == "skip"
+
+
 def test_what_a_second_press_no_longer_does_is_not_shown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -438,5 +449,11 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
             assert keyboard.pressed() == "repeat"
             os.write(hand, b"rs")
             assert keyboard.pressed() == "skip" and keyboard.pressed() is None
+            os.write(hand, b"rs")
+            keyboard.forget()
+            assert keyboard.pressed() is None
+            os.write(hand, b"q")
+            keyboard.forget()  # a position is asked for: who wants to stop still does
+            assert keyboard.pressed() == "stop" and keyboard.pressed() is None
         assert termios.tcgetattr(terminal_file) == before
     os.close(hand)

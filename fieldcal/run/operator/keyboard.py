@@ -50,6 +50,7 @@ class Keyboard:
         terminal = sys.stdin  # None where there is no console at all
         usable = terminal is not None and not terminal.closed and terminal.isatty()
         self._keys: Keys | None = None
+        self._stop = False
         if usable:
             windows = importlib.util.find_spec("termios") is None
             self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
@@ -70,18 +71,19 @@ class Keyboard:
 
     def pressed(self) -> Wish | None:
         """Wish of the keys since the last call: "stop" if any, else the last."""
+        stop, self._stop = self._stop, False
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
         letters = OTHER_KEYS.sub("", text or "").lower()
         wishes = [KEYS[key] for key in letters if key in KEYS]
-        if "stop" in wishes:
+        if stop or "stop" in wishes:
             return "stop"
         return wishes[-1] if wishes else None
 
     def forget(self) -> None:
-        """Discard keys pressed so far: they were meant for an earlier step."""
-        self.pressed()
+        """Discard keys pressed so far, meant for an earlier step; a stop is for all."""
+        self._stop = self.pressed() == "stop"
 
 
 class Keys(Protocol):

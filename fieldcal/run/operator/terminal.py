@@ -89,6 +89,9 @@ class ConsoleOperator:
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
+        before = self._shown.hold
+        if before is None or before.index != hold.index:
+            self._skips = -CONFIRM_WITHIN_S  # it was asked about the one before
         self._shown.position_asked(hold)
         self._lines.clear()
         self._bell()

@@ -60,7 +60,8 @@ class Buttons:
             if client != self._holder:
                 return False
             self._heard = self._clock()
-            self._pressed.append(wish)
+            if "stop" not in self._pressed:  # whoever wants to stop wants no more
+                self._pressed.append(wish)
             return True
 
     def pressed(self) -> Wish | None:
@@ -69,5 +70,7 @@ class Buttons:
             return self._pressed.pop() if self._pressed else None
 
     def forget(self) -> None:
-        """Discard wishes so far: they were meant for an earlier step."""
-        self.pressed()
+        """Discard wishes so far, meant for an earlier step; a stop is for all."""
+        with self._lock:
+            if "stop" not in self._pressed:
+                self._pressed.clear()

@@ -151,6 +151,18 @@ def test_one_has_the_buttons_and_all_others_watch() -> None:
     assert buttons.take("b", over=True) and not buttons.press("a", "stop")
 
 
+def test_a_stop_is_heard_whatever_is_pressed_or_asked_for_behind_it() -> None:
+    buttons = Buttons(Clock())
+    buttons.take("a")
+    buttons.press("a", "stop")
+    assert buttons.press("a", "confirm")
+    buttons.forget()
+    assert buttons.pressed() == "stop" and buttons.pressed() is None
+    buttons.press("a", "skip")
+    buttons.forget()
+    assert buttons.pressed() is None
+
+
 def test_whoever_is_gone_leaves_the_buttons() -> None:
     clock = Clock()
     buttons = Buttons(clock)
@@ -190,7 +202,7 @@ def test_the_console_is_shown_everything_and_both_may_wish() -> None:
     console, board, buttons = Console(), Board("fieldcal", FIVE_POSITIONS), Buttons()
     both = PageOperator(console, board, buttons)
     buttons.take("a")
-    buttons.press("a", "stop")
+    buttons.press("a", "skip")
     now, reason = view("turning"), WaitReason(WaitState.NO_SAMPLES, "no samples")
     both.place(HOLD)  # what was pressed before was meant for what is over
     assert both.wish() is None

@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from processes import HANGS, TWO_POSITION, steady
 
-from fieldcal.commands.run_page import parse_address
-from fieldcal.core.errors import InputError
+from fieldcal.commands.run_page import parse_address, wait_for_page
+from fieldcal.core.errors import InputError, Stopped
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
 from fieldcal.run.page.board import Board
@@ -193,6 +193,31 @@ def test_whoever_opens_the_page_as_a_run_ends_does_not_break_it() -> None:
         there.content_for("a")
         there.board = Opened("fieldcal", [])
     assert there.watched
+
+
+def test_whoever_is_shown_the_code_may_stop_or_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Keys:
+        def __init__(self) -> None:
+            self.has_keys = True
+
+        def __enter__(self) -> Keys:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        def pressed(self) -> str | None:
+            return wishes.pop(0)
+
+    monkeypatch.setattr("fieldcal.run.operator.keyboard.Keyboard", Keys)
+    with PageServer("127.0.0.1") as server:
+        wishes = [None, "skip", "stop"]
+        with pytest.raises(Stopped):
+            wait_for_page(server)
+        wishes = ["repeat", "confirm"]
+        wait_for_page(server)
+    assert not wishes
 
 
 def test_an_address_that_is_not_here_or_taken_is_said() -> None:

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldcal.core.errors import FieldcalError, SessionError
+from fieldcal.core.errors import DeviceError, FieldcalError, SessionError
 from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
@@ -128,9 +128,16 @@ class Companion:
         except FieldcalError as fault:
             # what was only just silent when all was over has been heard enough
             if not (self._ends and self._times.known):
-                self.failed = fault
-                with suppress(SessionError):  # a disk that is full takes no mark either
-                    self.mark("failed", text=str(fault))
+                self._fail(fault)
+        except Exception as fault:
+            # nobody waits for this thread: what ends it must not end in silence
+            what = f"{type(fault).__name__}: {fault}"
+            self._fail(DeviceError(f"its recording broke on {what}; please report it"))
+
+    def _fail(self, fault: FieldcalError) -> None:
+        self.failed = fault
+        with suppress(SessionError):  # a disk that is full takes no mark either
+            self.mark("failed", text=str(fault))
 
 
 class LeadRecorder:

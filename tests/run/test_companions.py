@@ -14,7 +14,7 @@ from processes import RUN, steady, turned
 
 from fieldcal.cli import main
 from fieldcal.commands.virtual_address import driver_address
-from fieldcal.core.errors import SessionError
+from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
@@ -285,3 +285,23 @@ def test_what_the_first_device_has_the_others_have_whenever_it_is_killed(
         leads.mark("window", position=0, start_s=1.0, end_s=8.0)
         leads.mark("repeated", position=0)
     assert other.marks == [("window", False), ("repeated", True)]
+
+
+def test_an_unforeseen_error_of_a_further_device_is_told(tmp_path: Path) -> None:
+    """Its recording is cut off there, and nothing may be calculated from it unsaid."""
+
+    class Broken(InProcess):
+        """Its wire format breaks on what it receives."""
+
+        def receive(self, timeout: float) -> Block | None:
+            raise ZeroDivisionError("of nothing")
+
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        companion = Companion(Broken(VirtualDevice(seed=1)), recorder)
+        companion.end()
+    assert isinstance(companion.failed, FieldcalError)
+    assert "ZeroDivisionError: of nothing" in str(companion.failed)
+    (mark,) = [
+        m for m in Session.open(tmp_path / "s").marks() if m["event"] == "failed"
+    ]
+    assert mark["text"] == str(companion.failed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -457,3 +458,37 @@ def test_no_key_halts_a_run_and_a_wish_to_stop_is_heard(
             assert keyboard.pressed() == "stop" and keyboard.pressed() is None
         assert termios.tcgetattr(terminal_file) == before
     os.close(hand)
+
+
+@pytest.fixture
+def hand(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The end of a terminal at which somebody sits; standard input is its other end."""
+    pytest.importorskip("termios")
+    sitting, terminal_file = os.openpty()
+    with os.fdopen(terminal_file) as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        yield sitting
+
+
+@pytest.mark.parametrize("key", ["\x1bOQ", "\x1bOS", "\x1b[15~", "\x1b[1;2S", "\x1b[A"])
+def test_a_key_that_arrives_in_parts_is_no_letter(hand: int, key: str) -> None:
+    """Over a slow link F2 is ESC O, and some time later Q."""
+    with Keyboard() as keyboard:
+        for at in range(1, len(key)):
+            os.write(hand, key[:at].encode())
+            assert keyboard.pressed() is None and keyboard.pressed() is None
+            os.write(hand, key[at:].encode())
+            assert keyboard.pressed() is None
+        os.write(hand, b"\x1b")
+        assert keyboard.pressed() is None
+        os.write(hand, b"q")  # Escape, and later a letter
+        assert keyboard.pressed() == "stop"
+    os.close(hand)
+
+
+def test_a_terminal_that_is_gone_has_no_keys_and_ends_nothing(hand: int) -> None:
+    with Keyboard() as keyboard:
+        assert keyboard.has_keys
+        os.close(hand)
+        assert keyboard.pressed() is None
+        assert not keyboard.has_keys

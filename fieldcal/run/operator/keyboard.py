@@ -15,6 +15,7 @@ import os
 import re
 import select
 import sys
+from contextlib import suppress
 from typing import Any, Protocol, Self
 
 from fieldcal.run.operator.protocol import Wish
@@ -34,6 +35,9 @@ OTHER_KEYS = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|O.|.)?", re.DOTALL)
 """Sequences of arrows, function keys and letters with Alt, which contain letters: F2
 ends in a Q, F4 in an S."""
 
+UNFINISHED = re.compile("\x1b(?:\\[[0-?]*[ -/]*|O)?$")
+"""Beginning of such a sequence whose end has not arrived: a slow link may divide it."""
+
 SHORT_HELP = "Enter ok · r again · s skip · q stop"
 """The same for a screen of 40 characters."""
 
@@ -50,7 +54,7 @@ class Keyboard:
         terminal = sys.stdin  # None where there is no console at all
         usable = terminal is not None and not terminal.closed and terminal.isatty()
         self._keys: Keys | None = None
-        self._stop = False
+        self._stop, self._unfinished = False, ""
         if usable:
             windows = importlib.util.find_spec("termios") is None
             self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
@@ -75,11 +79,23 @@ class Keyboard:
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
-        letters = OTHER_KEYS.sub("", text or "").lower()
+        letters = OTHER_KEYS.sub("", self._with_unfinished(text or "")).lower()
         wishes = [KEYS[key] for key in letters if key in KEYS]
         if stop or "stop" in wishes:
             return "stop"
         return wishes[-1] if wishes else None
+
+    def _with_unfinished(self, text: str) -> str:
+        """Keys behind the beginning of a sequence, without one at their own end.
+
+        Escape alone is a key, and a letter pressed later is one for itself.
+        """
+        if self._unfinished == "\x1b" and text[:1] not in ("", "[", "O"):
+            self._unfinished = ""
+        text, self._unfinished = self._unfinished + text, ""
+        if begun := UNFINISHED.search(text):
+            text, self._unfinished = text[: begun.start()], begun.group()
+        return text
 
     def forget(self) -> None:
         """Discard keys pressed so far, meant for an earlier step; a stop is for all."""
@@ -124,13 +140,17 @@ class PosixKeys:
         import termios
 
         if self._before:
-            termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
+            with suppress(termios.error):  # the terminal is gone
+                termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
 
     def read(self) -> str | None:
         """Keys pressed since the last call; None if the terminal is gone."""
         text = ""
         while select.select([self._file], [], [], 0)[0]:
-            data = os.read(self._file, 64)
+            try:
+                data = os.read(self._file, 64)
+            except OSError:
+                return None
             if not data:
                 return None
             text += data.decode(errors="replace")

@@ -22,8 +22,9 @@ Rows = NDArray[np.bool_]
 MIN_FALLING_ROWS = 10
 """Number of rows from which times that only fall show a file written newest first."""
 
-MAX_LEFT_OUT = 0.5
-"""Share of rows that may be left out: of a file with more, the rest is no recording."""
+MAX_LEFT_OUT, MIN_LONG_ROWS = 0.5, 50
+"""Share of rows that may be left out, and rows from which it counts: of a longer file
+with more bad rows, the rest is no recording."""
 
 
 class RowValidator:
@@ -74,7 +75,7 @@ class RowValidator:
             yield self._add(block)
         if len(self._held):
             yield self._of_time_order(self._held, np.array([self._held_row]), np.inf)
-        if self.left_out > MAX_LEFT_OUT * self._seen:
+        if self.left_out > MAX_LEFT_OUT * max(self._seen, MIN_LONG_ROWS):
             raise InputError(
                 f"{self._name}: {self.left_out} of {self._seen} rows cannot be used"
                 f" ({self._sentence(*self._runs[0])}): mend the file itself, or name"

@@ -34,6 +34,7 @@ from fieldcal.evaluation.observations import UsableWindows, angle_setting
 from fieldcal.history.store import History, HistoryRun, earlier_runs, family_runs
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
+from fieldcal.session.marks import taken_windows
 from fieldcal.windows import Average, average
 from fieldcal.windows.dead_axis import broken_axis_messages
 
@@ -199,31 +200,13 @@ def start_time(marks: Sequence[Mapping[str, Any]]) -> str | None:
     return datetime.fromtimestamp(times[0], UTC).isoformat(timespec="seconds")
 
 
-def verification_window(
-    marks: Sequence[Mapping[str, Any]], number: int
-) -> tuple[float, float] | None:
-    """Window of the position after the fitted ones, by its number, s of device time.
-
-    None if there is none, or if the last one was discarded.
-    """
-    window: tuple[float, float] | None = None
-    for mark in marks:
-        if mark.get("position") != number:
-            continue
-        if mark.get("event") == "window":
-            window = float(mark["start_s"]), float(mark["end_s"])
-        elif mark.get("event") == "repeated":
-            window = None
-    return window
-
-
 def _verification(
     calibration: Calibration,
     session: Session,
     marks: Sequence[Mapping[str, Any]],
 ) -> Verification | None:
     position = planned_verification(session.about)
-    window = verification_window(marks, len(session.positions))
+    window = taken_windows(marks).get(len(session.positions))
     if position is None or window is None:
         return None
     try:

@@ -266,9 +266,7 @@ def _record_and_solve(
         taken = recorded_averages(known, task) if known else {}
         if not args.resume:
             refuse_recorded_companions(folder, len(task.further))
-        own = stack.enter_context(
-            Recorder(folder, None if args.resume else task.tables)
-        )
+        own = stack.enter_context(Recorder(folder, None if known else task.tables))
         args.records = True
         recorder = stack.enter_context(
             record_companions(task.further, own, task.tables)

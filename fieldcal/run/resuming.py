@@ -17,7 +17,7 @@ from fieldcal.core.positions import Position
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.run.plan_file import PlanTask
 from fieldcal.session.folder import RESULT, Session
-from fieldcal.session.marks import POSITION_ADDED
+from fieldcal.session.marks import POSITION_ADDED, taken_windows
 from fieldcal.windows import Average, average
 
 CLOCK_TOLERANCE_S = 1.0
@@ -26,32 +26,16 @@ CLOCK_TOLERANCE_S = 1.0
 
 def recorded_averages(session: Session, task: PlanTask) -> dict[int, Average]:
     """Averages of the positions with a complete window in a session, by number."""
-    from fieldcal.acceptance.assessment import verification_window
-
-    marks = list(session.marks())
-    taken: dict[int, Average] = {}
+    windows, taken = taken_windows(session.marks()), dict[int, Average]()
     with suppress(SessionError):
         still = usable_windows(session)
         taken = dict(zip(still.position_numbers, still.averages, strict=True))
     last = len(task.about.positions)
-    window = verification_window(marks, last)
+    window = windows.get(last)
     if window is not None and task.verification is not None:
         with suppress(FieldcalError):
             taken[last] = average(session.block.between(*window))
-    for number in list(taken):
-        if not _window_stands(marks, number):
-            del taken[number]
-    return taken
-
-
-def _window_stands(marks: list[dict[str, Any]], number: int) -> bool:
-    """Whether the last mark of a position is that of its window."""
-    said = [
-        m["event"]
-        for m in marks
-        if m.get("position") == number and m.get("event") in ("window", "repeated")
-    ]
-    return bool(said) and said[-1] == "window"
+    return {number: held for number, held in taken.items() if number in windows}
 
 
 def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, ...]]:
@@ -67,8 +51,6 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
         of a further device.
 
     """
-    from fieldcal.acceptance.assessment import verification_window
-
     session = Session.open(folder)
     tables = dict(session.about.raw)
     if "run" not in tables:
@@ -87,7 +69,7 @@ def open_for_resume(folder: Path) -> tuple[Session, dict[str, Any], tuple[int, .
         remedy = _remedy(folder, session)
         again = tuple(int(i) for i in remedy["again"])
         last = len(session.positions)
-        if remedy["positions"] and verification_window(marks, last) is not None:
+        if remedy["positions"] and last in taken_windows(marks):
             again += (last,)  # what verified goes behind the positions besides, anew
         tables["position"] = [
             *tables.get("position", ()),
@@ -114,9 +96,8 @@ def _remedy_positions(remedy: Mapping[str, Any], session: Session) -> list[Any]:
 
 def positions_left_out(session: Session) -> tuple[int, ...]:
     """Numbers of the positions without a valid window."""
-    marks = list(session.marks())
-    every = range(len(session.about.positions))
-    return tuple(i for i in every if not _window_stands(marks, i))
+    taken = taken_windows(session.marks())
+    return tuple(i for i in range(len(session.about.positions)) if i not in taken)
 
 
 def _planned_count(marks: Sequence[Mapping[str, Any]], session: Session) -> int:

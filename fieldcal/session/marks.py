@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,27 @@ def mark_line(mark: Mapping[str, Any]) -> str:
     """
     text = json.dumps(json_values(mark), allow_nan=False)
     return f'{text[:-1]}, "crc32": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def taken_windows(marks: Iterable[Mapping[str, Any]]) -> dict[int, tuple[float, float]]:
+    """Window of each position that has one which was not discarded, s of device time.
+
+    >>> window = {"event": "window", "position": 0, "start_s": 1, "end_s": 9}
+    >>> taken_windows([window])
+    {0: (1.0, 9.0)}
+    >>> taken_windows([window, {"event": "repeated", "position": 0}])
+    {}
+    """
+    taken: dict[int, tuple[float, float]] = {}
+    for mark in marks:
+        number = mark.get("position")
+        if not isinstance(number, int):
+            continue
+        if mark.get("event") == "window":
+            taken[number] = float(mark["start_s"]), float(mark["end_s"])
+        elif mark.get("event") == "repeated":
+            taken.pop(number, None)
+    return taken
 
 
 def read_marks(path: Path, says: list[str] | None = None) -> Iterator[dict[str, Any]]:

@@ -59,6 +59,20 @@ class Set:
         """Keys of its causes that the base state contains."""
         return frozenset(c.key for c, g in self.members if g.in_state)
 
+    @property
+    def has_unknown_cause(self) -> bool:
+        """Whether it contains a cause without physics."""
+        return any(cause.kind == "unknown" for cause, _ in self.members)
+
+
+def is_function(member: Member) -> bool:
+    """Whether a member is an unknown function of several columns.
+
+    The offset of a single window does not count: it cannot replace effects.
+    """
+    cause, group = member
+    return cause.kind == "unknown" and len(group.columns) > 1
+
 
 def variant_log_priors(cause: Cause, there: Iterable[Member]) -> Array:
     """Log prior probability of a cause, given others in the set.

@@ -11,7 +11,7 @@ import numpy as np
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import Cause, Group
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.sets import Set
+from fieldcal.model.evidence.sets import Set, is_function
 from fieldcal.model.evidence.sizing import LOG_DENSITY, Member, Sizes
 from fieldcal.model.search.offer import Offer, OfferTable
 from fieldcal.model.search.offers import MAX_LOG_DISTANCE, Offers
@@ -140,14 +140,14 @@ class Search(Offers):
         The set with the highest weight may contain an unknown function although sets of
         known effects are likelier together.
         """
-        if not has_unknown_cause(best):
+        if not best.has_unknown_cause:
             return best
         every = list(self.visited.values())
         score = np.array([self.corrected_score(one) for one in every])
         share = np.exp(score - np.logaddexp.reduce(score))
-        if share[[has_unknown_cause(one) for one in every]].sum() >= thresholds.NAMED:
+        if share[[one.has_unknown_cause for one in every]].sum() >= thresholds.NAMED:
             return best
-        known = (one for one in every if not has_unknown_cause(one))
+        known = (one for one in every if not one.has_unknown_cause)
         return max(known, key=self.corrected_score)
 
     @staticmethod
@@ -338,20 +338,6 @@ def _full_variant(cause: Cause, group: Group) -> Group:
     whole = cause.variants[0]
     part = not group.shape and set(group.params) < set(whole.params)
     return whole if part else group
-
-
-def is_function(member: Member) -> bool:
-    """Whether a member is an unknown function of several columns.
-
-    The offset of a single window does not count: it cannot replace effects.
-    """
-    cause, group = member
-    return cause.kind == "unknown" and len(group.columns) > 1
-
-
-def has_unknown_cause(one: Set) -> bool:
-    """Whether a set contains a cause without physics."""
-    return any(cause.kind == "unknown" for cause, _ in one.members)
 
 
 def _score(one: Set) -> float:

@@ -123,6 +123,7 @@ def test_drawings_of_positions_turn_the_axes_as_the_frames_say() -> None:
 
 
 @pytest.mark.usefixtures("drawn")
+@pytest.mark.thorough
 def test_the_screens_that_are_shown_are_those_of_a_run_that_ends_in_go() -> None:
     screens = import_module("drawn.screens").screens()
     said = {

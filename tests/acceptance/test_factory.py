@@ -99,6 +99,7 @@ def test_what_is_unknown_of_it_is_in_every_uncertainty(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.thorough
 def test_bent_accelerometers_are_in_every_uncertainty(seed: int) -> None:
     """Of devices with a curve the plain estimate is far off, this one not; by hand."""
     rng = np.random.default_rng(seed)

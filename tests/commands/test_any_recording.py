@@ -482,6 +482,7 @@ def test_gyroscopes_along_other_axes_are_named_and_mended(
         assert "mounting" not in [e["id"] for e in found["effects"]]
 
 
+@pytest.mark.thorough
 def test_gyroscopes_along_other_axes_than_the_ladder_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -68,6 +68,7 @@ def units(
 
 
 @pytest.mark.parametrize("i", UNITS)
+@pytest.mark.thorough
 def test_five_mpu9150_leave_no_more_than_the_peer_s_model(
     units: Callable[[int], Unit], i: int
 ) -> None:

@@ -37,6 +37,7 @@ def tilted(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
     )
 
 
+@pytest.mark.thorough
 def test_the_league_says_why_each_lost(tilted: Diagnosis) -> None:
     found = tilted
     tried = {c.id: c for c in found.candidates}

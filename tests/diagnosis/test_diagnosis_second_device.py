@@ -143,6 +143,7 @@ def test_rates_that_the_turns_show_are_known_to_the_windows(tmp_path: Path) -> N
     assert found.evidence["held_out_gain"] > 0.5
 
 
+@pytest.mark.thorough
 def test_a_drift_is_no_noise(tmp_path: Path) -> None:
     said = diagnosed(tmp_path / "s", NAVIGATION, drift)
     assert named(said) == ["bias_drift"]

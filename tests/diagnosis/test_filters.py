@@ -25,6 +25,7 @@ def told(found: Diagnosis, name: str) -> dict[str, tuple[float, float]]:
 @pytest.mark.parametrize(
     ("acc", "gyr"), [(TAU, TAU), pytest.param(TAU, 0.02, marks=pytest.mark.thorough)]
 )
+@pytest.mark.thorough
 def test_both_triads_behind_one_of_first_order(
     tmp_path: Path, acc: float, gyr: float
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from fieldcal.diagnosis.explain import explain
 from fieldcal.diagnosis.prepare import prepare_recording
@@ -19,6 +20,7 @@ SEED = 3
 """One of five with which a function of alpha is found first, in the place of both."""
 
 
+@pytest.mark.thorough
 def test_a_function_of_the_angle_does_not_stay_in_the_place_of_two_effects() -> None:
     """What y has of both looks like one function; x and z show the other parameters."""
     there = (

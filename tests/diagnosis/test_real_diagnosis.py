@@ -130,6 +130,7 @@ def test_the_bias_of_six_faces_is_the_peer_s(
         pytest.param("HIGHRES_IMU.0", [], marks=pytest.mark.thorough),
     ],
 )
+@pytest.mark.thorough
 def test_whole_milligravities_are_coarse_steps_and_no_bumps(
     message: str,
     left_out: list[str],

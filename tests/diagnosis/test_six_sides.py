@@ -56,6 +56,7 @@ SEEDS = [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in (1, 2, 3, 5, 
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.thorough
 def test_what_every_triad_has_is_named_and_nothing_in_its_place(
     tmp_path: Path, seed: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -60,6 +60,7 @@ def test_it_is_nothing_of_the_device() -> None:
     ("held", "last"),
     [pytest.param(WIDE, False, marks=pytest.mark.thorough), (FACES[::-1], True)],
 )
+@pytest.mark.thorough
 def test_a_calibration_on_a_base_that_is_knocked_is_right(
     held: list[tuple[float, float]],
     last: bool,

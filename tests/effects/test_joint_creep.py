@@ -170,6 +170,7 @@ def test_a_calibration_with_joints_that_creep_is_right(
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(30, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
 def test_its_numbers_are_as_uncertain_as_is_said(tmp_path: Path, count: int) -> None:
     pulls = []
     for seed in range(count):

@@ -148,6 +148,7 @@ def five(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.thorough
 def test_solve_takes_the_lot_from_the_store(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], five: Path
 ) -> None:

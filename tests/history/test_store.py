@@ -392,6 +392,7 @@ def running(folder: Path) -> Iterator[Server]:
             server.stop()
 
 
+@pytest.mark.thorough
 def test_postgresql_restarted_among_eight_writers_loses_nothing(tmp_path: Path) -> None:
     pytest.importorskip("psycopg")
     with running(tmp_path / "pg") as server:

@@ -44,7 +44,10 @@ def session(
     return out, Session.open(out)
 
 
-@pytest.mark.parametrize(("coupling", "scattered"), [(0.0, True), (0.01, False)])
+@pytest.mark.parametrize(
+    ("coupling", "scattered"),
+    [(0.0, True), pytest.param(0.01, False, marks=pytest.mark.thorough)],
+)
 def test_means_are_a_session_like_any_other(
     coupling: float, scattered: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

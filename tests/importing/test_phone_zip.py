@@ -121,7 +121,9 @@ def in_turn(rows: Array) -> str:
     return "\n".join(["t,ax,ay,az,gx,gy,gz", *whole]) + "\n"
 
 
-@pytest.mark.parametrize("stamp", ["0.5", "", "9999"])
+@pytest.mark.parametrize(
+    "stamp", ["0.5", "", pytest.param("9999", marks=pytest.mark.thorough)]
+)
 @pytest.mark.parametrize("way", ["zip", "join", "in turn"])
 def test_a_wrong_time_of_the_gyroscope_costs_its_own_sample_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str, stamp: str

@@ -86,6 +86,7 @@ def test_processes_that_are_there_are_named_and_no_others() -> None:
         assert np.mean(named) >= 0.7, [row[pair] for row in seen]
 
 
+@pytest.mark.thorough
 def test_a_slow_process_has_its_correlation_time() -> None:
     values = noise(np.random.default_rng(7), 60_000, DT, 6, N=1.0, s=1.0, T=20.0)
     found = estimate_noise([reduce_recording([recording(values, DT)])]).channels
@@ -165,6 +166,7 @@ def test_a_noisy_thermometer_does_not_make_a_coefficient_smaller() -> None:
     assert np.mean([value for value, _ in seen]) == pytest.approx(0.2, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_what_scatters_more_than_its_processes_is_known_less_well() -> None:
     """Noise that swells and ebbs: neighbouring coefficients are not independent."""
     rng = np.random.default_rng(27)
@@ -177,6 +179,7 @@ def test_what_scatters_more_than_its_processes_is_known_less_well() -> None:
     assert 1.3 < np.mean([c.dispersion for c in found]) < 2.4
 
 
+@pytest.mark.thorough
 def test_noise_that_a_device_makes_quickly_is_white_to_a_second() -> None:
     """N^2 + 2 s^2 T of a Gauss-Markov process of a twentieth of a second."""
     values = noise(np.random.default_rng(28), 60_000, 0.01, 6, N=0.3, s=3.0, T=0.05)
@@ -197,6 +200,7 @@ def test_a_ramp_is_no_walk() -> None:
         assert "K" not in channel.processes
 
 
+@pytest.mark.thorough
 def test_a_filter_in_the_device_does_not_make_white_noise_smaller() -> None:
     rng = np.random.default_rng(12)
     dt = 0.005

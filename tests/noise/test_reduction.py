@@ -56,7 +56,16 @@ def test_it_does_not_matter_where_blocks_are_cut(first: int, shape: Array) -> No
             np.testing.assert_array_equal(a.squares, b.squares)
 
 
-@pytest.mark.parametrize("first", [0, 2000, *range(PIECE - 400, PIECE + 60, 57)])
+@pytest.mark.parametrize(
+    "first",
+    [
+        *(0, PIECE - 115, PIECE - 1),
+        *(
+            pytest.param(first, marks=pytest.mark.thorough)
+            for first in (2000, *range(PIECE - 400, PIECE + 60, 57))
+        ),
+    ],
+)
 def test_a_push_anywhere_is_no_noise(first: int) -> None:
     """A part of it in the noise would be a random walk."""
     told = estimate_noise([in_blocks(pushed(first, half_sine(200)), 1000)])

@@ -158,6 +158,7 @@ class Fickle(Hand):
         return cast(Wish, self.left.pop(0)[1]) if now == self.left[0][0] else None
 
 
+@pytest.mark.thorough
 def test_what_was_discarded_is_not_judged_any_more(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -138,6 +138,7 @@ def burn(_: object, folder: Path) -> Path:
         pass
 
 
+@pytest.mark.thorough
 def test_a_job_beyond_its_processor_time_says_so_and_is_not_tried_again(
     tmp_path: Path,
 ) -> None:

@@ -135,6 +135,7 @@ def test_the_print_is_for_two_angles() -> None:
         solve(seen, as_printed=True)
 
 
+@pytest.mark.thorough
 def test_a_recorded_session_goes_to_a_verdict(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

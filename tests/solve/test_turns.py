@@ -271,6 +271,7 @@ def test_gyroscopes_that_turn_the_other_way_are_said_to(
     assert len([w for w in found.warnings if sentence in w]) == 1 and not found.good
 
 
+@pytest.mark.thorough
 def test_a_turn_with_samples_missing_is_left_out(tmp_path: Path) -> None:
     block, windows = record(4, many_ways(6, 6), ANYHOW)
     middle = (windows[0][1] + windows[1][0]) / 2
@@ -408,6 +409,7 @@ def test_solve_leaves_the_turns_out_when_told_to(practised: Practise) -> None:
     assert any("gyr_scale is not determined" in w for w in result.warnings)
 
 
+@pytest.mark.thorough
 def test_compare_and_apply(
     practised: Practise, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

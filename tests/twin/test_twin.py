@@ -130,6 +130,7 @@ def test_windows_that_were_calm_are_calm_in_the_replay(
     assert all(p["twin"]["rms_acceleration"] < 0.02 for p in calm)
 
 
+@pytest.mark.thorough
 def test_the_device_file_has_the_device_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -371,6 +372,7 @@ def test_temperature_and_warm_up_go_into_the_twin(
     assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
 
 
+@pytest.mark.thorough
 def test_the_console_shows_the_replay_and_where_the_files_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -46,6 +46,7 @@ def in_gusts(seed: int, off: Array | None = None) -> PiecedWindow:
     return pieces
 
 
+@pytest.mark.thorough
 def test_pieces_add_up_and_the_error_of_their_mean_holds() -> None:
     pulls = []
     for seed in range(8):

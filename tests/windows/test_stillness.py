@@ -82,6 +82,7 @@ def test_a_turn_is_seen_and_rest_a_second_after_it(
 
 
 @pytest.mark.statistical
+@pytest.mark.thorough
 def test_rest_is_known_from_the_first_second_and_holds() -> None:
     moving = 0
     for seed in range(20):

@@ -54,6 +54,7 @@ def _having(name: str, seed: int) -> Session:
     return session.having({name: values})
 
 
+@pytest.mark.thorough
 def test_the_earth_s_upright_rate_is_no_g_sensitivity() -> None:
     """Where orientations are not known it follows the force, and is the Earth's."""
     draw, _ = kinds()["cross_coupling"]

@@ -46,6 +46,7 @@ def test_three_effects_are_found_of_which_none_is_seen_alone(seed: int) -> None:
     assert found.posterior.probability_of_noise_alone < 1e-6
 
 
+@pytest.mark.thorough
 def test_the_state_stays_where_the_set_does() -> None:
     """Another step about rows of turns that are linearised there is a small one."""
     inferred = explained(88_000_036).inferred

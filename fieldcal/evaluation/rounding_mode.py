@@ -1,4 +1,4 @@
-"""How a device rounds if this is not stated, and the dead band that it has.
+"""How a device rounds if this is not stated.
 
 Values on a grid of steps q are right on average where they are rounded to the nearest;
 cut toward zero, as a conversion to integers does, they are q / 2 too small in size;
@@ -12,9 +12,6 @@ zero for n0 samples and on its neighbours for n1 in the mean, and
 over all passes of all outputs, where S is how unsteadily a turn passes. The device has
 one firmware, so it is one mode for all.
 
-A dead band sets what is smaller than d to zero, d > q: the output is zero often, and
-has no other value below d. A mean of less than 2 d is off by d / sqrt(3) or less.
-
 The error of values rounded down is added to the variance of the biases. That of values
 cut toward zero depends on the signs of the means, and is in the model
 (`solve.parameter_set`).
@@ -23,7 +20,7 @@ cut toward zero depends on the signs of the means, and is in the model
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +42,7 @@ MAX_DWELL_RATIO = 2.0
 at zero or beside it does not pass it."""
 
 PASSED = 2
-"""Fewest samples of each neighbour in a pass, and fewest zeros of a dead band."""
+"""Fewest samples of each neighbour in a pass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +53,11 @@ class RoundingMode:
     ----------
     step : (3,) m/s^2; 0 if there is none, or if its rounding is known
     cut_probability : probability that values were cut toward zero
-    dead_band : (3,) m/s^2, size below which values are zero; 0 if there is none
 
     """
 
     step: Array
     cut_probability: float
-    dead_band: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def cut_sigma(self) -> Array:
@@ -80,11 +75,8 @@ class RoundingMode:
     def variance_near_zero(self, mean: Array) -> Array:
         """Added variance of means near zero, where values become zero, (n, 3)."""
         size = np.abs(np.nan_to_num(mean))
-        cut = np.where(
+        out: Array = np.where(
             size < self.step / 2, self.cut_probability * self.step**2 / 3, 0.0
-        )
-        out: Array = cut + np.where(
-            size < 2 * self.dead_band, self.dead_band**2 / 3, 0.0
         )
         return out
 
@@ -102,22 +94,7 @@ def rounding_mode(session: Session, grain: Grain) -> RoundingMode:
             np.rint(values[np.isfinite(values)] / q).astype(np.intp)
         )
     ]
-    least = np.maximum(seen, grain.step[:3])
-    return RoundingMode(step, cut_probability(shown), dead_bands(acc, least))
-
-
-def dead_bands(acc: Array, step: Array) -> Array:
-    """Smallest nonzero size of each output with a dead band; 0 for the others, (3,).
-
-    Samples that are zero on all axes were lost, and are ignored.
-    """
-    some = np.isfinite(acc).all(axis=1) & (acc != 0).any(axis=1)
-    size = np.abs(acc[some])
-    zeros = np.count_nonzero(size == 0, axis=0)
-    least = np.where(size > 0, size, np.inf).min(axis=0, initial=np.inf)
-    there = (zeros >= PASSED) & np.isfinite(least) & (least > 1.5 * step)
-    out: Array = np.where(there, least, 0.0)
-    return out
+    return RoundingMode(step, cut_probability(shown))
 
 
 def with_rounding_uncertainty(found: Calibration, mode: RoundingMode) -> Calibration:

@@ -49,6 +49,7 @@ from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.explanations import WeightedExplanation
 from fieldcal.solve.rows import mean_variances, with_window_variances
+from fieldcal.windows.dead_band import dead_band_messages
 
 UseTurns = Literal["auto", "yes", "no"]
 
@@ -124,11 +125,11 @@ class PreparedSession:
         return explain(self.reduced_recording, self.previous)
 
     @property
-    def unexamined_warnings(self) -> list[str]:
-        """Warning if only the means of the windows could be used."""
+    def sample_warnings(self) -> list[str]:
+        """Warnings of what samples hide, or that only the windows' means are used."""
         why = self.examination[1]
         if not why:
-            return []
+            return list(dead_band_messages(self.session.block, self.observations.mean))
         return [
             f"only the windows' means are used, neither samples nor turns nor [model],"
             f" since the recording cannot be examined: {why}"
@@ -223,7 +224,7 @@ def solve_prepared(
         )
     calibration = with_tilt_shown(calibration, prepared.observations, recorded, options)
     calibration = _with_warnings(
-        calibration, prepared, turns, [*notes, *prepared.unexamined_warnings]
+        calibration, prepared, turns, [*notes, *prepared.sample_warnings]
     )
     calibration = with_rounding_uncertainty(calibration, prepared.rounding)
     if options["angle_sigma_deg"] > stated:

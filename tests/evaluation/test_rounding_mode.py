@@ -76,27 +76,6 @@ def test_a_mean_of_zeros_may_be_anything_up_to_a_step() -> None:
     assert variance[0, 1] == 0.0
 
 
-def test_a_dead_band_hides_what_a_mean_near_zero_is() -> None:
-    """Some of it also where only a part of the samples is in the band."""
-    rng, smooth = np.random.default_rng(3), swung(3)
-    acc = np.where(np.abs(smooth) < STEP, 0.0, smooth)
-    found = rounding_mode(session(acc), Grain())
-    np.testing.assert_allclose(found.dead_band, STEP, rtol=0.02)
-    true = np.linspace(-3 * STEP, 3 * STEP, 61)
-    samples = true[:, None] + rng.normal(0, 0.3 * STEP, (61, 4000))
-    mean = np.where(np.abs(samples) < STEP, 0.0, samples).mean(axis=1)
-    sigma = np.sqrt(found.variance_near_zero(np.repeat(mean[:, None], 3, axis=1))[:, 0])
-    assert (np.abs(mean - true) < 2 * sigma + 0.01 * STEP).all()
-    assert not sigma[[0, -1]].any() and sigma[30] == pytest.approx(STEP / 3**0.5, 0.03)
-
-
-def test_what_is_zero_for_another_reason_is_no_dead_band() -> None:
-    lost = swung(4)
-    lost[100:120] = 0.0
-    for acc in (swung(4), lost, np.round(swung(4) / STEP) * STEP):
-        assert not rounding_mode(session(acc), Grain()).dead_band.any()
-
-
 def test_a_device_that_comes_to_rest_does_not_pass() -> None:
     through = [-3, -1, -1, 0, 0, 0, 0, 1, 1, 3]
     assert list(zero_crossings(np.array(through))) == [(4, 2.0)]

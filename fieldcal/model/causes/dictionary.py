@@ -255,7 +255,7 @@ class Dictionary(ColumnTable):
             yield Group("earth anyhow", "gyr", at + np.arange(4), size, fixed_size=1.0)
 
     def _shared_rounding(self, sizes: Array | None) -> Iterator[Group]:
-        """Group of the rounding errors that all windows share.
+        """Group of the errors of rounding and of dead bands that all windows share.
 
         They act while an output keeps its value; where outputs change they average out.
         """
@@ -265,7 +265,7 @@ class Dictionary(ColumnTable):
             "rounding", lambda v: np.ones((len(v.x.t), 1)), 1, while_output_stands=True
         )
         at = self.add(even, 6)
-        yield Group("rounding", "", at + some, sizes[some], fixed_size=1.0, random=True)
+        yield Group("rounding", "", at + some, sizes[some], fixed_size=1.0)
 
     def _is_unoriented(self, p: int) -> bool:
         """Whether the direction of a position's force, or of its rate, is not known."""

@@ -33,6 +33,7 @@ from fieldcal.physics.experience import Experience
 from fieldcal.physics.joint_turns import JointTurns
 from fieldcal.session.description import Description
 from fieldcal.session.site_gravity import gravity_sigma
+from fieldcal.windows.dead_band import dead_bands, error_of_means
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +178,10 @@ def reduce_to_rows(
     rounded = rounding_sigma(block, windows[held])
     alike = shared_rounding_sigma(block, windows[held], rounded)
     off = np.repeat(rounded, rows, axis=0)
+    # what a band hides of a gyroscope at rest is the same in each window
+    hidden = error_of_means(out.y, dead_bands(block))
+    off[:, :3] = np.hypot(off[:, :3], hidden[:, :3])
+    alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
     if source.sway_variance is not None:
         off = np.hypot(off, np.sqrt(source.sway_variance[out.x.position]))
     # the direction of the Earth's rate is unknown in device axes, except in a device

@@ -13,6 +13,9 @@ with c = 1 where the rate turns back. Where it crosses the step, going on, it is
 as much to one side as to the other, but for what it becomes faster or slower: then its
 mean error is q / 12 (n / k - n / m), so c is the square of that bracket over 12. It is
 less as far as noise reaches across a step ((2) of `windows.rounding`).
+
+An output with a dead band (`windows.dead_band`) is off by what the windows are off by
+as long as it is near the band.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block, Index
 from fieldcal.model.rows.noise import quantisation_steps, rounding_sigma
+from fieldcal.windows.dead_band import dead_bands
 
 MAX_STEP_PART = 0.99
 """Part of a step: a mean between two values is less than one from both."""
@@ -31,11 +35,12 @@ MAX_STEP_PART = 0.99
 
 @dataclass(frozen=True, slots=True)
 class StandingOutputs:
-    """Rounded values that the gyroscopes keep in the windows.
+    """Values that the gyroscopes keep in the windows, rounded or in a dead band.
 
     Attributes
     ----------
-    value, step : (3,) rad/s; the step is 0 if noise exceeds it
+    value, step : (3,) rad/s; outputs nearer than a step are those of the windows; the
+        step is 0 if noise exceeds it
     variance : (3,) of the error of a constant output, (rad/s)^2
 
     """
@@ -101,13 +106,18 @@ def _run_factor(value: Array, length: Array) -> Array:
 def find_standing_outputs(
     block: Block, windows: NDArray[np.intp], alike: Array
 ) -> StandingOutputs | None:
-    """Rounded values of gyroscopes in windows; None if no output keeps its value.
+    """Values of gyroscopes in windows; None if no output keeps its value.
 
-    `alike` (3,) rad/s is the part of the rounding errors that all windows share.
+    `alike` (3,) rad/s is the part of the errors that all windows share.
     """
     if not alike.any() or not len(windows):
         return None
     means = [block.gyr[a:b].mean(axis=0) for a, b in windows.tolist() if b > a]
     step = np.where(alike > 0, quantisation_steps(block, windows)[1], 0.0)
     variance = np.mean(rounding_sigma(block, windows)[:, 3:] ** 2, axis=0)
-    return StandingOutputs(np.nanmedian(means, axis=0), step, variance)
+    band = np.where(alike > 0, dead_bands(block)[3:], 0.0)
+    return StandingOutputs(
+        np.where(band > 0, 0.0, np.nanmedian(means, axis=0)),
+        np.where(band > 0, 2 * band, step),
+        np.where(band > 0, 0.0, variance),
+    )

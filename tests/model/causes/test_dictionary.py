@@ -469,7 +469,7 @@ def test_what_rounding_has_in_common_is_in_all_windows_and_in_no_turn() -> None:
         UNIT, True, Wander.none(), size,
     )  # fmt: skip
     (group,) = [g for g in d.always if g.cause == "rounding"]
-    assert group.random and group.fixed_size == 1.0
+    assert not group.random and group.fixed_size == 1.0
     np.testing.assert_array_equal(group.prior_sigma(1.0), [2e-3, 5e-4])
     flat = rows_of(x, np.hstack([x.f, x.w]))
     for part in WindowSystem(flat, d).linearised(nominal()):

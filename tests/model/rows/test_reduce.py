@@ -152,6 +152,24 @@ def test_coarse_outputs_may_be_off_all_through_a_window() -> None:
     assert (rows.window_error[:, 1:] < 1e-6).all()
 
 
+def test_what_a_dead_band_hides_of_gyroscopes_is_the_same_at_every_rest() -> None:
+    """Of accelerometers it is something else in every position."""
+    block, band = samples(30.0), 4e-3
+    acc, gyr = block.acc.copy(), block.gyr.copy()
+    turning = block.t > 15.0
+    acc[:, 0], gyr[:, 2] = acc[:, 0] % 0.05, band / 2
+    acc[turning, 0] += 1.0
+    gyr[turning, 2] = np.linspace(0.5, 5.0, turning.sum()) * band
+    acc[:, 0] = np.where(acc[:, 0] < 0.04, 0.0, acc[:, 0])
+    gyr[:, 2] = np.where(gyr[:, 2] < band, 0.0, gyr[:, 2])
+    held = place(2.0, 8.0), place(9.0, 14.0)
+    rows = reduce_to_rows(source(replace(block, acc=acc, gyr=gyr), about(*held)))
+    assert rows.session_error[5] == pytest.approx(band / 3**0.5, rel=0.1)
+    assert not rows.session_error[:5].any()
+    np.testing.assert_allclose(rows.window_error[:, 0], 0.04 / 3**0.5, rtol=0.1)
+    assert (rows.window_error[:, 1:] < 1e-5).all()
+
+
 def test_averages_between_any_bounds() -> None:
     block = samples(10.0)
     one = source(block, about(place(2.0, 5.0), place(6.0, 12.0)))

@@ -117,3 +117,25 @@ def test_what_windows_do_not_share_is_not_met_again(
     assert found.share(gyr, np.arange(0, 40, 2)).any(axis=0).tolist() == [
         False, True, False,
     ]  # fmt: skip
+
+
+def test_a_dead_band_hides_on_the_way_what_it_hides_at_rest() -> None:
+    """The outputs of a turn that begins and ends slowly, against those of no band."""
+    rng, band = np.random.default_rng(8), 0.03
+    t, n, bias = np.arange(2000) / RATE, 2000, band * np.array([0.5, -0.7, 0.3])
+    w = np.zeros((n, 3))
+    w[800:1200, 0] = 2 * np.sin(np.linspace(0, np.pi, 400)) ** 2
+    plain = w * SCALE + bias + 0.3 * band * rng.standard_normal((n, 3))
+    gyr = np.where(np.abs(plain) < band, 0.0, plain)
+    windows = np.array([[0, 700], [1300, 2000]], dtype=np.intp)
+    acc = rng.normal(9.8, 0.01, (n, 3))
+    found = find_standing_outputs(Block.of(t, acc, gyr), windows, np.full(3, band))
+    assert found is not None and not found.variance.any()
+    on, edge = slice(700, 1300), np.arange(0, 600, EACH)
+    share = found.share(gyr[on], edge)
+    off = (gyr - plain)[windows[0, 0] : windows[0, 1]].mean(axis=0)
+    hidden = (gyr - plain)[on].mean(axis=0)
+    np.testing.assert_allclose(share.mean(axis=0) * off, hidden, atol=0.05 * band)
+    assert (np.abs(hidden) > 0.1 * band).all() and share[150:200, 0].max() < 0.1
+    same = np.tile(np.eye(3), (len(edge), 1, 1))
+    assert not found.closure_covariance(t[on], gyr[on], SCALE, edge, same).any()

@@ -1,0 +1,77 @@
+"""Dead bands: outputs that the device sets to zero as long as they are small.
+
+An output of a triad has a dead band d if it is zero often, has no other value below d,
+and has values right beyond d. The last part tells a band from a grid, whose second step
+is at 2 d. A mean of less than 2 d is off by d / sqrt(3) or less, whatever part of its
+samples was set to zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Array, Block
+from fieldcal.core.sentences import join_words
+
+MIN_SAMPLES = 2
+"""Fewest zeros of a dead band, and fewest values right beyond it."""
+
+BEYOND = (1.1, 1.9)
+"""Where values right beyond a band lie, in units of d: a grid of step d has none, even
+if its values are rounded a little."""
+
+
+def dead_bands(block: Block) -> Array:
+    """Size below which each output is zero, (6,) m/s^2 and rad/s; 0 without a band.
+
+    Samples that are zero on all axes of a sensor were lost, and are ignored.
+
+    >>> swings = np.sin(np.arange(200.0))[:, None] * [1.0, 2.0, 3.0]
+    >>> held = np.where(np.abs(swings) < 0.2, 0.0, swings)
+    >>> block = Block.of(np.arange(200.0), swings, held)
+    >>> dead_bands(block).round(1).tolist()
+    [0.0, 0.0, 0.0, 0.2, 0.2, 0.2]
+    """
+    return np.concatenate([_bands(block.acc), _bands(block.gyr)])
+
+
+def _bands(triad: Array) -> Array:
+    some = np.isfinite(triad).all(axis=1) & (triad != 0).any(axis=1)
+    size = np.abs(triad[some])
+    least = np.where(size > 0, size, np.inf).min(axis=0, initial=np.inf)
+    first, last = (factor * least for factor in BEYOND)
+    zeros = np.count_nonzero(size == 0, axis=0)
+    beyond = np.count_nonzero((size > first) & (size < last), axis=0)
+    there = (zeros >= MIN_SAMPLES) & (beyond >= MIN_SAMPLES)
+    out: Array = np.where(there & np.isfinite(least), least, 0.0)
+    return out
+
+
+def error_of_means(mean: Array, band: Array) -> Array:
+    """Standard deviation of means (n, c) whose samples may be in the bands (c,).
+
+    >>> error_of_means(np.array([[0.0], [0.3], [0.5]]), np.array([0.2])).round(3)
+    array([[0.115],
+           [0.115],
+           [0.   ]])
+    """
+    near = np.abs(np.nan_to_num(mean)) < 2 * band
+    out: Array = np.where(near, band / np.sqrt(3), 0.0)
+    return out
+
+
+def dead_band_messages(block: Block, means: Array) -> Iterator[str]:
+    """Sentences about the bands that hide what windows measured; `means` are (n, 6)."""
+    band = dead_bands(block)
+    hidden: NDArray[np.bool_] = np.any(error_of_means(means, band) > 0, axis=0)
+    for some, unit in ((ACC, "m/s²"), (GYR, "rad/s")):
+        names = [n for n, h in zip(CHANNELS[some], hidden[some], strict=True) if h]
+        if names:
+            yield (
+                f"{join_words(names)} {'is' if len(names) == 1 else 'are'} zero where"
+                f" less than {band[some].max():.2g} {unit} is measured (a dead band):"
+                " what that hides is in the uncertainties; switch it off in the device"
+            )

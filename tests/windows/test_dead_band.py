@@ -1,0 +1,66 @@
+"""Outputs that the device sets to zero as long as they are small."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldcal.core.samples import Array, Block
+from fieldcal.windows.dead_band import dead_bands, error_of_means
+
+BAND = 0.05
+
+
+def swung(seed: int) -> Array:
+    """Three axes that swing through zero at different speeds, with some noise."""
+    t, rng = np.arange(0, 60, 0.01), np.random.default_rng(seed)
+    swing = [np.sin(2 * np.pi * t / p + rng.uniform(0, 6)) for p in (9.0, 13.0, 17.0)]
+    out: Array = 2 * np.column_stack(swing) + rng.normal(0, BAND / 10, (len(t), 3))
+    return out
+
+
+def banded(values: Array) -> Array:
+    return np.where(np.abs(values) < BAND, 0.0, values)
+
+
+def of_triads(acc: Array, gyr: Array) -> Array:
+    return dead_bands(Block.of(np.arange(len(acc)) / 100.0, acc, gyr))
+
+
+def test_each_output_has_its_own() -> None:
+    acc, gyr = swung(3), swung(4)
+    gyr[:, 1] = banded(gyr[:, 1])
+    np.testing.assert_allclose(
+        of_triads(banded(acc), gyr), [*[BAND] * 3, 0, BAND, 0], rtol=0.02
+    )
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.4, 0.9, 1.3])
+def test_gyroscopes_that_only_rest_and_turn_once_show_it(bias: float) -> None:
+    """Also those whose noise reaches beyond it only now and then."""
+    rng = np.random.default_rng(6)
+    gyr = BAND * (bias + 0.4 * rng.standard_normal((3000, 3)))
+    gyr[1500:1600] += 0.7 * np.sin(np.linspace(0, np.pi, 100))[:, None]
+    found = of_triads(swung(1), banded(gyr))[3:]
+    np.testing.assert_allclose(found, BAND, rtol=0.05)
+
+
+def test_a_mean_is_as_uncertain_as_what_the_band_takes_from_it() -> None:
+    """Also where only a part of the samples is in the band."""
+    rng = np.random.default_rng(3)
+    true = np.linspace(-3 * BAND, 3 * BAND, 61)
+    samples = true[:, None] + rng.normal(0, 0.3 * BAND, (61, 4000))
+    mean = banded(samples).mean(axis=1)
+    sigma = error_of_means(mean[:, None], np.array([BAND]))[:, 0]
+    assert (np.abs(mean - true) < 2 * sigma + 0.01 * BAND).all()
+    assert not sigma[[0, -1]].any() and sigma[30] == pytest.approx(BAND / 3**0.5)
+
+
+def test_what_is_zero_for_another_reason_is_no_dead_band() -> None:
+    lost, smooth = swung(4), swung(5)
+    lost[100:120] = 0.0
+    coarse = np.round(smooth / BAND) * BAND
+    told = np.round(coarse, 3)  # a grid as a text of few digits has it
+    sparse = np.where(np.arange(len(smooth))[:, None] % 7, coarse, np.nan)
+    for some in (smooth, lost, coarse, told, sparse, np.zeros_like(smooth)):
+        assert not of_triads(some, some).any()

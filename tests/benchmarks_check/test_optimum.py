@@ -13,6 +13,7 @@ from fieldcal.diagnosis.prepare import prepare_recording
 SEED = 77_000_001
 
 
+@pytest.mark.thorough
 def test_most_positions_are_laid_by_hand_at_whole_five_degrees() -> None:
     by_hand = 0
     for seed in range(SEED, SEED + 12):

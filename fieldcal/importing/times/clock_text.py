@@ -1,5 +1,6 @@
 """Times that a text writes as a clock does: ``2024-05-03T23:59:50.123Z``, ``23:59:50``.
 
+The date may lack its signs, as in the basic format: ``20240503T235950.123Z``.
 Dates may stand before the time of day, in any usual order, or in a column of their own;
 AM and PM, decimal commas and zones are understood, and spreadsheets' ``59:50.1``
 (minutes and seconds) as well. Times count in seconds from the first midnight, or the
@@ -28,6 +29,11 @@ _LATE_YEAR = re.compile(
 )
 """What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
 
+_BASIC = re.compile(
+    r"(\d{4})(0[1-9]|1[0-2])([0-3]\d)T([0-2]\d)([0-5]\d)([0-6]\d(?:[.,]\d+)?)(\D.*)?"
+)
+"""Basic format of ISO 8601, which leaves the signs out: ``20260314T101530.250Z``."""
+
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
 _DAY = re.compile(_DATE)
 _ZONE_BEFORE_NUMBERS = (
@@ -48,7 +54,7 @@ def is_clock(cell: str) -> bool:
     >>> [is_clock(c) for c in ("23:59:50.123", "05/03/2024 11:59 PM", "1.5", "59:50.1")]
     [True, False, False, True]
     """
-    cell = _date_first(cell)
+    cell = _usual_form(cell)
     return bool(_CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell))
 
 
@@ -57,8 +63,11 @@ def is_date(cell: str) -> bool:
     return _DAY.fullmatch(cell.strip()) is not None
 
 
-def _date_first(text: str) -> str:
-    """A time with its date before it, where the year stands behind."""
+def _usual_form(text: str) -> str:
+    """A time with its date before it, where the year stands behind; with its signs."""
+    if (basic := _BASIC.fullmatch(text.strip())) is not None:
+        year, month, day, hour, minute, second, zone = basic.groups("")
+        return f"{year}-{month}-{day}T{hour}:{minute}:{second}{zone}"
     said = _LATE_YEAR.fullmatch(text.strip())
     if said is None:
         return text.strip()
@@ -88,7 +97,7 @@ class ClockText:
         day : the date, where it has a column of its own
 
         """
-        said = _CLOCK.fullmatch(_date_first(text))
+        said = _CLOCK.fullmatch(_usual_form(text))
         if said is None:
             return self._of_minutes(text)
         h, half = int(said["h"]), (said["half"] or "").lower()

@@ -63,13 +63,21 @@ def has_time(names: Iterable[str]) -> bool:
     return any(name.partition("=")[0] in ("t", "dt") for name in names)
 
 
+THERMOMETER = ("t", "temperature")
+"""Columns of a file of a thermometer alone, to be joined with that of an IMU."""
+
+
 def column_placeholders(many: int) -> str:
     """Example of the columns option for a file with `many` columns.
 
-    >>> column_placeholders(3), column_placeholders(9), column_placeholders(54)
-    ('ax,ay,az', 't,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
+    >>> column_placeholders(2), column_placeholders(3)
+    ('t,temperature', 'ax,ay,az')
+    >>> column_placeholders(9), column_placeholders(54)
+    ('t,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
     """
     usual = ["t", *CHANNELS]
+    if many == len(THERMOMETER):
+        return ",".join(THERMOMETER)
     if many in (len("xyz"), len(CHANNELS)):
         return ",".join(CHANNELS[:many])
     if len("xyz") < many < len(usual):

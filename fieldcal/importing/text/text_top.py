@@ -31,6 +31,9 @@ LATEST = 50
 AXES = 3
 """Fewest columns by which the width of a table is told."""
 
+FEWEST = 2
+"""Fewest columns that names are looked for of: a time and a thermometer."""
+
 FULL = 50
 """Lines at the top by which the width of a row is judged."""
 
@@ -137,7 +140,7 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
         for line in tops
     ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
-    return [one for one in found if len(one.columns) > 2]
+    return [one for one in found if len(one.columns) >= FEWEST]
 
 
 def _all_words(line: str) -> bool:

@@ -246,7 +246,8 @@ def test_two_columns_of_an_axis_leave_a_choice() -> None:
 @pytest.mark.parametrize(
     ("name", "unit"),
     [("imu_degC", "degC"), ("temp (C)", "degC"), ("°C", "degC"), ("T_K", "K"),
-     ("die [°C]", "degC"), ("mpu.celsius", "degC"), ("temp_F", ""),
+     ("die [°C]", "degC"), ("mpu.celsius", "degC"), ("temp_F", "degF"),
+     ("temp (F)", "degF"),
      ("Temperature (°F)", "degF"), ("T [K]", "K"), ("sensor degF", "degF")],
 )  # fmt: skip
 def test_a_thermometer_that_only_its_unit_names_is_taken(name: str, unit: str) -> None:
@@ -256,7 +257,17 @@ def test_a_thermometer_that_only_its_unit_names_is_taken(name: str, unit: str) -
 
 
 @pytest.mark.parametrize(
-    "name", ["roll (°)", "heading [°]", "quat_c", "step_k", "mag_x (K)", "x (°C)", "C"]
+    "name",
+    [
+        "roll (°)",
+        "heading [°]",
+        "quat_c",
+        "step_k",
+        "mag_x (K)",
+        "roll_F",
+        "x (°C)",
+        "C",
+    ],
 )
 def test_what_may_be_something_else_is_no_thermometer(name: str) -> None:
     (found,) = match_headings([Column("", n) for n in (*BARE, name)], "_")
@@ -295,3 +306,12 @@ def test_the_clock_that_nobody_sets_is_the_time(swapped: bool) -> None:
     (found,) = match_headings([Column("", n) for n in (*clocks, *BARE[1:])], "_")
     assert found.columns[:2] == (("t", "_") if swapped else ("_", "t"))
     assert found.units["t"] == "ns"
+
+
+def test_an_array_with_a_unit_is_three_axes() -> None:
+    """As blackbox_decode writes it, behind a count of rows."""
+    names = ["loopIteration", " time (us)", *(f" gyroADC[{i}] (deg/s)" for i in "012"),
+             *(f" accSmooth[{i}] (g)" for i in "012")]  # fmt: skip
+    (found,) = match_headings([Column("", name) for name in names], "_")
+    assert found.columns == ("_", "t", "gx", "gy", "gz", "ax", "ay", "az")
+    assert found.units == {"t": "us", "g": "deg/s", "a": "g"}

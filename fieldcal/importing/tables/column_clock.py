@@ -155,7 +155,8 @@ class ColumnClock:
         if not 0 <= i < table.shape[1]:
             return wanted
         # of rows that were written several times, each counts once
-        table = table[distinct_rows(table[:, [*at.values()]], table[:, i])]
+        used = [j for j in at.values() if j < table.shape[1]]
+        table = table[distinct_rows(table[:, used], table[:, i])]
         t = table[:, i]
         if (value := constant_value(t)) is not None:
             raise InputError(

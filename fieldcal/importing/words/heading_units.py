@@ -37,8 +37,8 @@ SPELLINGS = {
 }  # fmt: skip
 """How each unit is written."""
 
-KELVIN = "K"
-"""Only as a capital letter: a small one counts rows or steps."""
+CAPITALS = {"K": "K", "F": "deg F"}
+"""Units only as capital letters: small ones count steps, or say what is filtered."""
 
 TEMPERATURES = {"deg C": "degC", "K": "K", "deg F": "degF"}
 """Units of temperatures, and what ``--temp-unit`` calls them."""
@@ -81,8 +81,8 @@ def parse_unit(text: str) -> str | None:
     # of "(m/(s^2))" the outer brackets, of "m/(s^2)" none
     while bare.lower() not in _WRITTEN and bare[:1] + bare[-1:] in ("()", "[]"):
         bare = bare[1:-1].strip()
-    if bare == KELVIN:
-        return KELVIN
+    if bare in CAPITALS:
+        return CAPITALS[bare]
     bare = bare.lower().replace("/per/", "/").replace(" per ", "/")
     return _WRITTEN.get(bare) or _WRITTEN.get(bare.strip("[]() "))
 

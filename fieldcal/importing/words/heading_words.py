@@ -107,7 +107,9 @@ _BARE = re.compile("[\u0300-\u036f]")
 """Accents, once they are apart from their letters."""
 
 _INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
-"""Axes of an array: ``gyro_rad[0]``, or ``gyro_rad.00`` as PlotJuggler writes it."""
+_INDEX_IN_UNIT = re.compile(r"(.+)\[([012])\]\s*\((.*)\)")
+"""Axes of an array: ``gyro_rad[0]``, ``gyroADC[0] (deg/s)``, or ``gyro_rad.00`` as
+PlotJuggler writes it."""
 
 
 class HeadingMeaning(NamedTuple):
@@ -188,6 +190,9 @@ def _kind_of(unit: str | None) -> str:
 
 def _name_unit_splits(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
     """Possible splits of a text into a name and its unit."""
+    if (one := _INDEX_IN_UNIT.fullmatch(name)) is not None:
+        yield f"{one.group(1)}_{'xyz'[int(one.group(2))]}", parse_unit(one.group(3))
+        return
     if indexed := _INDEX.fullmatch(name):
         name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
     elif bracketed := _BRACKETS.fullmatch(name):

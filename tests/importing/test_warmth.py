@@ -68,6 +68,14 @@ def test_a_thermometer_of_another_time_is_refused(
     assert "room.csv: no sample of log.csv lies within" in capsys.readouterr().err
 
 
+def test_a_thermometer_alone_is_no_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slow = thermometer(tmp_path, np.arange(40.0))
+    assert main(["import", slow, "-o", str(tmp_path / "s")]) == 2
+    assert "holds temperatures alone" in capsys.readouterr().err
+
+
 @given(st.lists(st.integers(0, 900), max_size=4))
 def test_it_is_no_matter_how_the_samples_come(cuts: list[int]) -> None:
     t = np.arange(3.0, 15.0)

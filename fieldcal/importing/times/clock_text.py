@@ -29,10 +29,15 @@ _LATE_YEAR = re.compile(
 )
 """What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
 
-_BASIC = re.compile(
-    r"(\d{4})(0[1-9]|1[0-2])([0-3]\d)T([0-2]\d)([0-5]\d)([0-6]\d(?:[.,]\d+)?)(\D.*)?"
-)
+_DIGITS = r"(0[1-9]|1[0-2])([0-2]\d|3[01]){}([01]\d|2[0-3])([0-5]\d)([0-5]\d|60)"
+_BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('T')}([.,]\d+)?(\D.*)?")
 """Basic format of ISO 8601, which leaves the signs out: ``20260314T101530.250Z``."""
+
+_PLAIN = re.compile(rf"(20\d\d){_DIGITS.format('')}([.,]\d+|\d{{3}}|\d{{6}})?()")
+"""The same without the T, ``20260314101530250``: no count has such figures in all."""
+
+_DASHED = re.compile(rf"{_DATE}[T _](\d\d)([-.])(\d\d)\3(\d\d(?:[.,]\d+)?)(\D.*)?")
+"""Signs as names of files have them: ``2026-03-14_10-15-30.250``."""
 
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
 _DAY = re.compile(_DATE)
@@ -65,12 +70,17 @@ def is_date(cell: str) -> bool:
 
 def _usual_form(text: str) -> str:
     """A time with its date before it, where the year stands behind; with its signs."""
-    if (basic := _BASIC.fullmatch(text.strip())) is not None:
-        year, month, day, hour, minute, second, zone = basic.groups("")
-        return f"{year}-{month}-{day}T{hour}:{minute}:{second}{zone}"
-    said = _LATE_YEAR.fullmatch(text.strip())
+    text = text.strip()
+    if (basic := _BASIC.fullmatch(text) or _PLAIN.fullmatch(text)) is not None:
+        year, month, day, hour, minute, second, part, zone = basic.groups("")
+        part = f".{part.lstrip('.,')}" if part else ""
+        return f"{year}-{month}-{day}T{hour}:{minute}:{second}{part}{zone}"
+    if (dashed := _DASHED.fullmatch(text)) is not None:
+        day, hour, _, minute, second, zone = dashed.groups("")
+        return f"{day}T{hour}:{minute}:{second}{zone}"
+    said = _LATE_YEAR.fullmatch(text)
     if said is None:
-        return text.strip()
+        return text
     return f"{said['day']}-{said['month']}-{said['year']} {said['time']}"
 
 

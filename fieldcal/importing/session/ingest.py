@@ -183,6 +183,11 @@ def _write_session(
 
 def _refuse_useless(recording: Recording, facts: StreamFacts, means: bool) -> None:
     """Raise InputError if nothing can come of these rows, samples or `means`."""
+    if not facts.measured and facts.coldest is not None:
+        raise InputError(
+            f"{recording.path}: holds temperatures alone; import it with the file of"
+            " the IMU beside it, with --join"
+        )
     if not facts.measured:
         raise InputError(
             f"{recording.path}: has no number of an accelerometer or gyroscope in any"

@@ -377,6 +377,8 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
          "or skip this one with _ and give --rate"),
         (lines(1e12 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
          "column t: its samples are 1e+12 s apart"),
+        (lines(T * 1e3, A, W, head=f"time (s),{SIX}"),
+         "makes 0.05 Hz, and in ms it is 50 Hz: add --time-unit ms or --time-unit s"),
         (lines(1e-13 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
          "column t: its samples come 1e+13 times a second"),
         (lines(np.round(np.arange(len(T)) * 1.5) + 115, DEG, A / G,
@@ -387,7 +389,8 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
     ids=["rows that are counted", "a thermometer's counts", "a direction",
          "a time that a spreadsheet shortened", "a time that stays, without a name",
          "seconds or rows", "too slow in any unit", "too fast in any unit",
-         "too slow as it says", "too fast as it says", "messages that are counted"],
+         "too slow as it says",
+         "ms that are called s", "too fast as it says", "messages that are counted"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str

@@ -155,8 +155,10 @@ class ColumnClock:
         if not 0 <= i < table.shape[1]:
             return wanted
         # of rows that were written several times, each counts once
-        used = [j for j in at.values() if j < table.shape[1]]
-        table = table[distinct_rows(table[:, used], table[:, i])]
+        wanted_too = (j for name, j in at.items() if name != columns.SKIP)
+        used = [j for j in wanted_too if j < table.shape[1]]
+        once = distinct_rows(table[:, used], table[:, i])
+        table = table[once]
         t = table[:, i]
         if (value := constant_value(t)) is not None:
             raise InputError(
@@ -165,7 +167,7 @@ class ColumnClock:
             )
         if not any(name in at for name in FRACTIONS):
             if (spread := self._spread(wanted, t)) is not None:
-                return spread
+                return replace(spread, written_again=not once.all())
         return wanted if wanted.time_unit else self._told(wanted, table, i)
 
     def _spread(self, wanted: ReadOptions, t: Array) -> ReadOptions | None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
 
 ALL_BUT_A_FEW = 0.99
-"""Share of the rows with the time of the row before that repeat it, where rows were
-written several times: a few may be damaged. Of samples that came together, noise makes
-nearly all differ."""
+"""Share of the rows with the time of the row before that repeat it, or of the rows that
+are there as often as usual, where rows were written several times: a few may be
+damaged. Of samples that came together, noise makes nearly all differ."""
 
 
 def repeated_rows(table: Array) -> NDArray[np.bool_]:
@@ -32,12 +34,21 @@ def distinct_rows(table: Array, t: Array) -> NDArray[np.bool_]:
 
     >>> distinct_rows(np.array([[1.0], [1.0], [2.0]]), np.array([0.0, 0.0, 1.0]))
     array([ True, False,  True])
-    >>> distinct_rows(np.array([[1.0], [1.0], [2.0]]), np.zeros(3)).all()
+    >>> distinct_rows(np.array([[1.0], [1.0], [2.0], [3.0]]), np.zeros(4)).all()
     np.True_
+
+    Where all rows are there as often, they were written several times nevertheless.
+
+    >>> distinct_rows(np.array([[1.0], [1.0], [2.0], [2.0]]), np.zeros(4))
+    array([ True, False,  True, False])
     """
     shared = np.append(np.zeros(min(1, len(t)), dtype=bool), t[1:] == t[:-1])
     again: NDArray[np.bool_] = repeated_rows(table) & shared
-    if again.sum() < ALL_BUT_A_FEW * shared.sum():
+    # of a clock that is too coarse, rows that differ share a time as well
+    many = np.diff(np.flatnonzero(~again))
+    usual = float(np.median(many)) if len(many) else 1.0
+    alike = usual > 1 and (many == usual).mean() >= ALL_BUT_A_FEW
+    if again.sum() < ALL_BUT_A_FEW * shared.sum() and not alike:
         return np.ones(len(t), dtype=bool)
     kept: NDArray[np.bool_] = ~again
     return kept
@@ -56,3 +67,20 @@ def repeats(block: Block) -> NDArray[np.bool_]:
         values = [block.acc, block.gyr, block.temperature[:, None], block.seq[:, None]]
         again[some + 1] = repeated_rows(np.hstack(values))[some + 1]
     return again
+
+
+class RepeatFinder:
+    """Finds rows that repeat the row before, whatever the pieces in which they come."""
+
+    def __init__(self) -> None:
+        self._last: Array | None = None
+
+    def of(self, columns: Sequence[Array]) -> NDArray[np.bool_]:
+        """Whether each row of some columns (n,) repeats the row before."""
+        table = np.column_stack(columns)
+        before = table[:1] + np.nan if self._last is None else self._last
+        again = repeated_rows(np.concatenate([before, table]))[1:]
+        if self._last is None and len(again):
+            again[0] = False
+        self._last = table[-1:] if len(table) else self._last
+        return again

@@ -36,7 +36,11 @@ from fieldcal.importing.units.scales import (
     rounded_text,
 )
 from fieldcal.importing.units.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.units.time_units import assumed_time_unit, usual_step
+from fieldcal.importing.units.time_units import (
+    assumed_time_unit,
+    check_stated_times,
+    usual_step,
+)
 from fieldcal.importing.units.unit_answers import (
     rate_options,
     scales_of_decimals,
@@ -144,6 +148,8 @@ class _Guess:
             unit, why = assumed_time_unit(name, block.t)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
+        elif "t" in said.named and not are_means(block.acc):
+            check_stated_times(name, said.time_unit, block.t)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero

@@ -111,7 +111,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     from fieldcal.importers import open_recording
-    from fieldcal.importing.session.merge import FilesInOrder, MergedFiles
+    from fieldcal.importing.session.joining import join_files
+    from fieldcal.importing.session.merge import FilesInOrder
 
     if len(args.columns) not in (0, 1, len(args.files)):
         raise InputError("give --columns once, or once for each file")
@@ -122,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     if args.join and args.in_order:
         raise InputError("FILEs hold either the same time or one time after another")
     if args.join:
-        opened = [MergedFiles(opened)]
+        opened = [join_files(opened)]
     if args.in_order:
         opened = [FilesInOrder(opened)]
     if args.list:

@@ -89,12 +89,11 @@ class TextColumns(ColumnRecording):
     Attributes
     ----------
     member : the file of a .zip that is the text; "" if it is the file itself
-    sensor : what bare axes are of, as the name of the file says it; "" if it does not
     instance : which of several IMUs that come in turn is read; "" for the first
 
     """
 
-    member = sensor = instance = ""
+    member = instance = ""
     _skip = 0
 
     def place(self, row: int) -> str:
@@ -314,6 +313,9 @@ def _of_sensor(sensor: str, column: Column) -> Column:
     axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
     said = heading_meaning(bare, column.unit)
     told = said is not None and bool(said.kind)
+    if said is not None and said.kind == "v" and sensor == "acc":
+        # of a file of gravity, which is part of the force
+        return Column(column.place, f"{sensor} {said.axis}", said.unit or "")
     return column._replace(name=f"{sensor} {bare}" if axis and not told else bare)
 
 

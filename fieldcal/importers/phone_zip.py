@@ -4,13 +4,13 @@ phyphox and the Sensor Logger of Android and iOS write ``Accelerometer.csv``,
 ``Gyroscope.csv`` and others, with one clock for all. The name of the file says the
 sensor, its columns the axes; each sample of the accelerometer goes with the nearest of
 the gyroscope. ``TotalAcceleration`` goes before ``Accelerometer``, from which some
-programs take gravity out.
+programs take gravity out: ``Gravity``, if it is there, is added to it then.
 """
 
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -23,12 +23,17 @@ from fieldcal.importers.workbook import MARKS
 from fieldcal.importing import columns
 from fieldcal.importing.recording import ImuStream, ReadOptions, Recording
 from fieldcal.importing.times.alignment import AlignedPair
+from fieldcal.importing.times.gravity_sum import GravitySum, lacks_gravity
 from fieldcal.importing.times.row_validator import RowValidator
-from fieldcal.importing.words.file_names import ACC, GYR
+from fieldcal.importing.words.file_names import ACC, GRAVITY, GYR, LINEAR, TOTAL
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
 
-SENSOR = {"a": "acc", "g": "gyr"}
+SENSOR = {"a": "acc", "v": "acc", "g": "gyr"}
+"""What the axes of each file are read as; v is gravity, where the force lacks it."""
+
+FIRST_ROWS = 1 << 14
+"""Rows at the beginning of a file that tell whether gravity is in it."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -41,11 +46,11 @@ class PhoneArchive(Recording):
     """An archive with the IMU of a telephone."""
 
     asks_units = True
-    _texts: tuple[TextColumns, ...] = ()
+    _texts: dict[str, TextColumns] | None = None
 
     def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
-        for text in self._opened():
+        for text in self._opened().values():
             text.streams()
         return [ImuStream("0", f"columns in {columns.describe_units(self.wanted)}")]
 
@@ -55,18 +60,39 @@ class PhoneArchive(Recording):
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of both sensors, those of the accelerometer with the nearest."""
-        pair, both = AlignedPair(), [self._in_units(t) for t in self._opened()]
-        judges = [
-            RowValidator(f"{self.path}: {one.member}", one.place, self.repair)
-            for one in both
-        ]
-        flows = [j.through(t.blocks("0")) for j, t in zip(judges, both, strict=True)]
-        acc, gyr = [*flows, iter(())][:2]
-        yield from pair.through(acc, gyr)
-        for judge, one in zip(judges, both, strict=True):
-            said = [*one.mended, *judge.mended]
+        both = {kind: self._in_units(t) for kind, t in self._opened().items()}
+        judges = {
+            kind: RowValidator(f"{self.path}: {one.member}", one.place, self.repair)
+            for kind, one in both.items()
+        }
+        flows = {k: judges[k].through(one.blocks("0")) for k, one in both.items()}
+        acc, total = flows["a"], GravitySum()
+        if "v" in flows:
+            acc = total.through(acc, flows["v"])
+        yield from AlignedPair().through(acc, flows.get("g", iter(())))
+        for kind, one in both.items():
+            said = [*one.mended, *judges[kind].mended]
             self.mended += [f"{one.member}: {sentence}" for sentence in said]
             self.says += [s for s in one.says if s not in self.says]
+            self.says += [f"{one.member}: {said}" for said in judges[kind].says]
+        if "v" in both:
+            self._say_sum(total, both["v"].member)
+
+    def _say_sum(self, total: GravitySum, gravity: str) -> None:
+        """Say how gravity was added, or refuse what has no times in common.
+
+        Raises
+        ------
+        InputError
+            If no sample had gravity near it.
+
+        """
+        if total.none:
+            raise InputError(
+                f"{self.path}: {gravity}: no sample is at a time at which the"
+                " accelerometer has one; record again, with TotalAcceleration"
+            )
+        self.says.append(total.sentence())
 
     def _in_units(self, text: TextColumns) -> TextColumns:
         """A text of one sensor, in the units that were found for all."""
@@ -81,23 +107,34 @@ class PhoneArchive(Recording):
         one.imus_found = {"0": one.wanted}
         return one
 
-    def _opened(self) -> tuple[TextColumns, ...]:
-        """The texts of accelerometer and gyroscope, as they are in it."""
-        if self._texts:
-            return self._texts
-        texts = []
-        for kind, member in self._members().items():
-            text = TextColumns(self.path, self.wanted, self.repair)
-            text.member, text.sensor, text.from_first = member, SENSOR[kind], False
-            texts.append(text)
-        self._texts = tuple(texts)
-        self.wanted = self._said()
+    def _opened(self) -> dict[str, TextColumns]:
+        """The texts of each sensor, as they are in it."""
+        if self._texts is None:
+            texts = {}
+            for kind, member in self._members().items():
+                text = TextColumns(self.path, self.wanted, self.repair)
+                text.member, text.sensor, text.from_first = member, SENSOR[kind], False
+                texts[kind] = text
+            self._texts = texts
+            self._without_needless_gravity(texts)
+            self.wanted = self._said(texts.values())
         return self._texts
 
-    def _said(self) -> ReadOptions:
+    def _without_needless_gravity(self, texts: dict[str, TextColumns]) -> None:
+        """Leave gravity out where the accelerometer has it."""
+        if "v" not in texts:
+            return
+        acc, gravity = (texts[k].first_rows("0", FIRST_ROWS).acc for k in "av")
+        if not lacks_gravity(acc, gravity):
+            left = texts.pop("v").member
+            self.says.append(
+                f"{left} is left out: {texts['a'].member} has gravity in it"
+            )
+
+    def _said(self, texts: Iterable[TextColumns]) -> ReadOptions:
         """What the texts' headings say of all units."""
         said = self.wanted
-        for text in self._texts:
+        for text in texts:
             one = next(iter(text.imus().values()))
             self.says += [s for s in text.says if s not in self.says]
             said = replace(
@@ -128,7 +165,9 @@ class PhoneArchive(Recording):
                 " came"
             ) from error
         stems = {Path(n).stem.lower().replace(" ", ""): n for n in reversed(names)}
-        acc = next((stems[n] for n in ACC if n in stems), None)
+        gravity = next((stems[n] for n in GRAVITY if n in stems), None)
+        forces = (*ACC, *(LINEAR if gravity else ()))
+        acc = next((stems[n] for n in forces if n in stems), None)
         gyr = next((stems[n] for n in GYR if n in stems), None)
         if acc is None:
             raise InputError(
@@ -136,4 +175,6 @@ class PhoneArchive(Recording):
                 f" Accelerometer.csv; unpack it and import the one that is: there are"
                 f" {', '.join(names[:12]) or 'no .csv files'}"
             )
-        return {"a": acc} | ({"g": gyr} if gyr else {})
+        whole = gravity is None or Path(acc).stem.lower().replace(" ", "") in TOTAL
+        parts = {} if whole else {"v": gravity or ""}
+        return {"a": acc, **parts} | ({"g": gyr} if gyr else {})

@@ -15,8 +15,9 @@ sensor. Source: message definitions of PX4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,11 @@ from fieldcal.drivers.mavlink_installed import (
     InstalledCalibration,
     parameter_names,
 )
-from fieldcal.importing.messages.ulog_messages import Table, UlogMessages
+from fieldcal.importing.messages.ulog_messages import Table, Topic, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.fifo_time import FifoTimes
+from fieldcal.importing.times.row_validator import RowValidator
 
 WHAT = "PX4 log, .ulg"
 
@@ -166,24 +168,47 @@ class UlogFile(Recording):
     def _pairs(self, topic: str, number: int) -> Iterator[Block]:
         mine = (topic, number)
         other = (PARTNERS[topic], self._partner(topic, number))
-        pair, reads = AlignedPair(), {mine: _reader(topic), other: _reader(topic)}
-        for tables in self._log.tables({mine, other} & self._log.topics):
-            read = {some: reads[some](table) for some, table in tables.items()}
-            if other not in self._log.topics:
-                yield from read.values()
-                continue
-            gyro = read.get(other)
-            block = pair.feed(read.get(mine), gyro and _as_rates(gyro))
-            if len(block):
-                yield block
-        if len(rest := pair.rest()):
-            yield rest
+        forces, rates = _reader(topic), _reader(topic)
+        reads: dict[Topic, Callable[[Table], Block]] = {
+            mine: forces,
+            other: lambda table: _as_rates(rates(table)),
+        }
+        both = {mine, other} & self._log.topics
+        flow = (
+            {some: reads[some](table) for some, table in tables.items()}
+            for tables in self._log.tables(both)
+        )
+        if other not in both:
+            yield from (block for read in flow for block in read.values())
+            return
+        yield from self._judged(mine, other, flow)
         if other[1] != number:
             stream = f"{topic}.{number}"
             self.says.append(
                 f"{stream} goes with {other[0]}.{other[1]}, the gyroscope of the same"
                 " device"
             )
+
+    def _judged(
+        self, acc: Topic, gyr: Topic, flow: Iterable[Mapping[Topic, Block]]
+    ) -> Iterator[Block]:
+        """Samples of both sensors whose times can be, paired."""
+        pair = AlignedPair()
+        judges = {
+            topic: RowValidator(str(self.path), partial(_sample_of, topic), self.repair)
+            for topic in (acc, gyr)
+        }
+        for read in flow:
+            good = {some: judges[some].feed(block) for some, block in read.items()}
+            block = pair.feed(good.get(acc), good.get(gyr))
+            if len(block):
+                yield block
+        last = pair.feed(judges[acc].rest(), judges[gyr].rest())
+        if len(rest := concat([last, pair.rest()])):
+            yield rest
+        for judge in judges.values():
+            self.mended += judge.mended
+            self.says += judge.says
         if pair.worst:
             self.says.append(
                 "accelerometer and gyroscope have times of their own: paired with the"
@@ -218,6 +243,11 @@ class UlogFile(Recording):
 def _split_stream(stream: str) -> tuple[str, int]:
     topic, _, number = stream.rpartition(".")
     return topic, int(number)
+
+
+def _sample_of(topic: Topic, number: int) -> str:
+    """Name a sample of a sensor, counted from 0."""
+    return f"sample {number + 1} of {topic[0]}.{topic[1]}"
 
 
 def _combined(table: Table) -> Block:

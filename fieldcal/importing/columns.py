@@ -10,6 +10,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join_words
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.times.repeats import RepeatFinder
 from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers
 from fieldcal.importing.units.scales import MIN_ROWS
@@ -63,13 +64,21 @@ def has_time(names: Iterable[str]) -> bool:
     return any(name.partition("=")[0] in ("t", "dt") for name in names)
 
 
+THERMOMETER = ("t", "temperature")
+"""Columns of a file of a thermometer alone, to be joined with that of an IMU."""
+
+
 def column_placeholders(many: int) -> str:
     """Example of the columns option for a file with `many` columns.
 
-    >>> column_placeholders(3), column_placeholders(9), column_placeholders(54)
-    ('ax,ay,az', 't,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
+    >>> column_placeholders(2), column_placeholders(3)
+    ('t,temperature', 'ax,ay,az')
+    >>> column_placeholders(9), column_placeholders(54)
+    ('t,ax,ay,az,gx,gy,gz,_,_', 't,ax,ay,az,gx,gy,gz,_...')
     """
     usual = ["t", *CHANNELS]
+    if many == len(THERMOMETER):
+        return ",".join(THERMOMETER)
     if many in (len("xyz"), len(CHANNELS)):
         return ",".join(CHANNELS[:many])
     if len("xyz") < many < len(usual):
@@ -121,7 +130,8 @@ class ColumnReader:
     def __init__(self, wanted: ReadOptions) -> None:
         self._wanted = wanted
         self._times = RowTimes(wanted)
-        self._missing = MissingNumbers()
+        self._missing, self._repeats = MissingNumbers(), RepeatFinder()
+        self._last = np.nan
 
     @property
     def says(self) -> list[str]:
@@ -152,13 +162,25 @@ class ColumnReader:
         if WITHOUT_GRAVITY[0] in columns:
             acc = acc + triad("l", wanted.acc_scale)
         return Block.of(
-            self._times.of(columns, n),
+            self._row_times(columns, n),
             acc,
             triad("g", wanted.gyr_scale),
             _celsius_column(columns.get("temperature"), *wanted.celsius),
             columns.get("seq"),
             columns.get("t_host"),
         )
+
+    def _row_times(self, columns: Mapping[str, Array], n: int) -> Array:
+        """Times (n,) of the next rows; one that was written again has the same."""
+        if not (self._wanted.written_again and n):
+            return self._times.of(columns, n)
+        again = self._repeats.of([*columns.values()])
+        first = np.flatnonzero(~again)
+        t = self._times.of({k: one[first] for k, one in columns.items()}, len(first))
+        known = np.append(self._last, t)
+        self._last = float(known[-1])
+        repeated: Array = known[np.cumsum(~again)]
+        return repeated
 
 
 def _celsius_column(column: Array | None, size: float, zero: float) -> Array | None:

@@ -35,6 +35,7 @@ TEMP_UNITS = {
     "degC": (1.0, 0.0),
     "cdegC": (0.01, 0.0),
     "K": (1.0, -273.15),
+    "degF": (5 / 9, -160 / 9),
     "none": (np.nan, np.nan),
 }
 """Kelvin in one of each, and deg C at its 0; "none" leaves it out."""
@@ -108,6 +109,7 @@ class ReadOptions:
     unsigned : kinds of channel (a, g) in 16 bits of which the sign was not read
     reversed : channels whose axis points the other way in the file
     batch : rows that share a time, where they do
+    written_again : whether each of them was written several times
     usual : unit of rates that such names of columns have; "" where they tell none
 
     """
@@ -129,6 +131,7 @@ class ReadOptions:
     unsigned: frozenset[str] = frozenset()
     reversed: frozenset[str] = frozenset()
     batch: RowBatch | None = None
+    written_again: bool = False
     usual: str = ""
     acc_zero: tuple[float, ...] = ()
 
@@ -194,10 +197,13 @@ class Recording(ABC):
     guessed : what was taken for what nobody said, and why, by what it is
     ends_early : whether it was cut off, as far as it was read
     began : stamp of the first row, s, where times count from that row; nan if unknown
+    sensor : what bare axes are of, where something else than the file says it
+    lacks_gravity : whether gravity, which another file holds, is added to its forces
 
     """
 
-    ends_early = False
+    ends_early = lacks_gravity = False
+    sensor = ""
     began = float("nan")
     from_first = True
     """Whether times count from the first row, of formats whose zero says nothing."""

@@ -28,7 +28,13 @@ from fieldcal.core.file_names import refuse_undecodable_path
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array, Block, impossible_rate_text
 from fieldcal.session import description, sample_files
-from fieldcal.session.blank_samples import remove_blank_samples
+from fieldcal.session.blank_samples import (
+    are_lost,
+    blank_rows,
+    blank_warning,
+    remove_blank_samples,
+    without_rows,
+)
 from fieldcal.session.clock_steps import ClockStepRemover, remove_clock_steps
 from fieldcal.session.description import Description
 from fieldcal.session.installed_calibration import (
@@ -141,10 +147,7 @@ class Session:
         raw, cut = sample_files.read_samples(sample_files.find_samples(self.folder))
         raw, blank = remove_blank_samples(raw)
         if blank:
-            cut += (
-                f"{blank} samples are zero in all outputs, which no device on the"
-                " ground puts out: they count as lost",
-            )
+            cut += (blank_warning(blank),)
         self.warnings += cut
         steps = np.diff(raw.t)
         if len(steps) and (
@@ -173,18 +176,32 @@ class Session:
         if "block" in vars(self) or len(installed_stretches(self.marks())) > 1:
             yield self.block
             return
-        clock, cut = clock or ClockStepRemover(), list[str]()
+        clock, cut, blank = clock or ClockStepRemover(), list[str](), 0
         units, gauge = self.about.units, self.about.gauge.size
         acc = ACC_UNITS[units["acceleration"]] / gauge[0]
         gyr = GYR_UNITS[units["angular_rate"]] / gauge[1]
         for whole in sample_files.iterate_samples(
             sample_files.find_samples(self.folder), cut
         ):
-            raw, _ = remove_blank_samples(whole)
+            zeros = blank_rows(whole)
+            lost = len(zeros) > 0 and self._zeros_are_lost
+            raw = without_rows(whole, zeros) if lost else whole
+            blank += len(whole) - len(raw)
             part = replace(raw, acc=raw.acc * acc, gyr=raw.gyr * gyr)
             yield clock.add(_blank_gaps(part, self.about.excluded_spans))
         yield clock.flush()
+        cut += [blank_warning(blank)] if blank else []
         self.warnings += (*cut, *(step.sentence() for step in clock.steps))
+
+    @cached_property
+    def _zeros_are_lost(self) -> bool:
+        """Whether rows of zeros are lost samples, as all samples tell together."""
+        blank = rows = 0
+        for part in sample_files.iterate_samples(
+            sample_files.find_samples(self.folder)
+        ):
+            blank, rows = blank + len(blank_rows(part)), rows + len(part)
+        return are_lost(blank, rows)
 
     def _steadied(self, raw: Block) -> Block:
         """Samples and windows without steps of the device's clock."""

@@ -130,7 +130,7 @@ def test_a_gz_is_read_as_such(tmp_path: Path) -> None:
         ("1,2,3\n", Layout(("t", "_", "_")), "neither ax ay az nor"),
         ("1,2,3\n", Layout(ACC, 1, acc_unit="furlong"), "'furlong' is none of"),
         (
-            "1,1,2,3\n1,1,2,3\n",
+            "1,1,2,3\n1,1,2,4\n2,1,2,3\n",
             Layout(("t", *ACC)),
             "line 2, column t: is not later than above",
         ),

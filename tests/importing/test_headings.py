@@ -17,6 +17,7 @@ from fieldcal.importers import open_recording
 from fieldcal.importing.headings.heading import Column
 from fieldcal.importing.headings.headings import match_headings
 from fieldcal.importing.recording import ReadOptions, Recording
+from fieldcal.importing.words.heading_units import UNITS
 from fieldcal.importing.words.heading_words import heading_meaning
 
 ROWS = np.column_stack([np.arange(4) * 1e3, np.arange(24).reshape(4, 6)])
@@ -240,3 +241,77 @@ def test_a_covariance_is_no_axis_and_topics_are_no_imus_of_their_own() -> None:
 def test_two_columns_of_an_axis_leave_a_choice() -> None:
     names = ["t", "ax", "ay", "az", "az", "gx", "gy", "gz"]
     assert match_headings([Column("", name) for name in names], "_") == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("imu_degC", "degC"), ("temp (C)", "degC"), ("°C", "degC"), ("T_K", "K"),
+     ("die [°C]", "degC"), ("mpu.celsius", "degC"), ("temp_F", "degF"),
+     ("temp (F)", "degF"),
+     ("Temperature (°F)", "degF"), ("T [K]", "K"), ("sensor degF", "degF")],
+)  # fmt: skip
+def test_a_thermometer_that_only_its_unit_names_is_taken(name: str, unit: str) -> None:
+    (found,) = match_headings([Column("", n) for n in (*BARE, name)], "_")
+    assert found.columns[-1] == "temperature"
+    assert found.taken(ReadOptions()).temp_unit == unit
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "roll (°)",
+        "heading [°]",
+        "quat_c",
+        "step_k",
+        "mag_x (K)",
+        "roll_F",
+        "x (°C)",
+        "C",
+    ],
+)
+def test_what_may_be_something_else_is_no_thermometer(name: str) -> None:
+    (found,) = match_headings([Column("", n) for n in (*BARE, name)], "_")
+    assert found.columns[-1] == "_"
+
+
+def test_thermometers_that_only_units_name_leave_no_choice() -> None:
+    def columns(*names: str) -> tuple[str, ...]:
+        (found,) = match_headings([Column("", n) for n in (*BARE, *names)], "_")
+        return found.columns[len(BARE) :]
+
+    assert columns("a_degC", "b_degC") == ("_", "_")
+    assert columns("a_degC", "motor_degC") == ("temperature", "_")
+    assert columns("a_degC", "temp") == ("_", "temperature")
+
+
+@pytest.mark.parametrize("unit", ["K", "degF"])
+def test_a_thermometer_in_other_units_reads_deg_c(tmp_path: Path, unit: str) -> None:
+    warm = {"K": 300.15, "degF": 80.6}[unit]
+    path = text(tmp_path / "log", (*NAMES, f"temp [{unit}]"))
+    rows = [",".join([*map(str, row), str(warm)]) for row in ROWS.tolist()]
+    path.write_text("\n".join([",".join([*NAMES, f"temp [{unit}]"]), *rows]) + "\n")
+    np.testing.assert_allclose(taken(path)[1].temperature, 27.0)
+
+
+@given(st.text(max_size=12), st.sampled_from(["", "[degC]", " °C", "_K", "(C)"]))
+def test_any_name_is_read_or_left(name: str, unit: str) -> None:
+    said = heading_meaning(name + unit)
+    assert said is None or said.unit is None or said.unit in UNITS[said.kind]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_clock_that_nobody_sets_is_the_time(swapped: bool) -> None:
+    """As GNSSLogger writes them: a network sets the one, and it leaps."""
+    clocks = ["utcTimeMillis", "elapsedRealtimeNanos"][:: -1 if swapped else 1]
+    (found,) = match_headings([Column("", n) for n in (*clocks, *BARE[1:])], "_")
+    assert found.columns[:2] == (("t", "_") if swapped else ("_", "t"))
+    assert found.units["t"] == "ns"
+
+
+def test_an_array_with_a_unit_is_three_axes() -> None:
+    """As blackbox_decode writes it, behind a count of rows."""
+    names = ["loopIteration", " time (us)", *(f" gyroADC[{i}] (deg/s)" for i in "012"),
+             *(f" accSmooth[{i}] (g)" for i in "012")]  # fmt: skip
+    (found,) = match_headings([Column("", name) for name in names], "_")
+    assert found.columns == ("_", "t", "gx", "gy", "gz", "ax", "ay", "az")
+    assert found.units == {"t": "us", "g": "deg/s", "a": "g"}

@@ -88,6 +88,39 @@ def test_px4_sensors_are_kept_apart_with_their_own_calibration(tmp_path: Path) -
     assert told["instance"] == 1 and not told["taken_out"]
 
 
+@pytest.mark.parametrize("stamp", [0.5, 9999.0])
+@pytest.mark.parametrize("sensor", ["acc", "gyr"])
+def test_a_wrong_time_in_a_px4_log_costs_its_own_sample_alone(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    stamp: float,
+    sensor: str,
+) -> None:
+    block, at = imu(1), 205
+    path, true = tmp_path / "log.ulg", round(block.t[at] * 1e6)
+    data = ulog({0: block}, SLOT)
+    number = {"acc": 1, "gyr": 11}[sensor]
+    old = struct.pack("<HQQ", number, true + 3, true)
+    assert data.count(old) == 1
+    path.write_bytes(
+        data.replace(old, struct.pack("<HQQ", number, 0, int(stamp * 1e6)))
+    )
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (4001,))
+    call = ["import", str(path), "-o", str(tmp_path / "s"), "--instance"]
+    call += ["sensor_accel.0"]
+    assert main(call) == 2
+    topic = {"acc": "sensor_accel.0", "gyr": "sensor_gyro.0"}[sensor]
+    assert f"sample {at + 1} of {topic}, column t" in capsys.readouterr().err
+    assert main([*call, "--repair"]) == 0
+    found = Session.open(tmp_path / "s").block
+    if sensor == "gyr":
+        assert np.flatnonzero(np.isnan(found.gyr[:, 0])).tolist() == [at]
+        np.testing.assert_array_equal(found.acc, block.acc)
+    else:
+        np.testing.assert_array_equal(found.gyr, np.delete(block.gyr, at, axis=0))
+
+
 def test_a_px4_log_in_small_pieces_is_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -355,7 +388,7 @@ def test_rows_that_are_let_through_always_go_forward(
         parts = (block[i : i + cut] for i in range(0, len(t), cut))
         times = concat(judge.through(parts)).t
         assert (np.diff(times) > 0).all() and np.isfinite(times).all()
-        assert len(times) + judge.left_out == len(t)
+        assert len(times) + judge.left_out + judge.repeated == len(t)
         assert bool(judge.mended) == (judge.left_out > 0)
         found: list[float] = times.tolist()
         return found

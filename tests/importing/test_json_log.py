@@ -14,6 +14,7 @@ from fieldcal.core.samples import Block, concat
 from fieldcal.importers import open_recording
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.records.json_lists import json_lists
+from fieldcal.importing.records.pandas_json import records_of_frame
 
 ROWS = 60
 T = np.arange(ROWS) / 50
@@ -178,3 +179,68 @@ def test_imus_in_a_list_of_each_record_are_imus_and_samples_are_samples(
 def test_any_document_has_lists_or_none(document: Any) -> None:
     for name, values in json_lists(document):
         assert name and values.ndim in (1, 2) and values.dtype == float
+
+
+FRAME = {"t": T, **{f"a{x}": ACC[:, i] for i, x in enumerate("xyz")},
+         **{f"g{x}": GYR[:, i] for i, x in enumerate("xyz")}}  # fmt: skip
+KEYS = [str(i) for i in range(ROWS)]
+RECORDS = [{n: float(c[i]) for n, c in FRAME.items()} for i in range(ROWS)]
+BARE = [{n: v for n, v in one.items() if n != "t"} for one in RECORDS]
+STAMPS = [f"20240503T1200{T[i]:09.6f}Z" for i in range(ROWS)]
+
+
+def by_column(records: list[dict[str, Any]], keys: list[str]) -> dict[str, Any]:
+    return {n: {k: r[n] for k, r in zip(keys, records, strict=True)}
+            for n in records[0]}  # fmt: skip
+
+
+FRAMES: dict[str, Any] = {
+    "columns": by_column(RECORDS, KEYS),
+    "columns of every other row": by_column(RECORDS, [str(2 * i) for i in range(ROWS)]),
+    "columns with stamps": by_column(
+        [{"time": s, **r} for s, r in zip(STAMPS, BARE, strict=True)], KEYS
+    ),
+    "an index in ms": by_column(BARE, [f"{1714737600000 + 1e3 * t:.0f}" for t in T]),
+    "an index of stamps": by_column(BARE, STAMPS),
+    "index": dict(zip(KEYS, RECORDS, strict=True)),
+    "records": RECORDS,
+    "records with stamps": [
+        {"stamp": s, **r} for s, r in zip(STAMPS, BARE, strict=True)
+    ],
+    "split": {
+        "columns": list(FRAME),
+        "index": list(range(ROWS)),
+        "data": [list(r.values()) for r in RECORDS],
+    },
+    "table": {
+        "schema": {"fields": [], "pandas_version": "1.4.0"},
+        "data": [{"index": i, **r} for i, r in enumerate(RECORDS)],
+    },
+}
+"""As `pandas.DataFrame.to_json` writes them."""
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_data_frame_is_samples(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(FRAMES[name]))
+    wanted = ReadOptions(time_unit="ms" if "ms" in name else "s")
+    recording = open_recording(path, wanted)
+    got = concat(list(recording.blocks(recording.streams()[0].name)))
+    np.testing.assert_allclose(got.acc, ACC)
+    np.testing.assert_allclose(got.gyr, GYR)
+    np.testing.assert_allclose(got.t - got.t[0], T, atol=1e-6)
+
+
+@given(
+    st.recursive(
+        st.none() | st.integers() | st.floats() | st.text(max_size=3),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+            st.sampled_from(["0", "1", "columns", "index", "data", "t", "schema"]),
+            inner, max_size=3,
+        ),
+    )
+)  # fmt: skip
+def test_any_document_is_a_data_frame_or_none(document: Any) -> None:
+    frame = records_of_frame(document)
+    assert frame is None or all(isinstance(one, dict) for one in frame)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import warnings
 from collections.abc import Callable
 from datetime import datetime, timedelta
@@ -361,18 +362,35 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
     [
         (lines(np.arange(float(len(T))), A / G, DEG,
                head="Timestamp,Accel_X_g,Accel_Y_g,Accel_Z_g,Gyro_X_deg_per_s,"
-               "Gyro_Y_deg_per_s,Gyro_Z_deg_per_s"), "only count rows"),
+               "Gyro_Y_deg_per_s,Gyro_Z_deg_per_s"), "may count rows"),
         (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
                np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
         (lines(T, W, UP), "say what its columns are"),
-        (lines(["1.70E+12"] * len(T), A, W, head=f"time,{SIX}"), "--rate 50"),
+        (lines(["1.70E+12"] * len(T), A, W, head=f"time,{SIX}"),
+         "its time is 1.7e+12 in all rows, no time: give the rate, e.g. --rate 50"),
+        (lines(["12"] * len(T), A, W), "give the rate, e.g. --rate 50"),
+        (lines(np.arange(float(len(T))), A, W, head=f"t,{SIX}"),
+         "or --time-unit s if a row is taken each second"),
+        (lines(1e12 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
+         "log.csv: column t: its numbers, 0 to 1.149e+15, make 1e-12 Hz in s"),
+        (lines(1e-13 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
+         "or skip this one with _ and give --rate"),
+        (lines(1e12 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
+         "column t: its samples are 1e+12 s apart"),
+        (lines(T * 1e3, A, W, head=f"time (s),{SIX}"),
+         "makes 0.05 Hz, and in ms it is 50 Hz: add --time-unit ms or --time-unit s"),
+        (lines(1e-13 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
+         "column t: its samples come 1e+13 times a second"),
         (lines(np.round(np.arange(len(T)) * 1.5) + 115, DEG, A / G,
                head="Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),"
                "Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),"
                "Accelerometer Z (g)"), "no column is t"),
     ],
     ids=["rows that are counted", "a thermometer's counts", "a direction",
-         "a time that a spreadsheet shortened", "messages that are counted"],
+         "a time that a spreadsheet shortened", "a time that stays, without a name",
+         "seconds or rows", "too slow in any unit", "too fast in any unit",
+         "too slow as it says",
+         "ms that are called s", "too fast as it says", "messages that are counted"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str
@@ -381,6 +399,28 @@ def test_what_would_be_wrong_in_silence_is_asked(
     path.write_text(text + "\n")
     assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
     assert question in capsys.readouterr().err
+
+
+def test_a_time_that_stays_is_refused_as_such_where_the_user_names_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(lines(["12"] * len(T), A, W) + "\n")
+    assert main(["import", str(path), "--columns", f"t,{SIX}"]) == 2
+    assert "column t is 12 in all rows, so it is no time" in capsys.readouterr().err
+
+
+def test_one_row_a_second_by_a_clock_is_taken_so(tmp_path: Path) -> None:
+    """Seconds since 1970 count no rows, and a real clock shows a little less."""
+    path = tmp_path / "log.csv"
+    stamps = [f"{UNIX + 1.0002 * i:.4f}" for i in range(len(T))]
+    path.write_text(lines(stamps, A, 0 * W, head=f"t,{SIX}") + "\n")
+    t = Session.open(imported(path)).block.t
+    np.testing.assert_allclose(np.diff(t), 1.0002, atol=1e-6)
+    shutil.rmtree(tmp_path / "out")
+    whole = [f"{UNIX + i}" for i in range(len(T))]
+    path.write_text(lines(whole, A, 0 * W, head=f"t,{SIX}") + "\n")
+    assert np.ptp(Session.open(imported(path)).block.t) == len(T) - 1
 
 
 def test_a_direction_is_one_though_a_row_is_not_whole() -> None:

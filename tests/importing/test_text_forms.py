@@ -120,7 +120,9 @@ def test_minutes_and_seconds_of_a_spreadsheet_begin_again_each_hour() -> None:
 @given(st.datetimes(datetime(2001, 1, 1), datetime(2098, 1, 1)), st.integers(1, 10**6))
 def test_a_clock_reads_what_was_written(start: datetime, more_ms: int) -> None:
     later = start + timedelta(milliseconds=more_ms)
-    for write in ("%Y-%m-%dT%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S.%f"):
+    basic = ["%Y%m%dT%H%M%S.%fZ", "%Y%m%dT%H%M%S,%f", "%Y%m%d%H%M%S%f"]
+    basic += ["%Y-%m-%d_%H-%M-%S.%f", "%Y-%m-%d %H.%M.%S,%f"]
+    for write in ("%Y-%m-%dT%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S.%f", *basic):
         clock = ClockText()
         first, last = (clock.seconds(t.strftime(write)) for t in (start, later))
         assert first is not None and last is not None

@@ -10,6 +10,7 @@ import pyarrow.parquet
 import pytest
 
 from fieldcal.core.samples import Block
+from fieldcal.session import sample_files
 from fieldcal.session.blank_samples import remove_blank_samples
 from fieldcal.session.folder import Session
 
@@ -46,15 +47,39 @@ def test_outputs_of_which_some_are_zero_are_a_device_s() -> None:
     assert remove_blank_samples(nothing) == (nothing, 0)
 
 
-def test_a_session_says_so_and_reads_on(tmp_path: Path) -> None:
-    block = samples()
+def recorded(folder: Path, block: Block) -> Path:
     columns = dict(zip(("ax", "ay", "az", "gx", "gy", "gz"), block.six.T, strict=True))
     table = pa.table({"t": block.t, **columns})
-    pa.parquet.write_table(table, tmp_path / "samples.parquet")
-    (tmp_path / "session.toml").write_text("format = 1\n")
-    session = Session.open(tmp_path)
-    assert len(session.block) == 97
-    (said,) = session.warnings
+    pa.parquet.write_table(table, folder / "samples.parquet")
+    (folder / "session.toml").write_text("format = 1\n")
+    return folder
+
+
+@pytest.mark.parametrize("rows_at_once", [1 << 17, 10])
+def test_a_session_says_so_and_reads_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows_at_once: int
+) -> None:
+    """Whole or part by part, of which one holds a single row of zeros."""
+    monkeypatch.setattr(sample_files, "ROWS_AT_ONCE", rows_at_once)
+    recorded(tmp_path, samples())
+    whole, parts = Session.open(tmp_path), Session.open(tmp_path)
+    assert len(whole.block) == 97
+    (said,) = whole.warnings
     assert said.startswith("3 samples are zero in all outputs")
-    parts = np.concatenate([part.t for part in Session.open(tmp_path).blocks()])
-    np.testing.assert_allclose(parts, session.block.t)
+    t = np.concatenate([part.t for part in parts.blocks()])
+    np.testing.assert_allclose(t, whole.block.t)
+    assert parts.warnings == (said,)
+
+
+def test_a_device_that_begins_with_zeros_is_read_alike_whole_and_in_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A part that holds nothing but zeros is no device that puts out nothing else."""
+    monkeypatch.setattr(sample_files, "ROWS_AT_ONCE", 10)
+    block = samples()
+    block.acc[:25] = block.gyr[:25] = 0.0
+    recorded(tmp_path, block)
+    whole, parts = Session.open(tmp_path), Session.open(tmp_path)
+    t = np.concatenate([part.t for part in parts.blocks()])
+    np.testing.assert_allclose(t, whole.block.t)
+    assert parts.warnings == whole.warnings and whole.warnings[0].startswith("26 ")

@@ -8,6 +8,7 @@ from shlex import quote
 from typing import NamedTuple
 
 from fieldcal.importing.recording import ReadOptions
+from fieldcal.importing.words.heading_units import TEMPERATURES
 
 
 class Column(NamedTuple):
@@ -71,7 +72,8 @@ class HeadingMatch:
             acc_unit=units.get("a") or wanted.acc_unit,
             gyr_unit=units.get("g") or wanted.gyr_unit,
             time_unit=units.get("t") or wanted.time_unit,
-            temp_unit=wanted.temp_unit or ("degC" if units.get("temperature") else ""),
+            temp_unit=wanted.temp_unit
+            or TEMPERATURES.get(units.get("temperature") or "", ""),
             named=frozenset(by_name),
             usual=self.usual,
         )

@@ -30,7 +30,8 @@ NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filte
 """Words of columns that are no samples of a sensor."""
 
 FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",
-           "board", "env", "cpu", "case", "gps", "room")  # fmt: skip
+           "board", "env", "cpu", "case", "gps", "room", "motor", "esc", "battery",
+           "engine", "water", "oil", "outside", "chamber")  # fmt: skip
 """Words of thermometers that lie apart from the IMU."""
 
 G_FORCE = (("g",), ("g", "force"))
@@ -250,8 +251,14 @@ def _stamps(times: Sequence[NamedColumn]) -> list[NamedColumn]:
 def _thermometer(
     named: Iterable[NamedColumn], label: tuple[str, ...]
 ) -> tuple[list[NamedColumn], tuple[str, ...]]:
-    """Return the thermometer nearest to an IMU, and a message about it."""
+    """Return the thermometer nearest to an IMU, and a message about it.
+
+    Of those that only their unit tells, there must be one.
+    """
     warm = [n for n in named if n.says.kind == "temperature"]
+    called = [n for n in warm if not n.says.weak]
+    near = [n for n in warm if not {*n.says.label} & {*FOREIGN}] or warm
+    warm = called or (near if len(near) == 1 else _columns_of_imu(warm, label))
     near = _columns_of_imu(warm, label) or [
         n for n in warm if not set(n.says.label) & set(FOREIGN)
     ]

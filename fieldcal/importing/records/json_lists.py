@@ -24,6 +24,7 @@ from fieldcal.importing.records.json_record import (
     join_devices,
     read_record,
 )
+from fieldcal.importing.records.pandas_json import records_of_frame
 from fieldcal.importing.records.record_pairs import pair_records
 from fieldcal.importing.times.clock_text import ClockText
 from fieldcal.importing.times.fifo_time import GAP_BATCHES
@@ -43,6 +44,8 @@ def json_lists(
     >>> [(n, v.tolist()) for n, v in json_lists([{"t": 0, "a": {"x": 1}}, {"t": 1}])]
     [('t', [0.0, 1.0]), ('a_x', [1.0, nan])]
     """
+    if (frame := records_of_frame(document)) is not None:
+        document = frame
     if isinstance(document, Mapping):
         for key, value in document.items():
             if name.count("/") < DEEPEST:
@@ -73,6 +76,7 @@ def _fields(
             f"of its records, those of {pair.acc} are taken, each with the nearest of"
             f" {pair.gyr}"
         )
+        says += [pair.says] if pair.says else []
         yield from pair.fields.items()
         return
     for prefix, fields in kinds.items():

@@ -4,7 +4,8 @@
     {"sensor": "gyroscope", "t": 0.012, "x": 0, "y": 0, "z": 0}
 
 Each record of the accelerometer goes with the gyroscope's nearest in time, within half
-a period; nothing is interpolated.
+a period; nothing is interpolated. Where the accelerometer lacks gravity, and records of
+gravity are there, the nearest of these is added.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, Index
 from fieldcal.importing.times.alignment import nearest_in_time
-from fieldcal.importing.words.file_names import best_name
+from fieldcal.importing.times.gravity_sum import lacks_gravity
+from fieldcal.importing.words.file_names import best_name, part_of_force
 from fieldcal.importing.words.heading_words import heading_meaning, words_in_name
 
 AXES = ("x", "y", "z")
@@ -26,11 +29,12 @@ Fields = Mapping[str, Array]
 
 
 class MatchedRecords(NamedTuple):
-    """Fields of both sensors, and the kinds of which they are."""
+    """Fields of both sensors, the kinds of which they are, and what else was done."""
 
     fields: dict[str, Array]
     acc: str
     gyr: str
+    says: str
 
 
 def pair_records(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
@@ -43,18 +47,61 @@ def pair_records(kinds: Mapping[str, Fields]) -> MatchedRecords | None:
     clock = next((name for name in _times(force) if name in _times(rate)), None)
     if clock is None or not all(axes):
         return None
-    t, late = force[clock], rate[clock]
-    known = np.flatnonzero(np.isfinite(late))
-    known = known[np.argsort(late[known], kind="stable")]
-    if len(t) < len(AXES) or not len(known):
+    t = force[clock]
+    if len(t) < len(AXES) or (near := _Nearest.of(t, rate[clock])) is None:
         return None
-    partner, apart = nearest_in_time(t, late[known])
-    far = ~(apart <= np.nanmedian(np.abs(np.diff(t))) / 2)
     found = {name: force[name] for name in _times(force)}
     found |= {f"acc_{axis}": force[name] for axis, name in axes[0].items()}
     for axis, name in axes[1].items():
-        found[f"gyr_{axis}"] = np.where(far, np.nan, rate[name][known][partner])
-    return MatchedRecords(found, acc, gyr)
+        found[f"gyr_{axis}"] = near.values(rate[name])
+    return MatchedRecords(found, acc, gyr, _add_gravity(found, kinds, clock))
+
+
+def _add_gravity(
+    found: dict[str, Array], kinds: Mapping[str, Fields], clock: str
+) -> str:
+    """Add gravity to accelerations that lack it; returns what was done, if anything."""
+    name = next((kind for kind in kinds if part_of_force(kind) == "gravity"), None)
+    gravity = kinds[name] if name else {}
+    axes = _axes(gravity)
+    near = _Nearest.of(found[clock], gravity[clock]) if clock in gravity else None
+    if near is None or not axes:
+        return ""
+    acc, down = (
+        np.column_stack([fields[names[axis]] for axis in AXES])
+        for fields, names in (
+            (found, {axis: f"acc_{axis}" for axis in AXES}),
+            (gravity, axes),
+        )
+    )
+    if not lacks_gravity(acc, down):
+        return ""
+    for axis in AXES:
+        found[f"acc_{axis}"] = found[f"acc_{axis}"] + near.values(gravity[axes[axis]])
+    return f"those of {name} are added to its accelerations, which lack gravity"
+
+
+class _Nearest(NamedTuple):
+    """Which record of another sensor is nearest to each, and where none is near."""
+
+    known: Index
+    partner: Index
+    far: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, t: Array, late: Array) -> _Nearest | None:
+        """Of times (n,) to those of another sensor (m,); None if it has none."""
+        known = np.flatnonzero(np.isfinite(late))
+        known = known[np.argsort(late[known], kind="stable")]
+        if not len(known):
+            return None
+        partner, apart = nearest_in_time(t, late[known])
+        return cls(known, partner, ~(apart <= np.nanmedian(np.abs(np.diff(t))) / 2))
+
+    def values(self, column: Array) -> Array:
+        """Values (n,) of the other sensor's records (m,)."""
+        near: Array = np.where(self.far, np.nan, column[self.known][self.partner])
+        return near
 
 
 def _axes(fields: Fields) -> dict[str, str]:

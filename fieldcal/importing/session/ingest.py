@@ -21,7 +21,8 @@ from fieldcal.importing.session.found_rests import find_rests
 from fieldcal.importing.session.sample_writer import SampleWriter, file_record
 from fieldcal.importing.session.stream_facts import StreamFacts
 from fieldcal.importing.times.row_validator import RowValidator
-from fieldcal.importing.units.time_units import recording_date
+from fieldcal.importing.units.scales import MIN_ROWS
+from fieldcal.importing.units.time_units import SLOWEST_HZ, recording_date
 from fieldcal.session.clock_steps import ClockStep, ClockStepRemover
 from fieldcal.session.folder import DESCRIPTION
 from fieldcal.session.lock import SessionLock
@@ -157,7 +158,7 @@ def _write_session(
                     jumps.add(good)
                 rows.add(cell_rows(cells.take_complete()))
                 written.add(good)
-        _refuse_useless(recording, facts)
+        _refuse_useless(recording, facts, means="position" in about)
         facts.left_out = judge.left_out
         written.close()
         found = find_rests(jumps, rows, cells.table, written.between, still)
@@ -166,6 +167,7 @@ def _write_session(
     tables = {} if given else {"position": found.positions}
     text = tomlkit.dumps({**about, **tables})
     (part / DESCRIPTION).write_text(text, encoding="utf-8")
+    recording.says += judge.says
     recording.says += [said for said in (found.how, found.left_out) if said]
     recording.says += [step.sentence() for step in clock.steps]
     repairs = [*recording.mended, *judge.mended]
@@ -179,15 +181,26 @@ def _write_session(
     )
 
 
-def _refuse_useless(recording: Recording, facts: StreamFacts) -> None:
-    """Raise InputError if nothing can come of these rows."""
+def _refuse_useless(recording: Recording, facts: StreamFacts, means: bool) -> None:
+    """Raise InputError if nothing can come of these rows, samples or `means`."""
+    if not facts.measured and facts.coldest is not None:
+        raise InputError(
+            f"{recording.path}: holds temperatures alone; import it with the file of"
+            " the IMU beside it, with --join"
+        )
     if not facts.measured:
         raise InputError(
             f"{recording.path}: has no number of an accelerometer or gyroscope in any"
             " row that can be used; name its columns with --columns"
         )
     if said := impossible_rate_text(facts.rate_hz):
-        raise InputError(f"{recording.path}: {said}")
+        raise InputError(f"{recording.path}: column t: {said}")
+    if facts.rate_hz < SLOWEST_HZ and facts.rows >= MIN_ROWS and not means:
+        raise InputError(
+            f"{recording.path}: column t: its samples are {1 / facts.rate_hz:.2g} s"
+            " apart, which no recording is: the times are in another unit; import it"
+            " again with --time-unit ms, us or ns, or name another column by --columns"
+        )
 
 
 def _without_clock_steps(

@@ -21,11 +21,13 @@ from fieldcal.importing.tables.column_times import (
     ask_rate_of_counter,
     ask_rate_of_shared_times,
     batch_options,
+    constant_value,
     is_clock_number,
     is_row_counter,
     rate_hint,
     split_seconds,
 )
+from fieldcal.importing.times.repeats import distinct_rows
 from fieldcal.importing.times.row_times import FRACTIONS
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.units.time_units import (
@@ -145,23 +147,56 @@ class ColumnClock:
         Raises
         ------
         InputError
-            If its times are too coarse to say when a row was taken.
+            If its times are too coarse to say when a row was taken, or none.
 
         """
-        table, at = self._of.beginning(), column_numbers(self._of, wanted).get("t", -1)
-        if not 0 <= at < table.shape[1]:
+        table, at = self._of.beginning(), column_numbers(self._of, wanted)
+        i = at.get("t", -1)
+        if not 0 <= i < table.shape[1]:
             return wanted
-        t = table[:, at]
-        both = any(name in column_numbers(self._of, wanted) for name in FRACTIONS)
-        if not both and (shared := shared_times(t)) is not None:
-            spread = batch_options(wanted, shared, t)
-            if spread is not None:
-                return self._said(spread)
-            if shared.equal:
-                asks = ask_rate_of_shared_times(wanted, shared, t)
-                raise InputError(f"{self._of.path}: {asks}")
-        if wanted.time_unit:
-            return wanted
+        # of rows that were written several times, each counts once
+        wanted_too = (j for name, j in at.items() if name != columns.SKIP)
+        used = [j for j in wanted_too if j < table.shape[1]]
+        once = distinct_rows(table[:, used], table[:, i])
+        table = table[once]
+        t = table[:, i]
+        if (value := constant_value(t)) is not None:
+            raise InputError(
+                f"{self._of.path}: column t is {value:.10g} in all rows, so it is no"
+                " time: name it _ in --columns, and give --rate"
+            )
+        if not any(name in at for name in FRACTIONS):
+            if (spread := self._spread(wanted, t)) is not None:
+                return replace(spread, written_again=not once.all())
+        return wanted if wanted.time_unit else self._told(wanted, table, i)
+
+    def _spread(self, wanted: ReadOptions, t: Array) -> ReadOptions | None:
+        """Options by which rows of one time (n,) are spread; None if none do.
+
+        Raises
+        ------
+        InputError
+            If the number of rows that share a time varies.
+
+        """
+        if (shared := shared_times(t)) is None:
+            return None
+        spread = batch_options(wanted, shared, t)
+        if spread is None and shared.equal:
+            asks = ask_rate_of_shared_times(wanted, shared, t)
+            raise InputError(f"{self._of.path}: {asks}")
+        return None if spread is None else self._said(spread)
+
+    def _told(self, wanted: ReadOptions, table: Array, i: int) -> ReadOptions:
+        """Options with the unit of times that their numbers, a rate or a name tell.
+
+        Parameters
+        ----------
+        wanted, table : options, and (n, k) the first rows
+        i : column of the times
+
+        """
+        t = table[:, i]
         if is_clock_number(t):
             self._of.guessed["time"] = (
                 f"{CLOCK_NUMBER}: no second of a minute is beyond 60"
@@ -175,7 +210,7 @@ class ColumnClock:
             raise InputError(f"{self._of.path}: {ask_rate_of_counter(wanted, table)}")
         if wanted.rate_hz:
             return self._beside_rate(wanted, wanted.rate_hz, t)
-        names = [c.name for way in self._of.heading() for c in way.columns[at : at + 1]]
+        names = [c.name for way in self._of.heading() for c in way.columns[i : i + 1]]
         unit, why = "", "its name says ticks"
         if said is not None:
             unit, why = time_unit_of_rate(t, said[0]), f"it says the rate: {said[1]!r}"
@@ -236,6 +271,14 @@ def column_numbers(source: ColumnSource, wanted: ReadOptions) -> dict[str, int]:
     return {n: places.index(p) for n, _, p in names if p in places}
 
 
+def _no_time(name: str, t: Array) -> str:
+    """Why numbers (n,) that are called a time are none, as far as it is known."""
+    if is_row_counter(t):
+        return f"its {name} only counts rows"
+    value = constant_value(t)
+    return "" if value is None else f"its {name} is {value:.10g} in all rows, no time"
+
+
 def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
     """Ask for the rate where no column is the time.
 
@@ -252,7 +295,7 @@ def ask_rate(source: ColumnSource, wanted: ReadOptions) -> None:
     said = {name: i for i, name in enumerate(names)
             if (one := heading_meaning(name)) is not None
             and one.kind == "t"}  # fmt: skip
-    rows = next((name for name, i in said.items() if is_row_counter(table[:, i])), "")
-    why = f"its {rows} only counts rows" if rows else "no column is t, the time"
+    why = next(filter(None, (_no_time(n, table[:, i]) for n, i in said.items())), "")
+    why = why or "no column is t, the time"
     hint = rate_hint(wanted, table)
     raise InputError(f"{source.path}: {why}: give the rate, e.g. --rate {hint}")

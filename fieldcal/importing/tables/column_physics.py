@@ -32,7 +32,7 @@ from fieldcal.importing.units.scales import (
     gain_scales,
 )
 from fieldcal.importing.units.time_units import usual_step
-from fieldcal.importing.words.heading_words import is_counter
+from fieldcal.importing.words.heading_words import heading_meaning, is_counter
 
 GROWS = 0.999
 """Share of steps of a time that are positive: a line may be damaged."""
@@ -87,7 +87,7 @@ def identify_columns(
         ]
         if clocks:
             # a thermometer may only grow as well, but the time stands first
-            channels[clocks[0]] = "t"
+            channels[next((i for i in clocks if _says_time(names[i])), clocks[0])] = "t"
     t = next((i for i, name in channels.items() if name == "t"), None)
     clock: Array = np.arange(len(table), dtype=float) if t is None else table[:, t]
     free = [i for i in range(table.shape[1]) if i not in {*known, *times}]
@@ -125,6 +125,12 @@ def unnamed_axes(
     moving = [i for i in free if _moves(table[:, i])]
     named = [three for three in _by_name(free, names) if {*three} & {*moving}]
     return _axis_triples(moving, names) or named
+
+
+def _says_time(name: str) -> bool:
+    """Whether a column is called a time."""
+    said = heading_meaning(name)
+    return said is not None and said.kind == "t"
 
 
 def _growing(table: Array) -> list[int]:

@@ -23,6 +23,7 @@ from fieldcal.importing.recording import (
 )
 from fieldcal.importing.tables import column_physics
 from fieldcal.importing.tables.column_clock import ColumnClock, ask_rate, column_numbers
+from fieldcal.importing.tables.heading_forces import with_checked_forces
 from fieldcal.importing.tables.heading_times import with_checked_times
 from fieldcal.importing.tables.means import scatter_columns
 from fieldcal.importing.text.rows_in_turn import RowsInTurn
@@ -122,9 +123,13 @@ class ColumnRecording(Recording):
         if self.wanted.columns:
             return {"0": self.wanted}
         table = self.beginning()
+        headed = self.heading()
+        checked = [
+            with_checked_forces(with_checked_times(way, table), table) for way in headed
+        ]
         ways = [
-            (headings.match_headings(*with_checked_times(way, table)), way)
-            for way in self.heading()
+            (headings.match_headings(*said), way)
+            for said, way in zip(checked, headed, strict=True)
         ]
         named = max((found for found, _ in ways), key=_match_quality, default=())
         way = next((w for found, w in ways if found and found is named), None)
@@ -133,11 +138,9 @@ class ColumnRecording(Recording):
             if told is not None:
                 return {"0": told}
             self._say_unnamed(named, way)
-        for way in self.heading() if not named else ():
+        for said in checked if not named else ():
             # the question of their size comes before that of their columns
-            named = named or headings.match_headings(
-                *with_checked_times(way, table), weak=True
-            )
+            named = named or headings.match_headings(*said, weak=True)
         if not named:
             raise InputError(self.ask())
         taken = {one.name: one.taken(self.wanted) for one in named}

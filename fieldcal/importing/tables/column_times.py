@@ -17,6 +17,7 @@ from fieldcal.importing.units.gravity_size import estimate_gravity
 from fieldcal.importing.units.rate_size import estimate_rate_unit
 from fieldcal.importing.units.scales import MIN_ROWS, USUAL_COUNTS, rounded_text
 from fieldcal.importing.units.time_units import (
+    UNIX,
     SharedTimes,
     possible_time_units,
     time_units_of_bursts,
@@ -37,6 +38,11 @@ SET_BACK = 0.01
 
 FRACTION_NAMES = tuple(sorted(FRACTIONS, key=lambda name: -FRACTIONS[name]))
 """Columns of fractions of a second, the coarsest first."""
+
+
+REACHED = 0.5
+"""Part of a second that what is beyond whole seconds reaches at least: the parts of a
+frame that are counted do not."""
 
 
 class SplitSeconds(NamedTuple):
@@ -79,6 +85,8 @@ def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
             name = next((f for f in FRACTION_NAMES
                          if np.max(part) * FRACTIONS[f] < 1), "")  # fmt: skip
             if i == j or not name or np.min(part) < 0 or np.ptp(part) == 0:
+                continue
+            if np.max(part) * FRACTIONS[name] < REACHED:
                 continue
             if (np.diff(part)[steps == 1] < 0).mean() < LATER:
                 continue
@@ -151,8 +159,9 @@ def ask_rate_of_counter(wanted: ReadOptions, table: Array) -> str:
     names = [SKIP if name == "t" else name for name in wanted.columns
              if not name.startswith("t=")]  # fmt: skip
     return (
-        f"its times only count rows: add --columns {quote(','.join(names))} --rate"
-        f" {rate_hint(wanted, table)}, or --time-unit ms if a row is taken each ms"
+        "its times grow by 1 from row to row, so they may count rows: add --columns"
+        f" {quote(','.join(names))} --rate {rate_hint(wanted, table)}; or --time-unit s"
+        " if a row is taken each second, or --time-unit ms if each ms"
     )
 
 
@@ -171,9 +180,22 @@ def rate_hint(wanted: ReadOptions, table: Array) -> str:
 
 
 def is_row_counter(t: Array) -> bool:
-    """Whether times (n,) are only row numbers."""
-    steps = np.diff(t[np.isfinite(t)])
-    return len(steps) > MIN_ROWS and float((steps == 1).mean()) > LATER
+    """Whether times (n,) are only row numbers; seconds since 1970 are none.
+
+    >>> rows = np.arange(100.0)
+    >>> is_row_counter(rows), is_row_counter(1.7e9 + rows)
+    (True, False)
+    """
+    t = t[np.isfinite(t)]
+    steps = np.diff(t)
+    counts = len(steps) > MIN_ROWS and float((steps == 1).mean()) > LATER
+    return counts and not UNIX[0] <= t[0] < UNIX[1]
+
+
+def constant_value(t: Array) -> float | None:
+    """The only value of numbers (n,), which are no times then; None of others."""
+    known = t[np.isfinite(t)]
+    return float(known[0]) if len(known) > 1 and not np.ptp(known) else None
 
 
 def keeps_growing(t: Array) -> bool:

@@ -13,7 +13,7 @@ AXES = ("x", "y", "z")
 
 _RULE = re.compile(r"[\s|:+-]*")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LIST = re.compile(rf"[\[({{]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}]")
+_LIST = re.compile(rf"[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]")
 _DIGITS = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{2}|[0-9A-Fa-f]{4}|[0-9A-Fa-f]{8})")
 
 MIN_COUNT_COLUMNS = 3

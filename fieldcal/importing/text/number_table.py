@@ -15,6 +15,7 @@ import numpy as np
 from fieldcal.core.samples import Array
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.text.text_lines import MISSING, plain_numbers, split_lines
+from fieldcal.importing.text.text_top import with_points
 
 
 class NumberTable:
@@ -60,7 +61,7 @@ class NumberTable:
         if len(use) < len(self._names):
             how["usecols"] = use
         if separator != ",":
-            lines = [line.replace(",", ".") for line in lines]
+            lines = [with_points(line) for line in lines]
         try:
             table = list(np.loadtxt(lines, **how).T)
         except ValueError:

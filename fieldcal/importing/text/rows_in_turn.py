@@ -90,6 +90,7 @@ class RowsInTurn:
         acc, gyr = (j.through(flow) for j, flow in zip(judges, flows, strict=True))
         yield from pair.through(acc, gyr)
         self.mended += [said for judge in judges for said in judge.mended]
+        self.says += [said for judge in judges for said in judge.says]
         self.says.append(
             "its rows hold the accelerometer or the gyroscope: each sample of the first"
             f" goes with the nearest, {1e3 * pair.worst:.2g} ms apart at most"

@@ -32,7 +32,7 @@ OTHER_QUANTITY = re.compile(r"lin|user|free|magn", re.IGNORECASE)
 """What it holds if they lack gravity or are of another sensor."""
 
 PLACES = 3
-"""Columns at the beginning of which one is the word."""
+"""Columns at the beginning of which one is the word, or else the last."""
 
 MIN_LINES = 2
 """Lines of a kind that is none by chance."""
@@ -86,12 +86,15 @@ class TaggedLines(TextForm):
         seen = Counter(find_separator(line) for line in lines)
         parted = separator or (seen.most_common(1)[0][0] if seen else None)
         rows = [split_cells(line, parted) for line in lines]
-        place = next((i for i in range(PLACES) if _is_word(rows, i)), None)
+        last = len(rows[-1]) - 1 if rows else 0
+        places = (*range(PLACES), *([last] if last >= PLACES else []))
+        place = next((i for i in places if _is_word(rows, i)), None)
         if place is None:
             return None
         found = _kinds(rows, place)
         acc, gyr = _chosen(found)
-        if acc is None:
+        # a word at the end may say what was done; of sensors it tells both
+        if acc is None or (place >= PLACES and gyr is None):
             return None
         here = [row for row in rows if len(row) == acc.width and row[place] == acc.word]
         time = next((i for i in range(acc.width) if _grows(row[i] for row in here)), -1)

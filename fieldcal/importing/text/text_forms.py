@@ -30,6 +30,7 @@ from fieldcal.importing.text.labels import (
     repeated_labels,
     repeated_shapes,
 )
+from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
@@ -41,7 +42,14 @@ from fieldcal.importing.times.clock_text import IN_LINE, ClockText, is_clock, is
 CLOCK = "utc time [s]"
 """What a column is called whose clock was read; a device's own time goes before it."""
 
-_ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*->\s*")
+_STAMP = r"(\S*\s?\d+:\d\d:\d\d(?:[.,]\d+)?)"
+_ARRIVALS = (
+    re.compile(rf"\s*\[?{_STAMP}\]?\s*->\s*"),
+    re.compile(rf"\s*\[{_STAMP}\][ \t]*(?=[-+.\d])"),
+    re.compile(rf"\s*{_STAMP} +(?=[-+.\d][^\s,;]*[,;\t])"),
+)
+"""Times that monitors write before a line: the Arduino IDE's; Tera Term's, in brackets;
+and CoolTerm's, parted by a space from columns that another sign parts."""
 
 
 def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
@@ -148,7 +156,10 @@ class LabelledValues(TextForm):
 
 
 class ArrivalPrefix(TextForm):
-    """The time at which a monitor received a line, ``12:34:56.789 -> ``: a column."""
+    """The time at which a monitor received a line, ``12:34:56.789 -> ``: a column.
+
+    Also ``[12:34:56.789] 0.1 0.2``, and ``12:34:56.789 0.1,0.2``.
+    """
 
     def __init__(self, separator: str) -> None:
         self._separator = separator
@@ -156,15 +167,17 @@ class ArrivalPrefix(TextForm):
     @classmethod
     def of(cls, lines: Sequence[str], separator: str | None) -> ArrivalPrefix | None:
         """The form, if most lines have it."""
-        if not is_true_of_most(lines, lambda line: _ARRIVAL.match(line) is not None):
+        if not is_true_of_most(lines, lambda line: _arrival(line) is not None):
             return None
-        return cls(separator or find_separator(_ARRIVAL.sub("", lines[-1])) or "\t")
+        said = _arrival(lines[-1])
+        rest = lines[-1][said.end() :] if said else lines[-1]
+        return cls(separator or find_separator(rest) or "\t")
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
 
         def one(line: str) -> str:
-            arrival = _ARRIVAL.match(line)
+            arrival = _arrival(line)
             if arrival is None:
                 return line
             rest = line[arrival.end() :]
@@ -173,6 +186,12 @@ class ArrivalPrefix(TextForm):
             return f"{arrival[1]}{self._separator}{rest}"
 
         return lambda lines: [one(line) for line in lines]
+
+
+def _arrival(line: str) -> re.Match[str] | None:
+    """The time before a line; None of a line without one."""
+    found = (form.match(line) for form in _ARRIVALS)
+    return next((said for said in found if said is not None), None)
 
 
 class ClockColumn(TextForm):
@@ -239,8 +258,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, RateOnTop, ReceiverLines, CheckedLines, EchoedMessages, EndedLines,
-    QuotedCells, LabelledValues, BarTable, ListCells, TaggedLines, ArrivalPrefix,
-    HexCells, ClockColumn,
+    DataflashText, LabviewText, RateOnTop, ReceiverLines, CheckedLines,
+    EchoedMessages, EndedLines, QuotedCells, LabelledValues, BarTable, ListCells,
+    TaggedLines, ArrivalPrefix, HexCells, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

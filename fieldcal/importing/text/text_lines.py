@@ -8,6 +8,9 @@ from fieldcal.session.arrow_columns import float_values
 MISSING = ("", "null", "NULL", "None", "NA", "N/A", "n/a", "#N/A", "NaN", "nan", "-")
 """What stands in a cell that holds no value."""
 
+MINUS = "\u2212"
+"""The sign that spreadsheets write before negative numbers in some languages."""
+
 TOP = 1000
 """Lines at the top among which the first of numbers is looked for."""
 
@@ -18,7 +21,7 @@ def split_lines(data: bytes) -> list[str]:
         text = data.decode()
     except UnicodeDecodeError:
         text = data.decode("cp1252", errors="replace")
-    lines = text.replace("\r\n", "\n").split("\n")
+    lines = text.replace("\r\n", "\n").replace(MINUS, "-").split("\n")
     return [line for line in lines if line.strip()]
 
 

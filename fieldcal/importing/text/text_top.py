@@ -31,6 +31,9 @@ LATEST = 50
 AXES = 3
 """Fewest columns by which the width of a table is told."""
 
+FEWEST = 2
+"""Fewest columns that names are looked for of: a time and a thermometer."""
+
 FULL = 50
 """Lines at the top by which the width of a row is judged."""
 
@@ -57,15 +60,42 @@ _RATE = re.compile(
 )
 
 
+_STEP = re.compile(
+    r"[#%/\s\"]*(?:delta[ _]?x|dt|(?:sample|sampling|time|logging)[ _]*"
+    r"(?:interval|period|step))\b[ _]*(?:\(?(s|ms|us)\)?)?\s*[:=;,\t ]+\s*\"?"
+    r"([0-9]+[.,]?[0-9]*(?:[eE][-+]?[0-9]+)?)(?:[;\t ]+\2)*\s*(s|ms|us)?\W*",
+    re.IGNORECASE,
+)
+"""The time from row to row, as ``Delta_X`` of LabVIEW, once for each column."""
+
+_SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
 def find_separator(line: str) -> str | None:
     """Return the separator of the columns of a line; None for spaces."""
     return next((s for s in SEPARATORS if s in line), None)
 
 
+_POINTS = re.compile(r"(?<=\d)\.(?=\d{3}(?:\.\d{3})*,\d)")
+_COMMAS = re.compile(r"(?<=\d),(?=\d{3}(?:,\d{3})*\.\d)")
+"""Signs between thousands, where the other one is that of the decimals."""
+
+
+def with_points(text: str) -> str:
+    """Numbers with decimal commas as numbers with points, without thousands' signs.
+
+    >>> with_points("1,5;-1.023,32;1,023.32")
+    '1.5;-1023.32;1023.32'
+    """
+    if "." in text and "," in text:
+        text = _COMMAS.sub("", _POINTS.sub("", text))
+    return text.replace(",", ".")
+
+
 def is_number(cell: str, comma: bool) -> bool:
     """Whether a cell is a number, where a comma is a decimal comma or no part of it."""
     try:
-        float(cell.replace(",", ".") if comma else cell)
+        float(with_points(cell) if comma else cell)
     except ValueError:
         return False
     return True
@@ -119,7 +149,9 @@ def count_top_lines(
     width, full = len(wanted.columns), max(map(len, rows[:FULL]), default=0)
     for i, (row, separator) in enumerate(zip(rows, parted, strict=True)):
         said = [row[j].strip() for j in use if j < len(row)]
-        whole = separator is None or len(row) in (full, width)
+        # a number alone, as of a rate, is no row
+        bare = separator is None and len(row) > len(use) / 2
+        whole = bare or len(row) in (full, width)
         numbers = all(is_number(cell, separator != ",") for cell in said if cell)
         if whole and any(said) and numbers:
             return i
@@ -137,7 +169,7 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
         for line in tops
     ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
-    return [one for one in found if len(one.columns) > 2]
+    return [one for one in found if len(one.columns) >= FEWEST]
 
 
 def _all_words(line: str) -> bool:
@@ -192,6 +224,13 @@ def find_stated_rate(
         said = [matched.group(1)] if matched else within if len(within) == 1 else []
         if said and float(said[0]) > 0:
             return float(said[0]), line.strip()
+    for line in lines[:LATEST]:
+        # one with its number for each column looks like a row
+        if (step := _STEP.fullmatch(line.strip())) is not None:
+            unit = (step[1] or step[3] or "").lower()
+            seconds = float(step[2].replace(",", ".")) * _SECONDS[unit]
+            if seconds > 0:
+                return 1 / seconds, line.strip()
     return None
 
 
@@ -206,7 +245,7 @@ def parse_numbers(lines: Sequence[str], separator: str | None) -> Array:
     for line in lines[first:]:
         row = line.split(parted)
         if len(row) == width:
-            text = [c.replace(",", ".") for c in row] if parted != "," else row
+            text = [with_points(c) for c in row] if parted != "," else row
             rows.append([_number(cell) for cell in text])
     return np.array(rows, dtype=float).reshape(-1, width)
 

@@ -1,5 +1,6 @@
 """Times that a text writes as a clock does: ``2024-05-03T23:59:50.123Z``, ``23:59:50``.
 
+The date may lack its signs, as in the basic format: ``20240503T235950.123Z``.
 Dates may stand before the time of day, in any usual order, or in a column of their own;
 AM and PM, decimal commas and zones are understood, and spreadsheets' ``59:50.1``
 (minutes and seconds) as well. Times count in seconds from the first midnight, or the
@@ -28,6 +29,16 @@ _LATE_YEAR = re.compile(
 )
 """What C calls ``ctime``: ``Wed Dec 22 21:09:46 2021``."""
 
+_DIGITS = r"(0[1-9]|1[0-2])([0-2]\d|3[01]){}([01]\d|2[0-3])([0-5]\d)([0-5]\d|60)"
+_BASIC = re.compile(rf"(\d{{4}}){_DIGITS.format('T')}([.,]\d+)?(\D.*)?")
+"""Basic format of ISO 8601, which leaves the signs out: ``20260314T101530.250Z``."""
+
+_PLAIN = re.compile(rf"(20\d\d){_DIGITS.format('')}([.,]\d+|\d{{3}}|\d{{6}})?()")
+"""The same without the T, ``20260314101530250``: no count has such figures in all."""
+
+_DASHED = re.compile(rf"{_DATE}[T _](\d\d)([-.])(\d\d)\3(\d\d(?:[.,]\d+)?)(\D.*)?")
+"""Signs as names of files have them: ``2026-03-14_10-15-30.250``."""
+
 _MINUTES = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d{2}[.,]\d+)")
 _DAY = re.compile(_DATE)
 _ZONE_BEFORE_NUMBERS = (
@@ -48,7 +59,7 @@ def is_clock(cell: str) -> bool:
     >>> [is_clock(c) for c in ("23:59:50.123", "05/03/2024 11:59 PM", "1.5", "59:50.1")]
     [True, False, False, True]
     """
-    cell = _date_first(cell)
+    cell = _usual_form(cell)
     return bool(_CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell))
 
 
@@ -57,11 +68,19 @@ def is_date(cell: str) -> bool:
     return _DAY.fullmatch(cell.strip()) is not None
 
 
-def _date_first(text: str) -> str:
-    """A time with its date before it, where the year stands behind."""
-    said = _LATE_YEAR.fullmatch(text.strip())
+def _usual_form(text: str) -> str:
+    """A time with its date before it, where the year stands behind; with its signs."""
+    text = text.strip()
+    if (basic := _BASIC.fullmatch(text) or _PLAIN.fullmatch(text)) is not None:
+        year, month, day, hour, minute, second, part, zone = basic.groups("")
+        part = f".{part.lstrip('.,')}" if part else ""
+        return f"{year}-{month}-{day}T{hour}:{minute}:{second}{part}{zone}"
+    if (dashed := _DASHED.fullmatch(text)) is not None:
+        day, hour, _, minute, second, zone = dashed.groups("")
+        return f"{day}T{hour}:{minute}:{second}{zone}"
+    said = _LATE_YEAR.fullmatch(text)
     if said is None:
-        return text.strip()
+        return text
     return f"{said['day']}-{said['month']}-{said['year']} {said['time']}"
 
 
@@ -88,7 +107,7 @@ class ClockText:
         day : the date, where it has a column of its own
 
         """
-        said = _CLOCK.fullmatch(_date_first(text))
+        said = _CLOCK.fullmatch(_usual_form(text))
         if said is None:
             return self._of_minutes(text)
         h, half = int(said["h"]), (said["half"] or "").lower()

@@ -3,7 +3,8 @@
 A row is refused whose time is not later than that of the row before, whose numbers are
 infinite or larger than any sensor's, or which holds nothing but zeros (a buffer that
 was never filled): a missing value is no zero. Rows without any number are no samples,
-and are left out as if they were not there.
+and are left out as if they were not there. A row that repeats the one before, time and
+values, was written several times: it is taken once, which is said.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Block, Index, concat, runs_of_true
 from fieldcal.importing.recording import MAX_LISTED_FAULTS, MAX_READING
+from fieldcal.importing.times.repeats import repeats
 
 Rows = NDArray[np.bool_]
 
@@ -39,6 +41,11 @@ class RowValidator:
     place : names a row, counted from 0
     repair : whether bad rows are left out and said, or refused
 
+    Attributes
+    ----------
+    left_out : bad rows that were left out
+    repeated : rows that were written several times, taken once
+
     """
 
     def __init__(self, name: str, place: Callable[[int], str], repair: bool) -> None:
@@ -47,7 +54,19 @@ class RowValidator:
         self._held, self._held_row = concat([]), -1
         self._runs: list[tuple[str, str, int, int]] = []
         self._more = [0, 0]
-        self.left_out = 0
+        self._first_repeated = -1
+        self.left_out = self.repeated = 0
+
+    @property
+    def says(self) -> list[str]:
+        """What the user must know of rows that are no fault, a sentence each."""
+        if not self.repeated:
+            return []
+        many = f" ({self.repeated} such rows)" if self.repeated > 1 else ""
+        return [
+            f"{self._place(self._first_repeated)}: repeats the row above, time and"
+            f" values{many}: what was written several times is taken once"
+        ]
 
     @property
     def mended(self) -> list[str]:
@@ -72,18 +91,39 @@ class RowValidator:
 
         """
         for block in blocks:
-            yield self._add(block)
-        if len(self._held):
-            yield self._of_time_order(self._held, np.array([self._held_row]), np.inf)
+            yield self.feed(block)
+        if len(last := self.rest()):
+            yield last
+
+    def rest(self) -> Block:
+        """Return the last row, where no block follows.
+
+        Raises
+        ------
+        InputError
+            As `through` does.
+
+        """
+        held, self._held = self._held, concat([])
+        if len(held):
+            held = self._of_time_order(held, np.array([self._held_row]), np.inf)
         if self.left_out > MAX_LEFT_OUT * max(self._seen, MIN_LONG_ROWS):
             raise InputError(
                 f"{self._name}: {self.left_out} of {self._seen} rows cannot be used"
                 f" ({self._sentence(*self._runs[0])}): mend the file itself, or name"
                 " its columns and their units by --columns and --time-unit"
             )
+        return held
 
-    def _add(self, block: Block) -> Block:
-        """Rows that can be used, up to the last one with a time."""
+    def feed(self, block: Block) -> Block:
+        """Return the rows that can be used, up to the last one with a time.
+
+        Raises
+        ------
+        InputError
+            As `through` does.
+
+        """
         bad = np.zeros(len(block), dtype=bool)
         for column, what, rows in self._faults(block):
             self._note(column, what, self._seen + np.flatnonzero(rows & ~bad))
@@ -97,6 +137,7 @@ class RowValidator:
                 whole = concat([self._held, whole])
             else:
                 numbers = numbers[1:]
+            whole, numbers = self._without_repeats(whole, numbers)
             self._held, self._held_row = whole[-1:], int(numbers[-1])
             following = float(whole.t[-1])
             whole = self._of_time_order(whole[:-1], numbers[:-1], following)
@@ -104,6 +145,16 @@ class RowValidator:
             whole = block[:0]
         self._seen += len(block)
         return whole
+
+    def _without_repeats(self, block: Block, numbers: Index) -> tuple[Block, Index]:
+        """Rows, and their numbers in the file, without those that repeat the last."""
+        again = repeats(block)
+        if not again.any():
+            return block, numbers
+        if not self.repeated:
+            self._first_repeated = int(numbers[np.argmax(again)])
+        self.repeated += int(again.sum())
+        return _rows_of(block, ~again), numbers[~again]
 
     def _leave_out(self, count: int) -> None:
         """Count bad rows; refuse them where no repair was asked for."""

@@ -13,12 +13,20 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldcal.core.errors import InputError
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
 from fieldcal.importing.recording import TIME_UNITS
 from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
 
-RATES_HZ = (1.0, 8000.0)
-"""What a logger of an IMU writes in a second."""
+RATES_HZ = (0.9, 8000.0)
+"""What a logger of an IMU writes in a second: of 1 Hz, a clock shows a little less."""
+
+STATED_HZ = 0.2
+"""Rate of times in a stated unit below which it is asked about, Hz: logs from 0.2 kHz
+down read less where ms are called s."""
+
+SLOWEST_HZ = 1e-3
+"""Slowest rate of what anyone calls a recording, Hz: a reading in a quarter of an
+hour."""
 
 MIN_RECORDING_S = 5.0
 """Shortest recording, s, where another unit of time makes it longer."""
@@ -76,10 +84,54 @@ def assumed_time_unit(name: str, t: Array) -> tuple[str, str]:
             f"{name}: its times may be {' or '.join(rates)}: add"
             f" {' or '.join(f'--time-unit {u}' for u in fits)}"
         )
+    if not fits and step:
+        _refuse_impossible_times(name, t, step)
     if not fits or fits == ["s"]:
         return "", ""
     rate = 1 / (TIME_UNITS[fits[0]] * step) if step else np.nan
     return fits[0], f"{fits[0]}, which makes {rate:.4g} Hz"
+
+
+def check_stated_times(name: str, unit: str, t: Array) -> None:
+    """Ask about the unit of times (n,), s, that names of columns state.
+
+    Raises
+    ------
+    InputError
+        If they make far less than any log has, and in another unit what logs have.
+
+    """
+    step, size = _step(t), TIME_UNITS[unit]
+    if not step or 1 / step >= STATED_HZ:
+        return
+    fits = [u for u in possible_time_units(t / size) if TIME_UNITS[u] < size]
+    if fits:
+        rate = 1 / (step / size * TIME_UNITS[fits[0]])
+        raise InputError(
+            f"{name}: the names of its columns say that times are in {unit}, which"
+            f" makes {1 / step:.2g} Hz, and in {fits[0]} it is {rate:.4g} Hz: add"
+            f" --time-unit {fits[0]} or --time-unit {unit}, if it is so"
+        )
+
+
+def _refuse_impossible_times(name: str, t: Array, step: float) -> None:
+    """Refuse times (n,) of which no unit makes the rate of a sensor.
+
+    Raises
+    ------
+    InputError
+        Naming file, column and remedy.
+
+    """
+    fastest = max(n / step for n in TIME_SIZES.values())
+    if fastest >= RATES_HZ[0] and 1 / step <= IMPOSSIBLE_RATE_HZ:
+        return
+    known = t[np.isfinite(t)]
+    raise InputError(
+        f"{name}: column t: its numbers, {known[0]:.10g} to {known[-1]:.10g}, make"
+        f" {1 / step:.2g} Hz in s, and in no unit a rate that a recording has: name the"
+        " column of the times with --columns, or skip this one with _ and give --rate"
+    )
 
 
 def counts_from_long_ago(t: Array) -> bool:

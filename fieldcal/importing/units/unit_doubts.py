@@ -63,7 +63,7 @@ def check_one_unit(parts: Sequence[Recording]) -> None:
     """
     sizes = {
         part.path.name: gravity.size
-        for part in parts if len(parts) > 1
+        for part in parts if len(parts) > 1 and not part.lacks_gravity
         if (gravity := _gravity_of_file(part)) is not None
     }  # fmt: skip
     low, high = (f(sizes, key=sizes.__getitem__, default="") for f in (min, max))
@@ -79,6 +79,13 @@ def _gravity_of_file(part: Recording) -> GravityReading | None:
     name = part.streams()[0].name
     acc = part.alone(name).first_rows(name, FIRST_ROWS).acc
     return estimate_gravity(acc - part.wanted.acc_scale * part.wanted.zero)
+
+
+LOG_GRAVITY = (
+    "log those with gravity in them, or import the file of gravity beside them with"
+    " --join (Accelerometer.csv Gravity.csv)"
+)
+"""What to do about accelerations from which gravity was taken."""
 
 
 class StatedUnits:
@@ -114,7 +121,7 @@ class StatedUnits:
             raise InputError(
                 f"{self._name}: |a| at rest is {gravity.size:.3g} m/s^2: gravity was"
                 " taken out of these accelerations, and nothing can be calibrated by"
-                " them; log those with gravity in them"
+                f" them; {LOG_GRAVITY}"
             )
         fits = _within(gravity.size / self._said.acc_scale, ACC_SCALES)
         shows = f"|a| at rest is {gravity.size:.4g} m/s^2 then, not gravity"

@@ -17,6 +17,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import Array, Block
 from fieldcal.importing.recording import MAX_READING, ReadOptions, Recording
 from fieldcal.importing.units.calm_rates import guess_unit_of_calm_rates
+from fieldcal.importing.units.file_times import FIRST_ROWS, settle_time_units
 from fieldcal.importing.units.gravity_size import (
     GravityReading,
     are_means,
@@ -35,7 +36,11 @@ from fieldcal.importing.units.scales import (
     rounded_text,
 )
 from fieldcal.importing.units.thermometers import temperature_counts, temperature_fits
-from fieldcal.importing.units.time_units import assumed_time_unit, usual_step
+from fieldcal.importing.units.time_units import (
+    assumed_time_unit,
+    check_stated_times,
+    usual_step,
+)
 from fieldcal.importing.units.unit_answers import (
     rate_options,
     scales_of_decimals,
@@ -43,14 +48,12 @@ from fieldcal.importing.units.unit_answers import (
     zero_options,
 )
 from fieldcal.importing.units.unit_doubts import (
+    LOG_GRAVITY,
     StatedUnits,
     check_format_units,
     check_one_unit,
 )
 from fieldcal.session.units import UNSCALED
-
-ROWS = 1 << 17
-"""Rows at the beginning by which units are told."""
 
 NO_UNIT = 0.75
 """What gravity reads at least in any unit, less what no factory scale is out by."""
@@ -83,9 +86,7 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
 
     """
     parts = recording.parts
-    times = [
-        why for part in parts if len(parts) > 1 and (why := _settle_time_unit(part))
-    ]
+    times = settle_time_units(parts) if len(parts) > 1 else []
     heard = recording.alone(stream)
     block = _beginning(heard, stream)
     if not all(part.asks_units for part in parts):
@@ -102,24 +103,8 @@ def settle_units(recording: Recording, stream: str) -> AssumedUnits:
     return AssumedUnits(taken | guess.found, guess.acc_bias)
 
 
-def _settle_time_unit(part: Recording) -> str:
-    """Determine the time unit of one of several files; return the reason, "" if stated.
-
-    Each has a clock column of its own, while each unit of a sensor stands in one.
-    """
-    wanted = part.wanted
-    if not part.asks_units or wanted.time_unit or wanted.rate_hz:
-        return ""
-    stream = part.streams()[0].name
-    unit, why = assumed_time_unit(
-        str(part.path), part.alone(stream).first_rows(stream, ROWS).t
-    )
-    part.wanted = replace(part.wanted, time_unit=unit or "s")
-    return why
-
-
 def _beginning(recording: Recording, stream: str) -> Block:
-    whole = recording.first_rows(stream, ROWS)
+    whole = recording.first_rows(stream, FIRST_ROWS)
     # such values tell no unit; whoever takes the rows says where they stand
     acc, gyr = (np.where(np.abs(three) > MAX_READING, np.nan, three)
                 for three in (whole.acc, whole.gyr))  # fmt: skip
@@ -163,6 +148,8 @@ class _Guess:
             unit, why = assumed_time_unit(name, block.t)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
+        elif "t" in said.named and not are_means(block.acc):
+            check_stated_times(name, said.time_unit, block.t)
         t = block.t * (self.said.time_scale / said.time_scale)
         block = replace(block, t=t)
         self._zero = said.acc_scale * said.zero
@@ -211,8 +198,8 @@ class _Guess:
             raise InputError(
                 f"{self._name}: {shows}, less than gravity reads in any unit: it seems"
                 " to be taken out of these accelerations, and nothing can be"
-                " calibrated by them; log those with gravity in them, or, if it is so,"
-                f" add --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
+                f" calibrated by them; {LOG_GRAVITY}, or, if it is so, add"
+                f" --acc-unit g --acc-lsb {rounded_text(gravity.size)}"
             )
         if len(fits) != 1:
             self._ask(

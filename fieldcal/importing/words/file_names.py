@@ -18,17 +18,19 @@ _OTHERS = ("mag", "magnetometer", "linear", "lin", "gravity", "imu", "and", "ang
            "orientation")  # fmt: skip
 """Words of files that hold something else, or more."""
 
-ACC = (
-    "totalacceleration",
-    "accelerometeruncalibrated",
-    "accelerometer",
-    "acceleration",
-)
+TOTAL = ("totalacceleration", "accelerometeruncalibrated")
+"""Names of accelerations with gravity, whoever writes them."""
+
+ACC = (*TOTAL, "accelerometer", "acceleration")
 GYR = ("gyroscope", "gyroscopeuncalibrated", "rotationrate", "gyro")
 """Names that programs on telephones give to sensors, those that are taken first first.
 
 From what is called an accelerometer beside a total acceleration gravity was taken out.
 """
+
+LINEAR = ("linearacceleration", "linearaccelerometer", "useracceleration")
+GRAVITY = ("gravity",)
+"""Names of an acceleration without gravity, and of gravity."""
 
 SENSOR = {"acc": "accelerometers", "gyr": "gyroscopes"}
 """What each is called in a sentence."""
@@ -47,6 +49,16 @@ def best_name(sensor: str, names: Iterable[str]) -> str | None:
             if bare == rank:
                 return name
     return next((name for name in there if sensor_of_file_name(name) == sensor), None)
+
+
+def part_of_force(stem: str) -> str:
+    """Part of the specific force that a file holds: "gravity", "linear", "" for none.
+
+    >>> [part_of_force(stem) for stem in ("Gravity", "Linear Acceleration", "log")]
+    ['gravity', 'linear', '']
+    """
+    bare = "".join(words_in_name(stem))
+    return "gravity" if bare in GRAVITY else "linear" if bare in LINEAR else ""
 
 
 def sensor_of_file_name(stem: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 SPELLINGS = {
     "m/s^2": ("m/s^2", "m/s2", "m/s²", "m/s/s", "m/s**2", "mps2", "m s-2", "ms-2",
               "m s^-2", "m/(s^2)", "m.s-2", "m.s^-2", "m/sec^2", "m/(sec^2)",
@@ -30,8 +32,23 @@ SPELLINGS = {
     "min": ("min", "mins", "minute", "minutes"),
     "deg C": ("c", "°c", "°", "degc", "deg c", "celsius", "℃", "degrees c", "deg.c",
               "ºc"),
+    "K": ("kelvin", "degk", "deg k"),
+    "deg F": ("°f", "degf", "deg f", "fahrenheit", "℉", "degrees f", "ºf"),
 }  # fmt: skip
 """How each unit is written."""
+
+CAPITALS = {"K": "K", "F": "deg F"}
+"""Units only as capital letters: small ones count steps, or say what is filtered."""
+
+TEMPERATURES = {"deg C": "degC", "K": "K", "deg F": "degF"}
+"""Units of temperatures, and what ``--temp-unit`` calls them."""
+
+THERMOMETERS = (*SPELLINGS["K"], *SPELLINGS["deg F"], "°c", "degc", "deg c", "celsius",
+                "℃", "degrees c", "deg.c", "ºc")  # fmt: skip
+"""Units that tell a thermometer, whatever it is called: a lone c or ° may be any."""
+
+_UNIT_BEHIND = re.compile(r"(.*?)[\s_.]*([(\[][^()\[\]]*[)\]]|[^\s_.()\[\]]+)")
+"""A name with what may be its unit, in brackets or as the last word."""
 
 _WRITTEN = {text: unit for unit, texts in SPELLINGS.items() for text in texts}
 
@@ -43,7 +60,7 @@ UNITS = {
     "g": ("rad/s", "deg/s", "mrad/s", "mdeg/s", "udeg/s", "deg/h"),
     "t": ("s", "ms", "us", "ns", "min"),
     "dt": ("s", "ms", "us", "ns"),
-    "temperature": ("deg C",),
+    "temperature": tuple(TEMPERATURES),
     "m": (),
     "seq": (),
     "t_host": (),
@@ -64,5 +81,28 @@ def parse_unit(text: str) -> str | None:
     # of "(m/(s^2))" the outer brackets, of "m/(s^2)" none
     while bare.lower() not in _WRITTEN and bare[:1] + bare[-1:] in ("()", "[]"):
         bare = bare[1:-1].strip()
+    if bare in CAPITALS:
+        return CAPITALS[bare]
     bare = bare.lower().replace("/per/", "/").replace(" per ", "/")
     return _WRITTEN.get(bare) or _WRITTEN.get(bare.strip("[]() "))
+
+
+def split_thermometer_name(name: str, unit: str) -> tuple[str, str] | None:
+    """Name and unit of what only its unit says to be a thermometer; None of another.
+
+    Parameters
+    ----------
+    name : of a column
+    unit : what the file says of it elsewhere, or nothing
+
+    >>> split_thermometer_name("imu_degC", ""), split_thermometer_name("°C", "")
+    (('imu', 'deg C'), ('', 'deg C'))
+    >>> split_thermometer_name("roll (°)", ""), split_thermometer_name("quat_c", "")
+    (None, None)
+    """
+    split = _UNIT_BEHIND.fullmatch(name)
+    pairs = [(split[1], split[2])] if split else []
+    for bare, written in (("", name), *pairs, (name, unit)):
+        if written.strip().strip("[]() ").lower() in THERMOMETERS:
+            return bare, parse_unit(written) or ""
+    return None

@@ -13,7 +13,13 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from fieldcal.importing.words.heading_units import TELLING, UNITS, parse_unit
+from fieldcal.importing.words.heading_units import (
+    TELLING,
+    TEMPERATURES,
+    UNITS,
+    parse_unit,
+    split_thermometer_name,
+)
 from fieldcal.importing.words.rate_names import with_axis_letter
 
 AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
@@ -55,7 +61,8 @@ _GAINS = (
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "ts", "tstamp", "sensortime",
           "epoch", "epoc", "unixtime", "datetime", "zeit", "tiempo", "temps", "tempo",
           "tijd", "时间", "sow", "tow")  # fmt: skip
-_SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot")
+_SINCE = ("elapsed", "epoch", "uptime", "since", "start", "boot", "realtime",
+          "monotonic", "mono")  # fmt: skip
 """Words of a time where a unit of time stands beside them."""
 
 _STEPS = (("dt",), ("delta", "t"), ("delta", "time"), ("time", "delta"), ("deltat",),
@@ -100,7 +107,9 @@ _BARE = re.compile("[\u0300-\u036f]")
 """Accents, once they are apart from their letters."""
 
 _INDEX = re.compile(r"(.+)(?:\[|\.0)([012])\]?")
-"""Axes of an array: ``gyro_rad[0]``, or ``gyro_rad.00`` as PlotJuggler writes it."""
+_INDEX_IN_UNIT = re.compile(r"(.+)\[([012])\]\s*\((.*)\)")
+"""Axes of an array: ``gyro_rad[0]``, ``gyroADC[0] (deg/s)``, or ``gyro_rad.00`` as
+PlotJuggler writes it."""
 
 
 class HeadingMeaning(NamedTuple):
@@ -148,7 +157,17 @@ def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
                 kind=found.kind or _kind_of(said),
                 weak=found.weak or bool({*_WITHOUT_GRAVITY} & {*found.label}),
             )
-    return None
+    return _unnamed_thermometer(name, unit)
+
+
+def _unnamed_thermometer(name: str, unit: str) -> HeadingMeaning | None:
+    """The meaning of a name that says a thermometer by its unit alone: imu_degC."""
+    said = split_thermometer_name(name, unit)
+    words = [w.lower() for w in _WORD.findall(said[0])] if said else []
+    # an axis, whatever it is of, is no thermometer
+    if said is None or {*words} & {*"xyz"}:
+        return None
+    return HeadingMeaning("temperature", "", said[1], tuple(words), True)
 
 
 def _as_angle_rate(found: HeadingMeaning) -> HeadingMeaning:
@@ -171,6 +190,9 @@ def _kind_of(unit: str | None) -> str:
 
 def _name_unit_splits(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
     """Possible splits of a text into a name and its unit."""
+    if (one := _INDEX_IN_UNIT.fullmatch(name)) is not None:
+        yield f"{one.group(1)}_{'xyz'[int(one.group(2))]}", parse_unit(one.group(3))
+        return
     if indexed := _INDEX.fullmatch(name):
         name = f"{indexed.group(1)}_{'xyz'[int(indexed.group(2))]}"
     elif bracketed := _BRACKETS.fullmatch(name):
@@ -194,7 +216,7 @@ def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | No
     if not words:
         return None
     words = with_axis_letter(words)
-    if "t" in words and unit == "deg C":
+    if "t" in words and unit in TEMPERATURES:
         return HeadingMeaning(
             "temperature", "", unit, tuple(w for w in words if w != "t")
         )

@@ -3,9 +3,10 @@
 A line is one sample, its fields in the order of ``columns`` (a name that is none of
 t, seq, ax … gz, temperature is passed over), between ``separator``: a character or
 comma, semicolon, tab, space. Units are ``t_unit`` (s, ms, us, ns), ``acc_unit`` and
-``gyr_unit`` as in session.toml. ``checksum=xor`` asks each line for the two hexadecimal
-digits behind ``*`` that NMEA 0183 has: the exclusive or of all between ``$`` and ``*``.
-``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no part of it.
+``gyr_unit`` as in session.toml, or mdeg/s. ``checksum=xor`` asks each line for the two
+hexadecimal digits behind ``*`` that NMEA 0183 has: the exclusive or of all between
+``$`` and ``*``. ``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no
+part of it.
 
 Headers and comments (lines that begin with a letter or one of # % ; / ") and blank
 lines are passed over, any other line that is not whole is refused. Without a checksum
@@ -37,6 +38,7 @@ LONGEST = 1024
 """Longest line, bytes; what is longer is no line."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+RATE_UNITS = {**GYR_UNITS, "mdeg/s": np.pi / 180e3}
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 KNOWN_COLUMNS = ("t", "seq", *CHANNELS, "temperature")
 DEFAULT = "t,ax,ay,az,gx,gy,gz,temperature"
@@ -77,7 +79,7 @@ class TextCodec(Codec):
         self._prefix = np.frombuffer(prefix.encode(), np.uint8)
         self._checked = options.choice("checksum", ("none", "xor"), "none") == "xor"
         acc = ACC_UNITS[options.choice("acc_unit", ACC_UNITS, "m/s^2")]
-        gyr = GYR_UNITS[options.choice("gyr_unit", GYR_UNITS, "rad/s")]
+        gyr = RATE_UNITS[options.choice("gyr_unit", RATE_UNITS, "rad/s")]
         self._scale = np.array([acc] * 3 + [gyr] * 3)
         unit = options.choice("t_unit", TIME_UNITS, "s")
         self._t_unit = TIME_UNITS[unit]

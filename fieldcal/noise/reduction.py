@@ -80,7 +80,10 @@ class Reducer:
         self._value = np.full(CHANNELS + 1, np.nan)
 
     def add(self, block: Block) -> None:
-        """Take samples, in order of time."""
+        """Take samples, in order of time; those without any value count as lost."""
+        blank = ~np.isfinite(block.six).any(axis=1)
+        if blank.any():
+            block = block[np.flatnonzero(~blank)]
         if not len(block):
             return
         if np.isnan(self._gap_s) and len(block) > 2:

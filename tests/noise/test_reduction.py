@@ -127,3 +127,16 @@ def test_a_slow_device_has_no_gap_behind_each_sample(period: float) -> None:
     found = reduce_recording([Block.of(t, block.acc, block.gyr)])
     assert [s.samples for s in found.stretches] == [400, 200]
     assert found.stretches[0].dt == pytest.approx(period, rel=1e-3)
+
+
+@pytest.mark.parametrize("length", [30, 600])
+def test_blank_samples_are_lost_ones_and_no_silence(length: int) -> None:
+    """As what a window has without its disturbances; held values have no noise."""
+    block = at_rest()
+    for first in range(5000, len(block) - length, 5000):
+        block.acc[first : first + length] = block.gyr[first : first + length] = np.nan
+    found = reduce_recording([block])
+    assert found.samples == np.isfinite(block.acc[:, 0]).sum()
+    assert len(found.stretches) == (1 if length < RATE else 6)
+    size = estimate_noise([found]).channels["ax"].processes["N"]
+    assert abs(size.value - SIZE / RATE**0.5) < 4 * size.sigma

@@ -13,7 +13,8 @@ lines are passed over, any other line that is not whole is refused. Without a ch
 the first line counts for nothing: it may be the end of one.
 
 ``t_unit=ms`` and ``us`` are taken for counters of ``t_bits=32``; ``t_resolution`` is in
-s (1 ms for ms). Without a column t: ``rate=`` in Hz, else the arrivals.
+s (1 ms for ms, else seen where samples share a stamp). Without a column t: ``rate=`` in
+Hz, else the arrivals.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index, M
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sample_counter import SampleCounter
+from fieldcal.drivers.stamp_resolution import StampResolution
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 LONGEST = 1024
@@ -87,6 +89,8 @@ class TextCodec(Codec):
         bits = options.number("t_bits", counter, 0, 64)
         coarse = 1e-3 if unit == "ms" else 0.0
         resolution = options.number("t_resolution", coarse, 0, 1)
+        stated = resolution > 0 or options.text("t_resolution")
+        self._resolution = None if stated else StampResolution()
         span = 2**bits * self._t_unit if bits else float("inf")
         self._clock = ChosenTimebase(self.health, options, resolution, span)
         self._whole = self._checked
@@ -244,6 +248,10 @@ class TextCodec(Codec):
         stamps = column.get("t", unknown) * self._t_unit
         six = np.column_stack([column.get(name, unknown) for name in CHANNELS])
         temperature = column.get("temperature", unknown)
+        if self._resolution and "t" in self._names:
+            if coarse := self._resolution.found(stamps, six):
+                self._clock.coarsen(coarse)
+                self._resolution = None
         which = np.arange(len(values))
         raw = RawSamples(which, six * self._scale, temperature, stamps, seq)
         return self._timed(self._clock, raw, t_host, self._seq.steps(seq))

@@ -154,8 +154,9 @@ def _states(signal: Signal) -> int | None:
     """
     least, most = signal.minimum or 0, signal.maximum or 0
     plain = (signal.scale, signal.offset) == (1, 0) and not signal.is_signed
-    whole = least == int(least) and most == int(most)
-    if not (plain and whole and 0 <= least < most < 2**signal.length):
+    if not (plain and 0 <= least < most < 2**signal.length):
+        return None  # also where they are no numbers
+    if least != int(least) or most != int(most):
         return None
     states = int(most - least) + 1
     return states if states < 2**signal.length else None

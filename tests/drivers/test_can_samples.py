@@ -235,8 +235,9 @@ def test_frames_of_noise_break_nothing_however_they_are_cut(
 @pytest.mark.parametrize(
     ("stated", "least", "states", "missing"),
     [("0|14", 0, 15, 0), ("1|15", 1, 15, 0), ("0|15", 0, 16, 0), ("0|0", 0, 16, 0),
-     ("0|3", 0, 16, 0), ("0|0", 0, 15, 6)],
-    ids=["E2E", "from 1", "all", "unstated", "wrongly stated", "unstated, and fewer"],
+     ("0|3", 0, 16, 0), ("0|0", 0, 15, 6), ("0|1e999", 0, 16, 0), ("0|14.5", 0, 16, 0)],
+    ids=["E2E", "from 1", "all", "unstated", "wrongly stated", "unstated, and fewer",
+         "endless", "no whole number"],
 )  # fmt: skip
 def test_a_counter_has_as_many_numbers_as_its_range_states(
     tmp_path: Path, stated: str, least: int, states: int, missing: int

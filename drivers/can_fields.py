@@ -54,6 +54,7 @@ class SignalField:
     scale, offset : a and b
     special : raw numbers with a name in the DBC; these are no measurements
     size : bytes that a frame needs to hold it
+    states : raw numbers that a counter has, where the DBC states fewer than fit in
 
     """
 
@@ -68,6 +69,7 @@ class SignalField:
     offset: float
     special: tuple[int, ...]
     size: int
+    states: int | None = None
 
     @classmethod
     def of(cls, signal: Signal) -> SignalField:
@@ -105,6 +107,7 @@ class SignalField:
             float(signal.offset),
             tuple(int(value) for value in signal.choices or ()),
             end,
+            _states(signal),
         )
 
     def bits(self, data: Bytes) -> Words:
@@ -142,6 +145,21 @@ class SignalField:
     def span(self) -> float:
         """Raw value at which a counter in this field wraps."""
         return float("inf") if self.floating else float(2**self.length)
+
+
+def _states(signal: Signal) -> int | None:
+    """How many numbers a signal has by its stated range; None if all that fit in.
+
+    A counter of the E2E profile 1 has four bits and counts from 0 to 14.
+    """
+    least, most = signal.minimum or 0, signal.maximum or 0
+    plain = (signal.scale, signal.offset) == (1, 0) and not signal.is_signed
+    if not (plain and 0 <= least < most < 2**signal.length):
+        return None  # also where they are no numbers
+    if least != int(least) or most != int(most):
+        return None
+    states = int(most - least) + 1
+    return states if states < 2**signal.length else None
 
 
 def _first_bit(signal: Signal) -> int:

@@ -77,7 +77,9 @@ class CanAssembler:
             health, options, tick if span < np.inf else 0.0, span
         )
         counter = self._channel("seq")
-        self._sequence = SampleCounter(counter.field.span if counter else float("inf"))
+        self._sequence = SampleCounter()
+        if counter:
+            self._sequence = SampleCounter(counter.field.span, counter.field.states)
         self._temperature = float("nan")
         count = len(self._needed)
         self._groups: FrameGrouper = SequenceGrouper(count, health, first, within)

@@ -46,6 +46,10 @@ class ChosenTimebase:
             self._health.clocked = not isinstance(self._chosen, ArrivalTimebase)
         return self._chosen.times(stamps, steps, t_host)
 
+    def coarsen(self, resolution: float) -> None:
+        """Take the device's stamps for cut to a resolution, s, from now on."""
+        self._stamps.coarsen(resolution)
+
     def link_broken(self) -> None:
         """Note that the link was interrupted before the next sample."""
         if self._chosen is not None:

@@ -3,6 +3,9 @@
 Three neighbours whose norm is one gravity are the accelerometers, and the norm tells
 their unit; the three beside them are the gyroscopes, which at rest read what is no rest
 in rad/s, or leave their unit open; a column that only grows is the time or a counter.
+Columns of an attitude or of a magnetometer look like others at rest: four that are a
+unit quaternion are no accelerometers unless nothing else is, and of three that stand
+together none is a temperature, unless a pressure is among them.
 """
 
 from __future__ import annotations
@@ -14,11 +17,30 @@ from urllib.parse import quote
 import numpy as np
 
 from fieldcal.core.gravity import G0
-from fieldcal.core.samples import Array
+from fieldcal.core.samples import Array, runs_of_true
+from fieldcal.drivers.framing import Mask
 from fieldcal.session.units import ACC_UNITS
 
 LARGEST_RATE_AT_REST = 0.1
 """What no gyroscope of a device at rest reads, rad/s: 6 deg/s."""
+
+LARGEST_DEGREES_AT_REST = 100.0
+"""The same in deg/s, of the worst of low-cost devices: more are thousandths of them."""
+
+TEMPERATURES = (10.0, 60.0)
+"""Usual temperatures of a device, deg C."""
+
+LARGEST_WARMING = 5.0
+"""Temperatures do not change by more while a port is listened to, K: counters do."""
+
+PRESSURES = ((500.0, 1100.0), (5e4, 1.1e5))
+"""Pressures of the air, in hPa and Pa."""
+
+EVEN_NOISE = 4.0
+"""Largest ratio of the noise of one triad's axes."""
+
+QUATERNION_ERROR = 1e-3
+"""Usual error of the norm of a quaternion, by its digits and its noise."""
 
 LEAST_LINES = 5
 """Lines that make a guess worth while."""
@@ -89,7 +111,7 @@ def _names(values: Array, seconds: float) -> list[str]:
     units = []
     grows = np.all(np.diff(values, axis=0) > 0, axis=0)
     for i in np.flatnonzero(grows).tolist():
-        if "t" not in names and not np.all(np.diff(values[:, i]) == 1):
+        if "t" not in names and not _counts_samples(values[:, i], seconds):
             names[i] = "t"
             units.append(f"t_unit={_time_unit(float(np.ptp(values[:, i])), seconds)}")
         elif "seq" not in names:
@@ -103,15 +125,46 @@ def _names(values: Array, seconds: float) -> list[str]:
             if beside >= 0 and names[beside : beside + 3] == ["-"] * 3:
                 names[beside : beside + 3] = ["gx", "gy", "gz"]
                 rates = values[:, beside : beside + 3]
-                if float(np.median(np.abs(rates).max(axis=1))) > LARGEST_RATE_AT_REST:
-                    units.append("gyr_unit=deg/s")
+                size = float(np.median(np.abs(rates).max(axis=1)))
+                if size > LARGEST_RATE_AT_REST:
+                    small = "m" * (size > LARGEST_DEGREES_AT_REST)
+                    units.append(f"gyr_unit={small}deg/s")
                 break
-    mean = values.mean(axis=0)
-    for i in [i for i, name in enumerate(names) if name == "-"]:
-        if "temperature" not in names and 10 < mean[i] < 60:
-            names[i] = "temperature"
+    if (warm := _temperature_column(values, names)) is not None:
+        names[warm] = "temperature"
     known = [unit for unit in units if unit not in ("t_unit=s", "acc_unit=m/s^2")]
     return ["columns=" + ",".join(names), *known]
+
+
+def _counts_samples(column: Array, seconds: float) -> bool:
+    """Whether a column that grows counts samples, of which some may be missing.
+
+    Milliseconds grow like a counter at 1 kHz, and by two where a sample was late.
+    """
+    steps = np.diff(column)
+    if np.all(steps == 1):
+        return True
+    if not (np.all(steps == np.round(steps)) and np.median(steps) == 1):
+        return False
+    return not 0.8 < float(np.ptp(column)) / max(seconds, 1e-9) / 1e3 < 1.25
+
+
+def _temperature_column(values: Array, names: list[str]) -> int | None:
+    """The quietest free column that may be a temperature, and is none of a triad."""
+    likely: list[int] = []
+    free = np.array([name == "-" for name in names])
+    mean = values.mean(axis=0)
+    warms = (mean > TEMPERATURES[0]) & (mean < TEMPERATURES[1])
+    warms &= np.ptp(values, axis=0) < LARGEST_WARMING
+    pressure = np.any([(mean > a) & (mean < b) for a, b in PRESSURES], axis=0)
+    for first, end in runs_of_true(free).tolist():
+        some = np.arange(first, end)
+        alone = len(some) % 3
+        if not pressure[some].any():  # what stands before or behind triads
+            some = np.concatenate([some[:alone], some[len(some) - alone :]])
+        likely += some[warms[some]].tolist()
+    quiet = np.abs(np.diff(values, axis=0)).mean(axis=0)
+    return min(likely, key=lambda i: quiet[i], default=None)
 
 
 def _time_unit(span: float, seconds: float) -> str:
@@ -125,17 +178,45 @@ def _time_unit(span: float, seconds: float) -> str:
 def _gravity_columns(values: Array, names: list[str]) -> tuple[int, str] | None:
     """First of three neighbours whose norm is one gravity, and their unit.
 
-    Triads stand behind one another: where zeros beside it make several norms alike, it
-    is the one a multiple of three from the first column that is free.
+    Parts of a quaternion are taken only where nothing else has that norm.
+    """
+    free = np.array([name == "-" for name in names])
+    turned = _quaternion_column(values, free)
+    if turned is not None:
+        others = free.copy()
+        others[turned : turned + 4] = False
+        if found := _triad_of_gravity(values, others):
+            return found
+    return _triad_of_gravity(values, free)
+
+
+def _triad_of_gravity(values: Array, free: Mask) -> tuple[int, str] | None:
+    """The triad of free columns whose norm is nearest to gravity, and its unit.
+
+    Where small numbers beside it make several norms alike, it is the one of even noise:
+    the others reach into another triad, of another quantity. Where the digits hide the
+    noise: triads stand behind one another, from the first or to the last free column.
     """
     found = []
-    free = names.index("-") if "-" in names else 0
-    for at in range(len(names) - 2):
-        if names[at : at + 3] != ["-"] * 3:
-            continue
-        norm = float(np.median(np.linalg.norm(values[:, at : at + 3], axis=1)))
-        for unit in ("m/s^2", "g", "mg"):
-            off = abs(norm * ACC_UNITS[unit] / G0 - 1)
-            if off < 0.1:
-                found.append(((at - free) % 3 > 0, off, at, unit))
-    return min(found)[2:] if found else None
+    noise = np.abs(np.diff(values, axis=0)).mean(axis=0)
+    for first, end in runs_of_true(free).tolist():
+        for at in range(first, end - 2):
+            three = noise[at : at + 3]
+            uneven = 0 < three.min() < three.max() / EVEN_NOISE
+            apart = ((at - first) % 3 > 0) + ((end - at) % 3 > 0)
+            norm = float(np.median(np.linalg.norm(values[:, at : at + 3], axis=1)))
+            for unit in ("m/s^2", "g", "mg"):
+                off = abs(norm * ACC_UNITS[unit] / G0 - 1)
+                if off < 0.1:
+                    found.append((uneven, apart, off, at, unit))
+    return min(found)[3:] if found else None
+
+
+def _quaternion_column(values: Array, free: Mask) -> int | None:
+    """The first of four free columns that are a unit quaternion, if there are any."""
+    for first, end in runs_of_true(free).tolist():
+        for at in range(first, end - 3):
+            off = np.abs(np.linalg.norm(values[:, at : at + 4], axis=1) - 1)
+            if float(np.median(off)) < QUATERNION_ERROR:
+                return int(at)
+    return None

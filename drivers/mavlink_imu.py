@@ -66,6 +66,13 @@ BAROMETER_REMARK = (
 )
 
 
+FILTER_BIAS_REMARK = (
+    "PX4 takes the biases that its filter estimates at the moment out of HIGHRES_IMU,"
+    " so that they change on the way and are not found; message=SCALED_IMU has the"
+    " samples with them"
+)
+
+
 class MavlinkImu(Driver):
     """A link to an autopilot, or a log of one, and the samples of one of its sensors.
 
@@ -141,6 +148,8 @@ class MavlinkImu(Driver):
         slow = self._log is None and self._asked > 0 and self.rate > 0
         remark = [self.installed.remark] if self.installed else []
         warm = [BAROMETER_REMARK] if self._decoder.thermometer == "barometer" else []
+        if self._decoder.lacks_filter_bias:
+            warm.append(FILTER_BIAS_REMARK)
         return [*self._dialog.says, *filter(None, remark), *warm, *heard * slow]
 
     @property

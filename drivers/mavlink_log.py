@@ -1,7 +1,8 @@
 """A telemetry log (.tlog) played: each packet behind its host time.
 
 Eight bytes, big-endian: µs since 1970 at which the packet arrived; then the packet. A
-log that was cut off or spoiled goes on at the next byte that can begin a packet.
+log that was cut off or spoiled goes on at the next byte that can begin a packet: one
+whose time is near that of the packet before, or behind.
 """
 
 from __future__ import annotations
@@ -16,6 +17,10 @@ from fieldcal.drivers.playback import PlaybackClock
 from fieldcal.drivers.reader import Chunk
 
 STAMP_BYTES = 8
+A_DAY_US = 86400 * 10**6
+"""Longest time between packets that need no other sign to be packets. The clock of a
+computer may be set by more while it records."""
+
 PACKETS_AT_ONCE = 4096
 """Packets delivered at once."""
 
@@ -42,7 +47,8 @@ def split_log(data: bytes) -> list[Chunk]:
 
 def split_whole_packets(data: bytes) -> tuple[list[Chunk], int]:
     """Cut a stretch of a log into whole packets; where the next one begins."""
-    chunks, at, last = [], 0, len(data) - STAMP_BYTES - 3
+    chunks: list[Chunk] = []
+    at, last, before = 0, len(data) - STAMP_BYTES - 3, None
     while at <= last:
         body = at + STAMP_BYTES
         if data[body] not in HEADER_BYTES:
@@ -51,11 +57,34 @@ def split_whole_packets(data: bytes) -> tuple[list[Chunk], int]:
         signed = data[body] == VERSION_2 and data[body + 2] & 1
         size = HEADER_BYTES[data[body]] + data[body + 1] + 2 + SIGNATURE_BYTES * signed
         if body + size > len(data):
+            if chunks and not _is_near(data, at, before):
+                at += 1  # garbage may state any size
+                continue
             break
-        stamp = int.from_bytes(data[at:body], "big") / 1e6
-        chunks.append(Chunk(stamp, data[body : body + size]))
+        if not (_is_near(data, at, before) or _goes_on(data, at, body + size)):
+            at += 1
+            continue
+        before = _stamp(data, at)
+        chunks.append(Chunk(before / 1e6, data[body : body + size]))
         at = body + size
     return chunks, at
+
+
+def _stamp(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + STAMP_BYTES], "big")
+
+
+def _is_near(data: bytes, at: int, before: int | None) -> bool:
+    """Whether a packet has about the time of the one before."""
+    return before is not None and abs(_stamp(data, at) - before) < A_DAY_US
+
+
+def _goes_on(data: bytes, at: int, end: int) -> bool:
+    """Whether a packet ends the data, or is followed by one of about its time."""
+    body = end + STAMP_BYTES
+    if body >= len(data):
+        return True
+    return data[body] in HEADER_BYTES and _is_near(data, end, _stamp(data, at))
 
 
 class PlayedMavlinkLog:

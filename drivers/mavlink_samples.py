@@ -6,7 +6,8 @@ from the first samples, which wait until they are, see `mavlink_units`.
 
 The temperature of RAW_IMU and SCALED_IMU is the sensor's. That of HIGHRES_IMU is the
 barometer's in the programs of `BAROMETER_AUTOPILOTS`, and says nothing of the sensor.
-Source: GCS_Common.cpp of ArduPilot, HIGHRES_IMU.hpp of PX4.
+PX4 takes the biases that its filter estimates out of HIGHRES_IMU, and of no other.
+Source: GCS_Common.cpp of ArduPilot, HIGHRES_IMU.hpp and SCALED_IMU.hpp of PX4.
 """
 
 from __future__ import annotations
@@ -147,8 +148,17 @@ class MavlinkDecoder(Codec):
         """Whose temperature the message has: ``imu``, ``barometer``, or empty."""
         if self.kind.whole:
             return "imu"
-        program = self.autopilots.get(self._vehicle or (0, 0))
-        return "barometer" if program in BAROMETER_AUTOPILOTS else ""
+        return "barometer" if self._program in BAROMETER_AUTOPILOTS else ""
+
+    @property
+    def lacks_filter_bias(self) -> bool:
+        """Whether the biases that the autopilot's filter estimates are taken out."""
+        return self.message == "HIGHRES_IMU" and self._program == PX4
+
+    @property
+    def _program(self) -> int | None:
+        """Number of the vehicle's program, once a heartbeat told it."""
+        return self.autopilots.get(self._vehicle or (0, 0))
 
     def accepts(self, system: int, component: int) -> bool:
         """Whether the options allow this one."""

@@ -95,6 +95,12 @@ class StampTimebase:
             i += FIRST_INTERVALS
         return np.concatenate(parts)
 
+    def coarsen(self, resolution: float) -> None:
+        """Take the stamps for cut to a resolution, s, from now on."""
+        self._resolution = resolution
+        if self._t == self._t:
+            self._anchor()
+
     def link_broken(self) -> None:
         """Do nothing: the stamps show the gap."""
 
@@ -211,12 +217,7 @@ class StampTimebase:
         d, self._t = t - self._t, t
         self._count += 1
         if self._count <= FIRST_INTERVALS:
-            self._early.append(d)
-            self._period = float(np.median(self._early))
-            self._anchor()
-            if self._count == FIRST_INTERVALS:
-                self._count = sum(max(1, round(d / self._period)) for d in self._early)
-                self._renewal = self._count
+            self._learn(d)
         elif d > 1.5 * self._period + self._resolution:
             lost = round(d / self._period) - 1
             self._health.gaps += 1
@@ -225,6 +226,19 @@ class StampTimebase:
             self._anchor()
         self._renew()
         return t
+
+    def _learn(self, d: float) -> None:
+        """Estimate the period from one of the first intervals and those before."""
+        self._early.append(d)
+        self._period = float(np.median(self._early))
+        # most samples share their stamp with others: only the mean is their period
+        shared = self._period < self._resolution / 2
+        if shared:
+            self._period = float(np.mean(self._early))
+        self._anchor()
+        if self._count == FIRST_INTERVALS and not shared:
+            self._count = sum(max(1, round(d / self._period)) for d in self._early)
+            self._renewal = self._count
 
     def _renew(self) -> None:
         """Estimate the period again when it is due."""

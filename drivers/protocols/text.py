@@ -3,16 +3,18 @@
 A line is one sample, its fields in the order of ``columns`` (a name that is none of
 t, seq, ax … gz, temperature is passed over), between ``separator``: a character or
 comma, semicolon, tab, space. Units are ``t_unit`` (s, ms, us, ns), ``acc_unit`` and
-``gyr_unit`` as in session.toml. ``checksum=xor`` asks each line for the two hexadecimal
-digits behind ``*`` that NMEA 0183 has: the exclusive or of all between ``$`` and ``*``.
-``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no part of it.
+``gyr_unit`` as in session.toml, or mdeg/s. ``checksum=xor`` asks each line for the two
+hexadecimal digits behind ``*`` that NMEA 0183 has: the exclusive or of all between
+``$`` and ``*``. ``prefix=IMU`` passes over lines that begin otherwise; a ``$`` is no
+part of it.
 
 Headers and comments (lines that begin with a letter or one of # % ; / ") and blank
 lines are passed over, any other line that is not whole is refused. Without a checksum
 the first line counts for nothing: it may be the end of one.
 
 ``t_unit=ms`` and ``us`` are taken for counters of ``t_bits=32``; ``t_resolution`` is in
-s (1 ms for ms). Without a column t: ``rate=`` in Hz, else the arrivals.
+s (1 ms for ms, else seen where samples share a stamp). Without a column t: ``rate=`` in
+Hz, else the arrivals.
 """
 
 from __future__ import annotations
@@ -31,12 +33,14 @@ from fieldcal.drivers.framing import Bytes, FrameCandidates, FrameScan, Index, M
 from fieldcal.drivers.layouts import RawSamples
 from fieldcal.drivers.options import Options
 from fieldcal.drivers.sample_counter import SampleCounter
+from fieldcal.drivers.stamp_resolution import StampResolution
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 LONGEST = 1024
 """Longest line, bytes; what is longer is no line."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+RATE_UNITS = {**GYR_UNITS, "mdeg/s": np.pi / 180e3}
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 KNOWN_COLUMNS = ("t", "seq", *CHANNELS, "temperature")
 DEFAULT = "t,ax,ay,az,gx,gy,gz,temperature"
@@ -77,7 +81,7 @@ class TextCodec(Codec):
         self._prefix = np.frombuffer(prefix.encode(), np.uint8)
         self._checked = options.choice("checksum", ("none", "xor"), "none") == "xor"
         acc = ACC_UNITS[options.choice("acc_unit", ACC_UNITS, "m/s^2")]
-        gyr = GYR_UNITS[options.choice("gyr_unit", GYR_UNITS, "rad/s")]
+        gyr = RATE_UNITS[options.choice("gyr_unit", RATE_UNITS, "rad/s")]
         self._scale = np.array([acc] * 3 + [gyr] * 3)
         unit = options.choice("t_unit", TIME_UNITS, "s")
         self._t_unit = TIME_UNITS[unit]
@@ -85,6 +89,8 @@ class TextCodec(Codec):
         bits = options.number("t_bits", counter, 0, 64)
         coarse = 1e-3 if unit == "ms" else 0.0
         resolution = options.number("t_resolution", coarse, 0, 1)
+        stated = resolution > 0 or options.text("t_resolution")
+        self._resolution = None if stated else StampResolution()
         span = 2**bits * self._t_unit if bits else float("inf")
         self._clock = ChosenTimebase(self.health, options, resolution, span)
         self._whole = self._checked
@@ -242,6 +248,10 @@ class TextCodec(Codec):
         stamps = column.get("t", unknown) * self._t_unit
         six = np.column_stack([column.get(name, unknown) for name in CHANNELS])
         temperature = column.get("temperature", unknown)
+        if self._resolution and "t" in self._names:
+            if coarse := self._resolution.found(stamps, six):
+                self._clock.coarsen(coarse)
+                self._resolution = None
         which = np.arange(len(values))
         raw = RawSamples(which, six * self._scale, temperature, stamps, seq)
         return self._timed(self._clock, raw, t_host, self._seq.steps(seq))

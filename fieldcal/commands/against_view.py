@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import IO
 
 from fieldcal.against.motion.wording import alignment_sentence
@@ -88,7 +89,8 @@ def _location_table(found: Match) -> object:
             )
             span = f"{m.from_s:.0f}–{m.to_s:.0f}"
             places = position_numbers(m.positions)
-            table.add_row(one.id, m.channel, follows, places, span, f"{m.sigma:.0f}")
+            size = f"{m.sigma:.0f}" if isfinite(m.sigma) else "–"
+            table.add_row(one.id, m.channel, follows, places, span, size)
     return table
 
 

@@ -60,7 +60,7 @@ def show_calibration(
             true = true_by_name[name]
             cells += [
                 format_with_sigma(true, sigma)[0],
-                f"{(value - true) / sigma:+.1f} σ",
+                f"{(value - true) / sigma:+.1f} σ" if sigma > 0 else "",
             ]
         table.add_row(*cells)
         before = group

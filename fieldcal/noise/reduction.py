@@ -1,7 +1,9 @@
 """Reduces samples, as they come, to stretches with powers, in constant memory.
 
-Samples count as evenly spaced, as a device takes them. A new stretch begins after a gap
-of a second or more, and where the level changes at a disturbance.
+Samples count as evenly spaced, as a device takes them: lost ones make a stretch
+shorter, and its samples no rarer, since white noise is that of a sample times its
+interval. A new stretch begins after a gap of a second or more, or of `GAP_STEPS`
+samples of a slow device, and where the level changes at a disturbance.
 """
 
 from __future__ import annotations
@@ -17,6 +19,20 @@ from fieldcal.noise.levels import CosineLevels, ReducedStretch
 
 MIN_GAP_S = 1.0
 """Time without samples that begins a new stretch, s."""
+
+GAP_STEPS = 2.5
+"""Usual intervals of a slow device that make a gap."""
+
+FIRST_STEPS = 16
+"""Intervals that show which are usual."""
+
+LOST_STEPS = 1.5
+"""Mean intervals beyond which samples were lost in between."""
+
+MOST_LOST, MOST_UNEVEN = 0.5, 0.15
+"""Largest share of the time that may be lost, and relative scatter of the intervals of
+a device that shows it: times of arrival have such intervals as well, and none is
+missing."""
 
 ROWS = 1 << 17
 """Samples that are processed together."""
@@ -58,15 +74,23 @@ class Reducer:
         self._cell_dt = np.nan
         self._rows = self._samples = self._bridged = 0
         self._last = self._first = np.nan
+        self._gap_s = np.nan
         self._steps, self._stepped, self._span = 0, 0.0, (np.nan, np.nan)
         self._known = np.zeros(CHANNELS, dtype=bool)
         self._value = np.full(CHANNELS + 1, np.nan)
 
     def add(self, block: Block) -> None:
-        """Take samples, in order of time."""
+        """Take samples, in order of time; those without any value count as lost."""
+        blank = ~np.isfinite(block.six).any(axis=1)
+        if blank.any():
+            block = block[np.flatnonzero(~blank)]
         if not len(block):
             return
-        edges = np.flatnonzero(np.diff(block.t, prepend=self._last) > MIN_GAP_S)
+        if np.isnan(self._gap_s) and len(block) > 2:
+            usual = float(np.median(np.diff(block.t[: FIRST_STEPS + 1])))
+            self._gap_s = max(MIN_GAP_S, GAP_STEPS * usual)
+        longest = np.fmax(self._gap_s, MIN_GAP_S)
+        edges = np.flatnonzero(np.diff(block.t, prepend=self._last) > longest)
         first = 0
         for edge in [*edges.tolist(), len(block)]:
             if edge > first:
@@ -105,8 +129,9 @@ class Reducer:
         """
         t, rows = self._next(self._rows if last else ROWS)
         if len(t) > 1:
-            self._steps += len(t) - 1
-            self._stepped += float(t[-1] - t[0])
+            steps = intervals_without_losses(np.diff(t))
+            self._steps += len(steps)
+            self._stepped += float(steps.sum())
         if not self._steps:
             return
         if np.isnan(self._cell_dt):
@@ -164,6 +189,20 @@ class Reducer:
         self._levels = None
         if not keep:
             self._steps, self._stepped, self._cell_dt = 0, 0.0, np.nan
+
+
+def intervals_without_losses(steps: Array) -> Array:
+    """Intervals between samples, s, without those in which others were lost.
+
+    >>> intervals_without_losses(np.array([0.1, 0.1, 0.4, 0.1, 0.1])).tolist()
+    [0.1, 0.1, 0.1, 0.1]
+    """
+    kept = steps
+    while len(less := steps[steps <= LOST_STEPS * kept.mean()]) < len(kept):
+        kept = less
+    lost = steps.sum() - len(steps) * kept.mean()
+    even = kept.std() <= MOST_UNEVEN * kept.mean()
+    return kept if even and lost <= MOST_LOST * steps.sum() else steps
 
 
 def reduce_recording(blocks: Iterable[Block]) -> Reduction:

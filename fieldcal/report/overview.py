@@ -97,11 +97,12 @@ def _advice_on_calibration_in_use(
             "No change is needed: the calibration in use agrees with this one within"
             f" the ± (χ² = {chi2:.0f} of {len(names)} parameters)."
         )
-    most = int(np.argmax(np.abs(change) / np.sqrt(np.diag(cov))))
+    sigma = np.sqrt(np.diag(cov))
+    # what has no uncertainty was given and not measured, and tells of no change
+    known = np.flatnonzero(sigma > 0)
+    most = int(known[np.argmax(np.abs(change[known]) / sigma[known])])
     unit = format_unit(found.units[at[most]])
-    value, error = format_with_sigma(
-        float(change[most]), float(np.sqrt(cov[most, most]))
-    )
+    value, error = format_with_sigma(float(change[most]), float(sigma[most]))
     return (
         f"Apply it: {parameter_title(names[most])} differs from the calibration in use"
         f" by {value} ± {error}{' ' + unit if unit else ''}, the most of all."

@@ -42,10 +42,14 @@ class CommandMover:
         self._process: subprocess.Popen[str] | None = None
         self._said: IO[str] | None = None
         self._began, self._done = 0.0, False
+        self._order: tuple[Position, int] | None = None
         self._filled_command(Position.deg(0.0, 0.0), 0)
 
     def turn(self, position: Position, number: int = 0) -> None:
-        """Call the command.
+        """Call the command, unless it is at work on the same turn already.
+
+        A position is asked for once more after a gap of the link. A turntable must not
+        lose its program half way for that.
 
         Raises
         ------
@@ -53,6 +57,11 @@ class CommandMover:
             If it cannot be called.
 
         """
+        order = (position, number)
+        if self._process and self._order == order and not self._done:
+            if self._exit_code(self._process) is None:
+                return
+        self._order = order
         self.close()
         self._said = tempfile.TemporaryFile("w+", errors="replace")
         command = self._filled_command(position, number)

@@ -28,7 +28,7 @@ from fieldcal.core.factory import FACTORY_KEYS
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import Driver, host_clock, open_driver
 from fieldcal.run.link_marks import LinkMarks
-from fieldcal.session.folder import DESCRIPTION
+from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.recorder import Recorder
 
@@ -240,6 +240,9 @@ def record_companions(
     with ExitStack() as stack:
         others: list[Companion] = []
         folders = companion_folders(recorder.folder, len(further))
+        # what the first session has by now: a position added later is marked in both
+        known = len(Session.open(recorder.folder).positions)
+        about = {**about, "position": list(about.get("position", ()))[:known]}
         for folder, (url, serial) in zip(folders, further.items(), strict=True):
             driver = stack.enter_context(open_driver(url))
             device: dict[str, Any] = {
@@ -250,8 +253,8 @@ def record_companions(
                 device["serial"] = serial
             lead = about.get("device", {})
             device |= {key: lead[key] for key in SHARED_KEYS if key in lead}
-            known = (folder / DESCRIPTION).exists()
-            tables = None if known else {**about, "device": device}
+            begun = (folder / DESCRIPTION).exists()
+            tables = None if begun else {**about, "device": device}
             own = stack.enter_context(Recorder(folder, tables))
             others.append(Companion(driver, own))
             stack.callback(others[-1].end)

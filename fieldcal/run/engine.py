@@ -27,7 +27,11 @@ from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.incoming import SILENCES_UNTIL_TOLD, IncomingSamples
 from fieldcal.run.interruptions import WindowDisturbed, kept_notice, restart_notice
 from fieldcal.run.link_marks import MarkedRecorder
-from fieldcal.run.operator.desk import OperatorDesk, confirmation_question
+from fieldcal.run.operator.desk import (
+    OperatorDesk,
+    confirmation_question,
+    left_out_error,
+)
 from fieldcal.run.operator.protocol import Display, Operator
 from fieldcal.run.position_check import AcceptedPosition
 from fieldcal.run.wait_reason import WaitReason, WaitState, reminder
@@ -60,6 +64,8 @@ class Engine:
         again, if that helps
     judge : evaluates the windows taken so far, quickly or in full
     added : positions of the session beyond the planned ones; new ones are appended
+    left_out : numbers of positions that the operator has left out, which are not asked
+        for again; new ones are added
 
     """
 
@@ -75,6 +81,7 @@ class Engine:
         lost_share: float = np.inf,
         judge: Callable[[bool], object] = lambda quick: None,
         added: list[Position] | None = None,
+        left_out: set[int] | None = None,
     ) -> None:
         self._driver = driver
         self._operator = operator
@@ -85,6 +92,7 @@ class Engine:
         self._warm_up = warm_up
         self._judge = judge
         self._added = [] if added is None else added
+        self._left_out = set[int]() if left_out is None else left_out
         self._held: AcceptedPosition | None = None
         self._hold_now: Hold | None = None
         self._before: int | None = None
@@ -139,7 +147,7 @@ class Engine:
             case Hold():
                 average = self._taken.get(step.index)
                 if average is None:
-                    average = self._hold(step)
+                    average = self._hold_unless_left_out(step)
                     self._taken[step.index] = average
                 else:
                     self._display.show_taken_before(step, average)
@@ -163,6 +171,7 @@ class Engine:
         """Add a position to the session; returns its number."""
         position = step.position
         number = len(self._about.positions) + len(self._added)
+        self._left_out.discard(number)
         alpha, beta = position.degrees or (0.0, 0.0)
         where = {"alpha_deg": alpha, "beta_deg": beta}
         if step.seconds is not None:
@@ -175,6 +184,16 @@ class Engine:
         )
         self._added.append(position)
         return number
+
+    def _hold_unless_left_out(self, hold: Hold) -> Average:
+        """Hold a position, unless the operator has left it out before."""
+        if hold.index in self._left_out:
+            raise left_out_error(hold)
+        try:
+            return self._hold(hold)
+        except Skipped:
+            self._left_out.add(hold.index)
+            raise
 
     def _hold(self, hold: Hold) -> Average:
         self._hold_now, tries = hold, 0
@@ -254,18 +273,18 @@ class Engine:
             if block.t_host[-1] < asked:
                 continue  # it waited in the link: where the device was before
             waiting.add(block, self._driver.host_time())
+            if not (waiting.may_insist and waiting.problem):
+                insisted = False  # moved since: that place is not asked about
             wish = self._desk.wish(hold)
             if wish == "repeat":
                 self._desk.repeat(self._before)
             if wish == "confirm" and shown is WaitState.WARMING_UP and self._warm_up:
                 self._warm_up.waived = True  # only what was read can be waived
             elif wish == "confirm" and not waiting.arrived:
-                if insisted and waiting.may_insist:
+                if insisted:
                     self._desk.record_insistence(hold, waiting.problem)
                     return
                 insisted = self._desk.ask_back(waiting)
-            if not (waiting.may_insist and waiting.problem):
-                insisted = False  # moved since: that place is not asked about
             waits = self._warm_up is not None and self._warm_up.must_wait
             reason = confirmation_question(waiting) if insisted else waiting.reason
             if waiting.arrived and self._warm_up and self._warm_up.notice and waits:

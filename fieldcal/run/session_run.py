@@ -83,6 +83,7 @@ class SessionRun:
         wait = float(task.run.get("warm_up_s", WARM_UP))
         self._limits, self._until_go = limits, until_go
         self._added: list[Position] = []
+        self._left_out: set[int] = set()
         self._so_far: InterimResult | None = None
         self._judged_changes = 0
         self._remedies = 0
@@ -130,12 +131,14 @@ class SessionRun:
             self._limits.lost_share,
             self._judge,
             self._added,
+            self._left_out,
         )
         while True:
             try:
                 return engine.run(self._plan())
             except RepeatPosition as again:
                 self._taken.pop(again.index, None)
+                self._left_out.discard(again.index)
 
     def _judge(self, quick: bool) -> InterimResult:
         """Judge the windows taken so far."""

@@ -7,13 +7,18 @@ are appended one line at a time, each with its checksum. Both files grow by whol
 only: a piece that is written in part is removed. So after a kill everything up to the
 last fifth of a second can be read, and an interrupted recording can be continued: what
 follows its last whole batch is cut off, and the next batch is appended.
+
+All writing is done in one thread of its own. A Ctrl-C may come between any two
+instructions of the main thread: it ends the waiting for a piece to be written, and
+never comes between its bytes and what is remembered of them.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -105,6 +110,7 @@ class Recorder:
         self._fault: OSError | None = None
         self._written = monotonic()
         self._stop, self._closed = Event(), False
+        self._writer = ThreadPoolExecutor(1, "recorder writes")
         try:
             self._open(about)
         except FileExistsError as error:
@@ -212,22 +218,29 @@ class Recorder:
 
     def flush(self) -> None:
         """Hand waiting samples to the operating system."""
+        self._in_writer(self._write_samples)
+
+    def _in_writer(self, write: Callable[[], None]) -> None:
+        """Let the writing thread do something, behind what it does already."""
+        self._writer.submit(write).result()
+
+    def _write_samples(self) -> None:
+        self._written = monotonic()
         with self._lock:
-            self._written = monotonic()
-            if not self._waiting and not self._unwritten:
-                return
-            waiting = concat(self._waiting)
-            if len(waiting):
-                # kept until written, so that nothing is lost if writing fails
-                self._unwritten += self._encoder.encode(to_record_batch(waiting))
-            self._waiting = []
-            try:
-                self._samples.append(self._unwritten)
-                self._unwritten = b""
-            except OSError as error:
-                self._fault = error
-                raise self._refused(error) from error
-            self._fault = None
+            blocks, self._waiting = self._waiting, []
+        if not blocks and not self._unwritten:
+            return
+        waiting = concat(blocks)
+        if len(waiting):
+            # kept until written, so that nothing is lost if writing fails
+            self._unwritten += self._encoder.encode(to_record_batch(waiting))
+        try:
+            self._samples.append(self._unwritten)
+            self._unwritten = b""
+        except OSError as error:
+            self._fault = error
+            raise self._refused(error) from error
+        self._fault = None
 
     def mark(self, event: str, **what: Any) -> None:
         """Append a mark: an event with the host's time.
@@ -237,11 +250,14 @@ class Recorder:
         if event == "device" and self._last is not None:
             what["at_s"] = self._last[0]
         line = mark_line({"event": event, **what, "host_s": round(time(), 3)})
-        self.flush()
+        self._in_writer(lambda: self._write_mark(line.encode()))
+
+    def _write_mark(self, line: bytes) -> None:
+        # the samples first: a mark must not refer to samples that are not stored
+        self._write_samples()
         try:
-            # the samples first: a mark must not refer to samples that are not stored
             self._samples.sync()
-            self._marks.append(line.encode())
+            self._marks.append(line)
             self._marks.sync()
         except OSError as error:
             raise self._refused(error) from error
@@ -253,9 +269,16 @@ class Recorder:
         self._closed = True
         self._stop.set()
         self._watch.join()
+        try:
+            self._in_writer(self._end)
+        finally:
+            self._writer.shutdown()
+            self._held.release()
+
+    def _end(self) -> None:
         told = self._fault is not None
         try:
-            self.flush()
+            self._write_samples()
             self._samples.append(self._encoder.end())
             self._samples.sync()
         except OSError as error:
@@ -266,7 +289,6 @@ class Recorder:
         finally:
             self._samples.close()
             self._marks.close()
-            self._held.release()
 
     def _keep_up(self) -> None:
         """Flush and sync in the background; the next call raises what failed here."""

@@ -13,7 +13,9 @@ from fieldcal.core.errors import DeviceSilent
 from fieldcal.drivers import probe as module
 from fieldcal.drivers.column_guess import guess_text_options
 from fieldcal.drivers.driver import open_driver
+from fieldcal.drivers.options import Options
 from fieldcal.drivers.probe import baud_rates, probe_port
+from fieldcal.drivers.protocols.text import TextCodec
 
 
 def sample(name: str) -> Say:
@@ -174,6 +176,59 @@ def test_separators_are_found(separator: str) -> None:
     found = guess_text_options(text.encode(), 0.2)
     assert found is not None
     assert found.startswith("columns=t,ax,ay,az,gx,gy,gz")
+
+
+ACC, GYR = [0.1, -0.2, 9.75], [0.01, -0.02, 0.005]
+MAG, YAW, TURNED = [22.0, -5.0, -43.0], [1.2, -0.6, 45.0], [0.995, 0.01, 0.02, 0.0975]
+
+
+@pytest.mark.parametrize(
+    ("row", "columns"),
+    [
+        ([*ACC, *GYR, *MAG], "ax,ay,az,gx,gy,gz,-,-,-"),
+        ([*ACC, *GYR, *MAG, 31.0], "ax,ay,az,gx,gy,gz,-,-,-,temperature"),
+        ([31.0, *MAG, *ACC, *GYR], "temperature,-,-,-,ax,ay,az,gx,gy,gz"),
+        ([31.0, *ACC, *GYR], "temperature,ax,ay,az,gx,gy,gz"),
+        ([*YAW, *ACC, *GYR], "-,-,-,ax,ay,az,gx,gy,gz"),
+        ([*TURNED, *ACC, *GYR], "-,-,-,-,ax,ay,az,gx,gy,gz"),
+        ([*ACC, *GYR, 31.0, 1013.0, 45.0], "ax,ay,az,gx,gy,gz,temperature,-,-"),
+    ],
+)
+def test_an_attitude_or_a_magnetometer_is_taken_for_nothing_else(
+    row: list[float], columns: str
+) -> None:
+    """A temperature that follows the position would pass for one of the biases."""
+    rng = np.random.default_rng(4)
+    small = np.isin(row, TURNED) | np.isin(row, GYR)
+    noise = np.where(small, 1e-4, 0.01) * (np.array(row) != 31.0)
+    rows = row + noise * rng.standard_normal((200, len(row)))
+    text = "".join(",".join(f"{x:.4f}" for x in each) + "\n" for each in rows)
+    assert guess_text_options(text.encode(), 2.0) == f"columns={columns}"
+
+
+@pytest.mark.parametrize(
+    ("steps", "seconds", "query"),
+    [([1] * 50 + [3] + [1] * 50, 1.0, "seq"), ([1] * 50 + [2] + [1] * 50, 0.1, "t"),
+     ([10] * 100, 1.0, "t")],
+    ids=["a counter with a loss", "ms with a late sample", "ms"],
+)  # fmt: skip
+def test_a_counter_that_lost_a_sample_is_no_time(
+    steps: list[int], seconds: float, query: str
+) -> None:
+    counts = np.cumsum(steps)
+    text = "".join(f"{count},0.1,0.2,9.8,0,0.01,0\n" for count in counts)
+    found = guess_text_options(text.encode(), seconds)
+    unit = "&t_unit=ms" if query == "t" else ""
+    assert found == f"columns={query},ax,ay,az,gx,gy,gz{unit}"
+
+
+def test_rates_of_hundreds_at_rest_are_thousandths_of_a_degree() -> None:
+    text = "".join(f"{10 * i},12,-8,1001,420,-710,{90 + i % 9}\n" for i in range(50))
+    found = guess_text_options(text.encode(), 0.5)
+    assert found is not None and found.endswith("&acc_unit=mg&gyr_unit=mdeg/s")
+    block = TextCodec(Options("", f"{found}&rate=100")).feed(text.encode(), 0.0)
+    assert block is not None
+    assert block.gyr[0, 1] == pytest.approx(-0.71 * np.pi / 180)
 
 
 def test_words_are_no_numbers() -> None:

@@ -41,3 +41,14 @@ def test_words_of_an_effect_are_no_values() -> None:
         "acc_bias.x": 0.1, "acc_bias.y": 0.2, "acc_bias.z": 0.3,
         "decode_fault.full_scale": 0.0, "cross_coupling.k12": 0.003,
     }  # fmt: skip
+
+
+def test_what_is_exact_is_off_by_no_number_of_its_uncertainties() -> None:
+    found = calibration(np.random.default_rng(1), 0.0)
+    covariance = found.covariance.copy()
+    covariance[0] = covariance[:, 0] = 0.0
+    out = io.StringIO()
+    truth = {"acc_bias": [9.0, 9.0, 9.0]}
+    show_calibration(replace(found, covariance=covariance), truth, out)
+    first, second = out.getvalue().split("acc bias x")[1].splitlines()[:2]
+    assert "σ" not in first and "inf" not in first and second.rstrip(" │").endswith("σ")

@@ -1,5 +1,6 @@
 """Samples put together out of frames: whatever is lost, doubled or late."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -229,3 +230,28 @@ def test_frames_of_noise_break_nothing_however_they_are_cut(
     pieces, _ = decode(dbc, query, rows, sorted(cuts))
     assert_same(whole, pieces)
     assert (np.diff(whole.t) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("stated", "least", "states", "missing"),
+    [("0|14", 0, 15, 0), ("1|15", 1, 15, 0), ("0|15", 0, 16, 0), ("0|0", 0, 16, 0),
+     ("0|3", 0, 16, 0), ("0|0", 0, 15, 6), ("0|1e999", 0, 16, 0), ("0|14.5", 0, 16, 0)],
+    ids=["E2E", "from 1", "all", "unstated", "wrongly stated", "unstated, and fewer",
+         "endless", "no whole number"],
+)  # fmt: skip
+def test_a_counter_has_as_many_numbers_as_its_range_states(
+    tmp_path: Path, stated: str, least: int, states: int, missing: int
+) -> None:
+    """The last number of E2E profile 1 means an error, and is never sent."""
+    dbc = tmp_path / "imu.dbc"
+    dbc.write_text(
+        DBC.replace("seq : 48|8@1+ (1,0) [0|0]", f"seq : 48|4@1+ (1,0) [{stated}]")
+    )
+    rows = [
+        frame_row(i / 100, identifier, False, data)
+        for i in range(100)
+        for data in [struct.pack("<3hBx", i, 2 * i, 3 * i, least + i % states)]
+        for identifier in (32, 33)
+    ]
+    block, health = decode(dbc, f"map={KEYED}", rows)
+    assert len(block) == 100 and health.missing == missing

@@ -101,6 +101,20 @@ def test_same_truth_over_udp_tcp_and_a_serial_port(place: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("program", "message", "warns"),
+    [("px4", "HIGHRES_IMU", 1), ("px4", "SCALED_IMU", 0), ("ardupilot", "RAW_IMU", 0)],
+)
+def test_biases_that_a_filter_takes_out_meanwhile_are_told(
+    program: str, message: str, warns: int
+) -> None:
+    place = f"tcpin:127.0.0.1:0?autopilot={program}"
+    with autopilot(place, "--speed", "15") as (where, _):
+        with opened(f"mavlink:{where}?message={message}&rate=100") as imu:
+            taken(imu, 1.0)
+            assert sum("message=SCALED_IMU has" in text for text in imu.says) == warns
+
+
+@pytest.mark.parametrize(
     ("kind", "given", "name"),
     [
         ("ardupilot", "INS_ACCOFFS_X=0.5&INS_ACCSCAL_Y=1.02", "INS_ACCOFFS_X"),

@@ -187,3 +187,39 @@ def test_any_bytes_are_survived(data: bytes) -> None:
     assert decoder.feed(data, 0.0) is None
     assert decoder.waiting_bytes <= decoder.longest
     assert sum(len(chunk.data) for chunk in split_log(data)) <= len(data)
+
+
+def spoiled_log(kind: str, rng: np.random.Generator) -> tuple[list[bytes], bytes]:
+    """Packets of a log with their stamps, and the log with a place that is spoiled."""
+    packets = [
+        int(1.7e15 + 10_000 * i).to_bytes(8, "big") + b"\xfe\x1a" + rng.bytes(32)
+        for i in range(300)
+    ]
+    at, garbage = int(rng.integers(50, 250)), rng.bytes(int(rng.integers(1, 200)))
+    before, behind = b"".join(packets[:at]), b"".join(packets[at:])
+    lost = int(rng.integers(1, 60))
+    return packets, {
+        "inserted": before + garbage + behind,
+        "lost": before[:-lost] + behind,
+        "changed": before + garbage[:60] + behind[60:],
+    }[kind]
+
+
+@pytest.mark.parametrize("kind", ["inserted", "lost", "changed"])
+def test_a_spoiled_log_goes_on_in_its_own_time(kind: str) -> None:
+    """A packet with a time of garbage would be due in a million years."""
+    for seed in range(30):
+        packets, data = spoiled_log(kind, np.random.default_rng(seed))
+        chunks = split_log(data)
+        times = np.array([chunk.t_host for chunk in chunks])
+        assert (abs(times - 1.7e9) < 86400).all()
+        whole = {packet[8:] for packet in packets}
+        assert sum(chunk.data in whole for chunk in chunks) > len(packets) - 12
+
+
+def test_a_clock_that_is_set_in_a_log_ends_no_log() -> None:
+    """A companion computer knows the time when it has found a network."""
+    begins = [10_000 * i for i in range(9)] + [10**15 + 10_000 * i for i in range(9)]
+    packets = [t.to_bytes(8, "big") + b"\xfe\x04" + bytes(10) for t in begins]
+    chunks = split_log(b"".join(packets))
+    assert [round(chunk.t_host * 1e6) for chunk in chunks] == begins

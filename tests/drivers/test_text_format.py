@@ -154,3 +154,34 @@ def test_a_sequence_counter_shows_what_is_missing_at_a_declared_rate() -> None:
 def test_options_that_are_none(query: str) -> None:
     with pytest.raises(InputError):
         codec(query)
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(150, 2), (200, 2), (400, 2), (2000, 3)])
+def test_samples_that_share_a_coarse_stamp_are_no_repetitions(
+    rate: int, digits: int
+) -> None:
+    """As of a program that prints seconds with two digits, whatever its rate."""
+    rng, q = np.random.default_rng(1), 10.0**-digits
+    t = 5.0 + (np.arange(3000) + 0.3 * rng.random(3000)) / rate
+    force = rng.standard_normal(3000)
+    rows = zip(np.floor(t / q) * q, force, strict=True)
+    lines = [f"{stamp:.{digits}f},0.1,{f:.3f},9.8\n".encode() for stamp, f in rows]
+    made = codec("columns=t,ax,ay,az")
+    blocks = [made.feed(b"".join(lines[i : i + 7]), 0.0) for i in range(0, 3000, 7)]
+    block = concat(block for block in blocks if block is not None)
+    assert made.health.repeated < 20 and made.health.missing < 20
+    late = block.t[-2000:] - t[-2000:]
+    assert np.abs(late - late.mean()).max() < q
+    assert np.diff(block.t[-2000:]).std() < 0.3 / rate
+
+
+@pytest.mark.parametrize("query", ["", "&t_resolution=0"])
+def test_a_few_doubled_lines_or_stamps_are_repetitions(query: str) -> None:
+    lines = [f"{0.01 * i:.2f},0.1,{i % 7},9.8\n".encode() for i in range(1000)]
+    for i in (300, 500, 501):
+        lines[i] = lines[i - 1][:4] + lines[i][4:]
+    lines[700:700] = lines[690:691] * 100
+    made = codec(f"columns=t,ax,ay,az{query}")
+    block = made.feed(b"".join(lines), 0.0)
+    assert block is not None and made.health.repeated == 103
+    assert len(block) == 999 - 3

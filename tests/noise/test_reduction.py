@@ -101,3 +101,51 @@ def test_a_device_that_is_never_calm_is_not_held_back_for_ever() -> None:
     )
     calm, left = bridge_disturbances(rows, 1 / RATE, 3, last=False)
     assert calm and len(left) < PIECE // 2
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05])
+@pytest.mark.parametrize("together", [1, 50])
+def test_lost_samples_make_no_noise(share: float, together: int) -> None:
+    """White noise is that of a sample times its interval, which is the device's."""
+    whole = at_rest()
+    begins = np.random.default_rng(2).random(len(whole)) < share / together
+    lost = np.convolve(begins, np.ones(together))[: len(whole)] > 0
+    kept = Block.of(whole.t[~lost], whole.acc[~lost], whole.gyr[~lost])
+    (stretch,) = reduce_recording([kept]).stretches
+    assert stretch.dt == pytest.approx(1 / RATE, rel=1e-9)
+    assert stretch.samples == len(kept)
+
+
+@pytest.mark.parametrize("kind", ["bursts", "late", "coarse"])
+def test_uneven_times_of_which_none_is_missing_count_as_even(kind: str) -> None:
+    whole, rng = at_rest(), np.random.default_rng(3)
+    t = {
+        "bursts": np.repeat(whole.t[9::10], 10) + np.tile(1e-4 * np.arange(10), 3000),
+        "late": np.maximum.accumulate(whole.t + rng.exponential(0.02, len(whole))),
+        "coarse": np.floor(whole.t / 0.004) * 0.004 + 1e-6 * np.arange(len(whole)),
+    }[kind]
+    (stretch,) = reduce_recording([Block.of(t, whole.acc, whole.gyr)]).stretches
+    assert stretch.dt == pytest.approx(1 / RATE, rel=2e-3)
+
+
+@pytest.mark.parametrize("period", [1.0, 2.0, 10.0])
+def test_a_slow_device_has_no_gap_behind_each_sample(period: float) -> None:
+    block, rng = at_rest(rows=600), np.random.default_rng(4)
+    t = period * (np.arange(600) + (np.arange(600) >= 400) * 5)
+    t += 0.01 * rng.standard_normal(600)
+    found = reduce_recording([Block.of(t, block.acc, block.gyr)])
+    assert [s.samples for s in found.stretches] == [400, 200]
+    assert found.stretches[0].dt == pytest.approx(period, rel=1e-3)
+
+
+@pytest.mark.parametrize("length", [30, 600])
+def test_blank_samples_are_lost_ones_and_no_silence(length: int) -> None:
+    """As what a window has without its disturbances; held values have no noise."""
+    block = at_rest()
+    for first in range(5000, len(block) - length, 5000):
+        block.acc[first : first + length] = block.gyr[first : first + length] = np.nan
+    found = reduce_recording([block])
+    assert found.samples == np.isfinite(block.acc[:, 0]).sum()
+    assert len(found.stretches) == (1 if length < RATE else 6)
+    size = estimate_noise([found]).channels["ax"].processes["N"]
+    assert abs(size.value - SIZE / RATE**0.5) < 4 * size.sigma

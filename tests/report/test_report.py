@@ -282,6 +282,32 @@ def test_the_page_opens_with_what_to_do(material: ReportMaterial) -> None:
         assert says in Tags(render(replace(material, session=session))).text
 
 
+def test_a_parameter_that_was_given_exactly_is_not_what_changed_most(
+    material: ReportMaterial,
+) -> None:
+    """It has no uncertainty that its change could be compared with."""
+    found = material.calibration
+    assert found is not None
+    covariance = found.covariance.copy()
+    given = found.names.index("acc_bias.x")
+    covariance[given] = covariance[:, given] = 0.0
+    about = material.session.about
+    nominal = {g: found.vector(g)[0] for g in ("acc_bias", "acc_scale", "gyr_bias")}
+    for moved in (0.0, 0.3):
+        nominal["acc_bias"] = found.vector("acc_bias")[0] + [moved, 0.2, 0.0]
+        session = replace(
+            material.session,
+            about=replace(
+                about,
+                nominal={**about.nominal, **nominal},
+                raw={**about.raw, "nominal": {}},
+            ),
+        )
+        exact = replace(found, covariance=covariance)
+        page = render(replace(material, session=session, calibration=exact))
+        assert "Apply it: acc bias y differs" in Tags(page).text
+
+
 def test_the_norm_misses_gravity_by_bias_and_scale_before(
     material: ReportMaterial,
 ) -> None:

@@ -15,6 +15,7 @@ from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.run_results import first_result
 from fieldcal.core.errors import Stopped
 from fieldcal.core.positions import Position
+from fieldcal.core.samples import Block
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.history.store import History
 from fieldcal.model.posterior.probabilities import ProbableCause
@@ -260,6 +261,52 @@ def test_who_leaves_out_what_a_remedy_wants_again_is_asked_for_nothing_more(
     run = {"procedure": "positions", "seconds": 5.0}
     bench.run(run, until_go=True, position=start)
     assert bench.numbers == [0, 1, 2] + ([1] if left_out else [1, 1, 1])
+
+
+THREE = [{"alpha_deg": a, "beta_deg": b} for a, b in ((0, 0), (45, 5), (22.5, 5))]
+
+
+def test_what_was_left_out_is_not_asked_for_again_after_a_repetition(
+    bench: Bench,
+) -> None:
+    bench.hand.wants = {1: "skip", 2: "repeat"}
+    found = bench.run({"procedure": "positions", "seconds": 5.0}, position=THREE)
+    assert bench.numbers == [0, 1, 2, 0, 2]
+    assert [m["event"] for m in bench.marks].count("skipped") == 1
+    assert any("left out by the operator" in w for w in found.warnings)
+
+
+class Loose(InProcess):
+    """A device whose plug falls out once."""
+
+    at = 0.0
+
+    def receive(self, timeout: float) -> Block | None:
+        if 0.0 < self.at < self.device.time:
+            self.at = 0.0
+            raise OSError("unplugged")
+        return super().receive(timeout)
+
+
+def test_what_was_left_out_is_not_asked_for_again_after_a_lost_link(
+    bench: Bench,
+) -> None:
+    driver = bench.hand.driver = Loose(bench.hand.driver.device)
+
+    class Unlucky(Hand):
+        def place(self, hold: Hold) -> None:
+            super().place(hold)
+            if self.numbers == [0, 1, 2]:
+                driver.at = driver.device.time + 5.0
+
+        @property
+        def numbers(self) -> list[int]:
+            return [number for number, _ in self.asked]
+
+    bench.hand = Unlucky(driver, {1: "skip"})
+    bench.run({"procedure": "positions", "seconds": 5.0}, position=THREE)
+    assert bench.numbers == [0, 1, 2, 2]
+    assert "lost" in [m["event"] for m in bench.marks]
 
 
 def test_a_window_that_a_remedy_wants_longer_is_so_also_behind_a_break(

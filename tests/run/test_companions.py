@@ -18,10 +18,13 @@ from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
 from fieldcal.history.store import History
+from fieldcal.run import companions
 from fieldcal.run.companions import (
     ArrivalTimes,
     Companion,
     LeadRecorder,
+    companion_folders,
+    record_companions,
     refuse_recorded_companions,
 )
 from fieldcal.run.movers import VirtualMover
@@ -285,6 +288,30 @@ def test_what_the_first_device_has_the_others_have_whenever_it_is_killed(
         leads.mark("window", position=0, start_s=1.0, end_s=8.0)
         leads.mark("repeated", position=0)
     assert other.marks == [("window", False), ("repeated", True)]
+
+
+def test_a_device_that_joins_a_session_later_has_each_position_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Positions of a remedy are in the tables of the task, and marked as added."""
+    monkeypatch.setattr(
+        companions, "open_driver", lambda url: InProcess(VirtualDevice(seed=1))
+    )
+    planned = [
+        {"alpha_deg": 0.0, "beta_deg": 0.0},
+        {"alpha_deg": 45.0, "beta_deg": 5.0},
+    ]
+    besides = {"alpha_deg": -45.0, "beta_deg": 5.0}
+    with Recorder(tmp_path / "s", {"format": 1, "position": planned}):
+        pass
+    with Recorder(tmp_path / "s", None) as recorder:
+        tables = {"format": 1, "position": [*planned, besides]}
+        with record_companions({"new:": ""}, recorder, tables) as leads:
+            leads.mark("added", position=2, name="besides", **besides)
+    for folder in (tmp_path / "s", *companion_folders(tmp_path / "s", 1)):
+        assert [p.degrees for p in Session.open(folder).positions] == [
+            (0.0, 0.0), (45.0, 5.0), (-45.0, 5.0)
+        ]  # fmt: skip
 
 
 def test_an_unforeseen_error_of_a_further_device_is_told(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from fieldcal.drivers.driver import Driver, LinkHealth, open_driver
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.planning.holding import hold_each
 from fieldcal.planning.steps import Hold, Plan, add, hold
+from fieldcal.run import engine as engine_module
 from fieldcal.run.engine import Engine
 from fieldcal.run.gyro_unit import GyroUnitWatch
 from fieldcal.run.interruptions import RepeatPosition
@@ -463,6 +465,45 @@ def test_a_first_position_that_was_set_wrongly_may_be_set_right(bench: Bench) ->
     engine.run(hold(0, TWO_POSITIONS[0], 5.0))
     assert turner.told == ["nothing was taken yet that could be repeated"]
     assert events(bench).count("repeated") == 1
+
+
+class Insistent(Turner):
+    """Presses Enter in a wrong place, turns slowly to the right one, and once more."""
+
+    waits: list[PositionWait]
+    presses = 0
+
+    def wish(self) -> Wish | None:
+        shown = self.views[-1].reason.state if self.views else WaitState.NOTHING
+        if not self.presses and shown is WaitState.MISPLACED:
+            self.driver.device.turn(float(np.deg2rad(8.0)), 0.0, seconds=20.0)
+        elif self.presses != 1 or self.waits[-1].problem:
+            return None
+        self.presses += 1
+        return "confirm"
+
+
+def test_nobody_insists_on_a_place_that_is_right_by_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a base that sways it moves there without a motion that would be noticed."""
+    about = description.parse_description({"site": {"gravity": 9.81, "sways": True}})
+    turner = Insistent(InProcess(VirtualDevice(seed=3)), slips=[(10.0, 0.0)])
+    turner.corrects, turner.waits = False, []
+
+    class Watched(PositionWait):
+        def __init__(self, *given: Any) -> None:
+            super().__init__(*given)
+            turner.waits.append(self)
+
+    monkeypatch.setattr(engine_module, "PositionWait", Watched)
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        engine = Engine(turner.driver, turner, about, recorder, give_up=99.0)
+        engine.run(hold_all(TWO_POSITIONS[:1], 5.0))
+    assert any("press Enter once more" in text for text in turner.told)
+    assert turner.told[-1] == "not yet: settling"
+    marks = Session.open(tmp_path / "s").marks()
+    assert "insisted" not in [mark["event"] for mark in marks]
 
 
 def test_an_operator_may_stop(bench: Bench) -> None:

@@ -129,6 +129,17 @@ def test_all_that_a_command_has_started_ends_with_it(tmp_path: Path) -> None:
                 assert alive.read() == ""  # whoever could write is gone
 
 
+def test_a_turn_that_is_asked_for_twice_is_not_broken_off(tmp_path: Path) -> None:
+    """As after a gap of the link, while the table is on its way."""
+    with CommandMover(script(tmp_path, "import time; time.sleep(600)"), 600.0) as mover:
+        started = []
+        for number in (0, 0, 1):
+            mover.turn(FIVE_POSITIONS[number], number)
+            assert mover._process is not None
+            started.append(mover._process.pid)
+    assert started[0] == started[1] != started[2]
+
+
 class Gone:
     """A mover that is gone for some of its calls."""
 

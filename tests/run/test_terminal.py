@@ -366,6 +366,31 @@ def test_what_a_second_press_no_longer_does_is_not_shown(
     assert "press s once more" in screen(operator)
 
 
+class Table(ManualMover):
+    """A turntable that is on its way until it is told otherwise."""
+
+    turning = True
+
+    def busy(self) -> bool:
+        return self.turning
+
+
+def test_no_key_breaks_off_a_turn() -> None:
+    """A program that is killed half way leaves its table anywhere."""
+    operator = sized(80, 24, "repeat", "confirm")
+    table = operator._mover = Table()
+    assert [operator.wish() for _ in range(3)] == ["wait"] * 3
+    shown = " ".join(screen(operator).split())
+    assert "r counts once the mover is done" in shown and "not yet: the mo" in shown
+    table.turning = False
+    assert [operator.wish() for _ in range(2)] == ["repeat", None]
+    table.turning, operator._keyboard = True, Keys("skip", "skip", "stop", "stop")
+    assert [operator.wish() for _ in range(3)] == ["wait", "wait", "stop"]
+    operator.place(Hold(2, FIVE_POSITIONS[2], 30.0))
+    table.turning = False
+    assert [operator.wish() for _ in range(2)] == ["stop", None]
+
+
 @pytest.mark.parametrize(
     ("angle", "right_lower", "left_lower"), [(45.0, True, False), (-45.0, False, True)]
 )

@@ -20,6 +20,11 @@ def confirmation_question(waiting: PositionWait) -> WaitReason:
     )
 
 
+def left_out_error(hold: Hold) -> Skipped:
+    """The error that tells a plan that the operator left a position out."""
+    return Skipped(f"{hold.position.name} was left out by the operator")
+
+
 class OperatorDesk:
     """Dialogue of the engine with the operator; messages are marked in the session.
 
@@ -85,7 +90,7 @@ class OperatorDesk:
             raise Stopped("stopped by the operator")
         if wish == "skip":
             self._recorder.mark("skipped", position=hold.index)
-            raise Skipped(f"{hold.position.name} was left out by the operator")
+            raise left_out_error(hold)
         return wish
 
     def repeat(self, before: int | None) -> None:

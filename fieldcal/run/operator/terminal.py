@@ -21,6 +21,7 @@ from fieldcal.run.operator.content import RunContent
 from fieldcal.run.operator.keyboard import Keyboard
 from fieldcal.run.operator.protocol import OperatorView, Wish
 from fieldcal.run.operator.screen import Screen
+from fieldcal.run.operator.turning import WishesWhileTurning
 from fieldcal.run.operator.widgets import alert
 from fieldcal.run.wait_reason import WaitReason, reminder
 
@@ -64,6 +65,7 @@ class ConsoleOperator:
         self._shown = RunContent(title, positions, most)
         self._screen = Screen(console, self._shown, verification, self._has_keys)
         self._skips, self._asked = -CONFIRM_WITHIN_S, ""
+        self._later = WishesWhileTurning()
         self._drawn = 0.0
         self._lines: set[str] = set()
         self._live: Live | None = None
@@ -95,6 +97,7 @@ class ConsoleOperator:
         self._shown.position_asked(hold)
         self._lines.clear()
         self._bell()
+        self._later.kept = None  # like keys, meant for an earlier step
         if self._keyboard:
             self._keyboard.forget()
         self._log(
@@ -131,7 +134,12 @@ class ConsoleOperator:
             self._ask_back()
         elif pressed == "skip":
             self._skips = -CONFIRM_WITHIN_S
-        return pressed or ("wait" if self._mover.busy() else None)
+        if pressed == "stop":
+            return pressed
+        turning = self._mover.busy()
+        if said := self._later.notice(pressed, turning):
+            self.tell(said)
+        return self._later.wish(pressed, turning)
 
     def _ask_back(self) -> None:
         """Ask whether the position is to be left out."""

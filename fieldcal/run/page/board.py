@@ -81,6 +81,12 @@ class Board:
         """A number that grows with every change."""
         return self._version
 
+    @property
+    def position_now(self) -> int | None:
+        """Number of the position that is asked for; None before there is one."""
+        with self._lock:
+            return self._shown.hold.index if self._shown.hold else None
+
     def content(self) -> dict[str, Any]:
         """The whole state as JSON; texts are made safe for display."""
         with self._lock:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fieldcal.planning.steps import Hold
 from fieldcal.run.operator.protocol import Operator, OperatorView, Wish
+from fieldcal.run.operator.turning import WishesWhileTurning
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.buttons import Buttons
 from fieldcal.run.wait_reason import WaitReason
@@ -22,10 +23,12 @@ class PageOperator:
 
     def __init__(self, inner: Operator, board: Board, buttons: Buttons) -> None:
         self._inner, self._board, self._buttons = inner, board, buttons
+        self._later = WishesWhileTurning()
 
     def place(self, hold: Hold) -> None:
         """Ask for a position."""
         self._buttons.forget()
+        self._later.kept = None
         self._board.position_asked(hold)
         self._inner.place(hold)
 
@@ -46,4 +49,10 @@ class PageOperator:
 
     def wish(self) -> Wish | None:
         """Wish from the page, else from the wrapped operator."""
-        return self._buttons.pressed() or self._inner.wish()
+        inner, pressed = self._inner.wish(), self._buttons.pressed()
+        if inner == "stop":
+            return inner
+        turning = inner == "wait"
+        if said := self._later.notice(pressed, turning):
+            self.tell(said)
+        return self._later.wish(pressed, turning) or inner

@@ -177,6 +177,9 @@ def _make_app(server: PageServer) -> Starlette:
         wished = None if given is None else given.get("wish")
         if given is None or not isinstance(wished, str) or wished not in OFFERED:
             return JSONResponse({"error": "client and wish are wanted"}, 400)
+        meant = given.get("position")
+        if wished != "stop" and meant not in (None, server.board.position_now):
+            return JSONResponse({"error": "another position is asked for now"}, 409)
         if not server.buttons.press(given["client"], given["wish"]):
             return JSONResponse({"error": "somebody else has the buttons"}, 409)
         return JSONResponse({})

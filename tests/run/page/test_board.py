@@ -211,9 +211,23 @@ def test_the_console_is_shown_everything_and_both_may_wish() -> None:
     both.show(now)
     assert console.seen == [HOLD, "said", (reason, 30.0), now]
     assert board.content()["words"] == "TURN TO"
-    console.wishes = ["wait"]
     buttons.press("a", "confirm")
-    assert both.wish() == "confirm" and both.wish() == "wait"
+    assert both.wish() == "confirm"
+
+
+def test_no_button_breaks_off_a_turn() -> None:
+    console, board, buttons = Console(), Board("fieldcal", FIVE_POSITIONS), Buttons()
+    both = PageOperator(console, board, buttons)
+    buttons.take("a")
+    console.wishes = [None, "wait", "wait"]
+    buttons.press("a", "repeat")
+    assert [both.wish() for _ in range(3)] == ["wait", "wait", "repeat"]
+    assert console.seen == ["r counts once the mover is done; q ends at once"]
+    console.wishes = ["wait", "stop", "wait"]
+    buttons.press("a", "confirm")
+    assert [both.wish() for _ in range(2)] == ["wait", "stop"]
+    buttons.press("a", "stop")
+    assert both.wish() == "stop"
 
 
 @pytest.mark.parametrize("name", ["page.html", "page.css", "page.js"])

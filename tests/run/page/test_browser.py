@@ -148,6 +148,25 @@ def test_buttons_are_taken_pressed_and_pressed_twice(
     assert "take them over" in page.text("take")
 
 
+def test_a_tap_for_a_position_that_was_taken_leaves_out_no_other_one(
+    page: Screen, server: PageServer
+) -> None:
+    """Its second tap comes while the next position is asked for."""
+    opened(page, server)
+    tap(page, "#take")
+    page.until("!document.getElementById('mine').hidden")
+    tap(page, "[data-wish=skip]")
+    server.board.position_asked(Hold(2, FIVE_POSITIONS[2], 30.0))
+    page.until("document.getElementById('detail').textContent.startsWith('position 3')")
+    tap(page, "[data-wish=skip]")
+    shown = "document.querySelector('[data-wish=skip]').textContent"
+    assert page.value(shown) == "Really leave out?"
+    tap(page, "[data-wish=repeat]")
+    while (wish := server.buttons.pressed()) is None:
+        page.value("0")
+    assert wish == "repeat"
+
+
 def test_a_link_that_is_lost_comes_back(page: Screen, server: PageServer) -> None:
     opened(page, server)
     lost = "!document.getElementById('lost').hidden"

@@ -168,6 +168,19 @@ def test_one_presses_and_the_other_watches(server: PageServer) -> None:
     assert status(server, "/wish", {"client": "b", "wish": "dance"}) == 400
 
 
+def test_what_was_meant_for_another_position_is_refused(server: PageServer) -> None:
+    """The link of a phone may be slower than the next position; a stop is for all."""
+    server.buttons.take("a", over=True)
+    skip = {"client": "a", "wish": "skip"}
+    assert status(server, "/wish", {**skip, "position": 0}) == 409
+    assert status(server, "/wish", {**skip, "position": "1"}) == 409
+    assert server.buttons.pressed() is None
+    assert status(server, "/wish", {**skip, "position": 1}) == 200
+    assert server.buttons.pressed() == "skip"
+    stop = {"client": "a", "wish": "stop", "position": 0}
+    assert status(server, "/wish", stop) == 200 and server.buttons.pressed() == "stop"
+
+
 def test_a_change_is_sent_without_being_asked_for(server: PageServer) -> None:
     with sent(server, "/events?client=c") as stream:
         assert json.loads(stream.readline()[6:])["detail"].startswith("position 2")

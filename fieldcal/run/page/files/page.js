@@ -84,7 +84,10 @@ function lines(id, items, make) {
   }));
 }
 
+let current = null; // number of the position that is shown
+
 function show(now) {
+  current = now.now;
   document.title = `${now.words} · fieldcal`;
   at("band").dataset.colour = now.colour;
   at("words").textContent = now.words;
@@ -129,17 +132,19 @@ at("take").addEventListener("click", () => ask("buttons", { over: at("take").dat
 for (const button of document.querySelectorAll("[data-wish]")) {
   const plain = button.textContent;
   let until = 0;
+  let meant = null; // a second tap counts for the position of the first one only
   const calm = () => { button.textContent = plain; button.classList.remove("sure"); until = 0; };
   button.addEventListener("click", () => {
-    if (button.dataset.sure && Date.now() > until) {
+    if (button.dataset.sure && (Date.now() > until || meant !== current)) {
       until = Date.now() + SURE;
+      meant = current;
       button.textContent = button.dataset.sure;
       button.classList.add("sure");
       setTimeout(() => { if (Date.now() >= until) calm(); }, SURE + 50);
       return;
     }
     calm();
-    ask("wish", { wish: button.dataset.wish });
+    ask("wish", { wish: button.dataset.wish, position: current });
   });
 }
 

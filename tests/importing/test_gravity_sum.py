@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from joined import read_files
 from laid_about import turned, write
 
 from fieldcal.cli import main
+from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Array
 from fieldcal.session.folder import Session
 
-RATE = 50.0
-ROWS = turned(6, RATE, 2.0)
+Way = Callable[[Path, list[str]], list[str]]
+"""Files as they are given: as they are, or in an archive."""
+
+RATE = 25.0
+ROWS = turned(6, RATE, 1.5)
 T, FORCE, RATES = ROWS[:, :1], ROWS[:, 1:4], ROWS[:, 4:]
 GRAVITY = np.round(FORCE, 1)
 FREE = FORCE - GRAVITY
@@ -40,50 +46,42 @@ def packed(folder: Path, paths: list[str]) -> list[str]:
     return [str(folder / "log.zip")]
 
 
-@pytest.mark.parametrize("way", ["zip", "join"])
-@pytest.mark.parametrize("late", [0.0, 4e-3])
-def test_files_of_both_parts_are_added(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str, late: float
-) -> None:
-    paths = files(tmp_path, late)
-    call = packed(tmp_path, paths) if way == "zip" else [*paths[::-1], "--join"]
-    assert main(["import", *call, "-o", str(tmp_path / "s")]) == 0
+def test_three_files_are_one_session(tmp_path: Path) -> None:
+    call = [*files(tmp_path)[::-1], "--join", "-o", str(tmp_path / "s")]
+    assert main(["import", *call]) == 0
     block = Session.open(tmp_path / "s").block
     np.testing.assert_allclose(block.acc, FORCE, atol=1e-6)
-    np.testing.assert_allclose(block.gyr[:-1], RATES[:-1], atol=1e-6)
     np.testing.assert_allclose(block.t, T[:, 0], atol=1e-6)
-    assert "are added, each with the nearest" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("way", ["zip", "join"])
-def test_parts_of_different_recordings_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str
-) -> None:
-    paths = files(tmp_path, late=1000.0)
-    call = packed(tmp_path, paths) if way == "zip" else [*paths, "--join"]
-    assert main(["import", *call, "-o", str(tmp_path / "s")]) == 2
-    said = capsys.readouterr().err
-    assert "Gravity.csv: no sample is at a time at which" in said
-    assert "TotalAcceleration" in said and not (tmp_path / "s").exists()
+@pytest.mark.parametrize("way", [packed, lambda _, paths: paths], ids=["zip", "join"])
+@pytest.mark.parametrize("late", [0.0, 4e-3])
+def test_files_of_both_parts_are_added(tmp_path: Path, way: Way, late: float) -> None:
+    block, says = read_files(way(tmp_path, files(tmp_path, late)))
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-6)
+    np.testing.assert_allclose(block.gyr[:-1], RATES[:-1], atol=1e-6)
+    np.testing.assert_allclose(block.t - block.t[0], T[:, 0], atol=1e-6)
+    assert any("are added, each with the nearest" in said for said in says)
 
 
-@pytest.mark.parametrize("way", ["zip", "join"])
-def test_gravity_is_not_added_twice(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str
-) -> None:
-    paths = files(tmp_path, acc=FORCE)
-    call = packed(tmp_path, paths) if way == "zip" else [*paths, "--join"]
-    assert main(["import", *call, "-o", str(tmp_path / "s")]) == 0
-    np.testing.assert_allclose(Session.open(tmp_path / "s").block.acc, FORCE, atol=1e-6)
-    assert "Accelerometer.csv has gravity in it" in capsys.readouterr().err
+@pytest.mark.parametrize("way", [packed, lambda _, paths: paths], ids=["zip", "join"])
+def test_parts_of_different_recordings_are_refused(tmp_path: Path, way: Way) -> None:
+    paths = way(tmp_path, files(tmp_path, late=1000.0))
+    with pytest.raises(InputError, match=r"Gravity.csv: no sample is at a time") as no:
+        read_files(paths)
+    assert "TotalAcceleration" in str(no.value)
 
 
-def test_accelerations_without_gravity_alone_say_what_to_do(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = files(tmp_path)[0]
-    assert main(["import", path, "-o", str(tmp_path / "s")]) == 2
-    assert "--join (Accelerometer.csv Gravity.csv)" in capsys.readouterr().err
+@pytest.mark.parametrize("way", [packed, lambda _, paths: paths], ids=["zip", "join"])
+def test_gravity_is_not_added_twice(tmp_path: Path, way: Way) -> None:
+    block, says = read_files(way(tmp_path, files(tmp_path, acc=FORCE)))
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-6)
+    assert any("Accelerometer.csv has gravity in it" in said for said in says)
+
+
+def test_accelerations_without_gravity_alone_say_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"--join \(Accelerometer.csv Gravity.csv\)"):
+        read_files(files(tmp_path)[:1])
 
 
 @pytest.mark.parametrize("unit", ["", " (m/s^2)"])
@@ -94,9 +92,10 @@ def test_columns_of_both_parts_are_added_whatever_the_first_is_called(
              for axis in "xyz"]  # fmt: skip
     names += [f"gyroscope_{axis}" for axis in "xyz"]
     rows = np.hstack([T, FREE, GRAVITY, RATES])
-    path = write(tmp_path, rows, heading=",".join(["seconds", *names]))
-    assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 0
-    np.testing.assert_allclose(Session.open(tmp_path / "s").block.acc, FORCE, atol=1e-6)
+    block, _ = read_files(
+        [write(tmp_path, rows, heading=",".join(["seconds", *names]))]
+    )
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-6)
 
 
 def test_records_of_both_parts_are_added(tmp_path: Path) -> None:
@@ -108,5 +107,6 @@ def test_records_of_both_parts_are_added(tmp_path: Path) -> None:
     ]
     path = tmp_path / "log.json"
     path.write_text(json.dumps(records))
-    assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 0
-    np.testing.assert_allclose(Session.open(tmp_path / "s").block.acc, FORCE, atol=1e-6)
+    block, says = read_files([path])
+    np.testing.assert_allclose(block.acc, FORCE, atol=1e-6)
+    assert any("those of Gravity are added" in said for said in says)

@@ -8,55 +8,89 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from joined import read_files
 from laid_about import turned, write
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block, concat
-from fieldcal.importing.times.repeats import distinct_rows
+from fieldcal.importing.times.repeats import RepeatFinder, distinct_rows
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.session.folder import Session
 
-RATE = 50.0
-ROWS = turned(4, RATE, 2.0)
+RATE = 25.0
+ROWS = turned(4, RATE, 1.5)
 HEADING = "t (s),ax,ay,az,gx (rad/s),gy (rad/s),gz (rad/s)"
 
 
 def brought(folder: Path, rows: Array, heading: str = HEADING) -> Block:
-    path = write(folder, rows, heading=heading)
-    assert main(["import", str(path), "-o", str(folder / "s")]) == 0
-    return Session.open(folder / "s").block
+    return read_files([write(folder, rows, heading=heading)])[0]
+
+
+def test_a_session_of_rows_that_were_written_twice_has_each_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, np.repeat(ROWS, 2, axis=0), heading=HEADING)
+    assert main(["import", str(path), "-o", str(tmp_path / "s")]) == 0
+    block = Session.open(tmp_path / "s").block
+    np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
+    said = capsys.readouterr().err
+    assert "line 3: repeats the row above, time and values" in said
+    assert "left out" not in said and "25 Hz" in said
 
 
 @pytest.mark.parametrize("times", [2, 3])
 @pytest.mark.parametrize("heading", [HEADING, "time,ax,ay,az,gx,gy,gz"])
 def test_rows_that_were_written_several_times_are_taken_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], times: int, heading: str
+    tmp_path: Path, times: int, heading: str
 ) -> None:
     block = brought(tmp_path, np.repeat(ROWS, times, axis=0), heading)
     np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
     np.testing.assert_allclose(block.six, ROWS[:, 1:], atol=1e-9)
-    said = capsys.readouterr().err
-    assert "line 3: repeats the row above, time and values" in said
-    assert "left out" not in said and "50 Hz" in said
 
 
-def test_a_few_rows_that_are_there_twice_need_no_repair(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    block = brought(tmp_path, np.insert(ROWS, [400, 800], ROWS[[399, 799]], axis=0))
+def test_columns_that_are_not_used_make_no_row_another(tmp_path: Path) -> None:
+    """A time of arrival beside the device's, as of a log over two links."""
+    twice = np.repeat(ROWS, 2, axis=0)
+    arrived = 100 + np.arange(len(twice)) / (2 * RATE)
+    heading = "arrival," + HEADING
+    block = brought(tmp_path, np.column_stack([arrived, twice]), heading)
     np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
-    assert "line 402: repeats the row above" in (said := capsys.readouterr().err)
-    assert "(2 such rows)" in said
+
+
+def test_a_few_rows_that_are_there_twice_need_no_repair(tmp_path: Path) -> None:
+    rows = np.insert(ROWS, [200, 300], ROWS[[199, 299]], axis=0)
+    block, says = read_files([write(tmp_path, rows, heading=HEADING)])
+    np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
+    assert says[-1].startswith("line 202: repeats the row above")
+    assert "(2 such rows)" in says[-1]
 
 
 def test_rows_of_one_time_with_values_of_their_own_are_spread(tmp_path: Path) -> None:
     """A batch of a device that repeats a value by chance is no row written twice."""
     batched = ROWS.copy()
     batched[:, 0] = np.arange(len(ROWS)) // 10 * 10 / RATE
-    batched[1:200:40] = batched[:200:40]
+    batched[201] = batched[200]
     block = brought(tmp_path, batched)
     np.testing.assert_allclose(np.diff(block.t), 1 / RATE, atol=1e-6)
     assert len(block) == len(ROWS)
+
+
+def test_a_clock_of_whole_seconds_hides_no_rows_that_were_written_twice(
+    tmp_path: Path,
+) -> None:
+    coarse = ROWS.copy()
+    coarse[:, 0] = np.floor(ROWS[:, 0] + 1e-9)
+    block = brought(tmp_path, np.repeat(coarse, 2, axis=0))
+    np.testing.assert_allclose(np.diff(block.t), 1 / RATE, atol=1e-6)
+    np.testing.assert_allclose(block.six, ROWS[:, 1:], atol=1e-9)
+
+
+@given(st.lists(st.integers(0, 12), min_size=1, max_size=4))
+def test_a_repeat_is_found_wherever_a_piece_ends(cuts: list[int]) -> None:
+    x = np.repeat(np.arange(4.0), 3)
+    finder, edges = RepeatFinder(), [0, *sorted(cuts), len(x)]
+    parts = [finder.of([x[a:b]]) for a, b in zip(edges, edges[1:], strict=False)]
+    np.testing.assert_array_equal(np.concatenate(parts), np.arange(12) % 3 > 0)
 
 
 @given(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from fieldcal.core.samples import Array
 from fieldcal.importing.recording import ReadOptions, RowBatch
+from fieldcal.importing.tables.column_times import split_seconds
 from fieldcal.importing.times.row_times import BETWEEN, BatchTimes, RowTimes
 
 EACH, STEP = 10, 0.1
@@ -151,3 +152,11 @@ def test_a_clock_that_ends_often_is_said_once() -> None:
     found, says = read(t, (100, 250))
     np.testing.assert_allclose(np.diff(found), 0.5)
     assert len(says) == 1
+
+
+def test_frames_and_their_parts_are_no_seconds() -> None:
+    """Parts of a frame are counted as well, but end long before a second does."""
+    i = np.arange(400.0)
+    assert split_seconds(np.column_stack([i // 20, i % 20]), [0]) is None
+    clock = np.column_stack([i // 20, 50 * (i % 20)])
+    assert split_seconds(clock, [0]) == (0, 1, "t_ms")

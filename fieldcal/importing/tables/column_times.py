@@ -40,6 +40,11 @@ FRACTION_NAMES = tuple(sorted(FRACTIONS, key=lambda name: -FRACTIONS[name]))
 """Columns of fractions of a second, the coarsest first."""
 
 
+REACHED = 0.5
+"""Part of a second that what is beyond whole seconds reaches at least: the parts of a
+frame that are counted do not."""
+
+
 class SplitSeconds(NamedTuple):
     """A clock in two columns.
 
@@ -80,6 +85,8 @@ def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
             name = next((f for f in FRACTION_NAMES
                          if np.max(part) * FRACTIONS[f] < 1), "")  # fmt: skip
             if i == j or not name or np.min(part) < 0 or np.ptp(part) == 0:
+                continue
+            if np.max(part) * FRACTIONS[name] < REACHED:
                 continue
             if (np.diff(part)[steps == 1] < 0).mean() < LATER:
                 continue

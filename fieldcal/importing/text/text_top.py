@@ -149,7 +149,9 @@ def count_top_lines(
     width, full = len(wanted.columns), max(map(len, rows[:FULL]), default=0)
     for i, (row, separator) in enumerate(zip(rows, parted, strict=True)):
         said = [row[j].strip() for j in use if j < len(row)]
-        whole = separator is None or len(row) in (full, width)
+        # a number alone, as of a rate, is no row
+        bare = separator is None and len(row) > len(use) / 2
+        whole = bare or len(row) in (full, width)
         numbers = all(is_number(cell, separator != ",") for cell in said if cell)
         if whole and any(said) and numbers:
             return i

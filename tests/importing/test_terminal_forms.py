@@ -51,6 +51,23 @@ def test_times_that_a_terminal_writes_before_a_line(stamp: str, separator: str) 
     assert found.shape == (ROWS, 4)
 
 
+@pytest.mark.parametrize(
+    "prefix",
+    ["[INFO] [{:.9f}] [imu_node]: ", "[ INFO] [{:.9f}]: ",
+     "[00:00:{:06.3f},000] <inf> imu: ", "[{:08.0f}] <inf> imu: ",
+     "05-03 14:20:{:06.3f}  1234  1250 D Imu: "],
+    ids=["ROS 2", "ROS 1", "Zephyr", "Zephyr, ms", "Android"],
+)  # fmt: skip
+def test_what_a_program_s_log_writes_before_a_line_is_its_time(prefix: str) -> None:
+    ms = "08.0f" in prefix
+    stamps = [prefix.format((50 if ms else 0.05) * i) for i in range(ROWS)]
+    lines = [f"{stamp}accel: [{', '.join(values(i))}] ax={i}"
+             for i, stamp in enumerate(stamps)]  # fmt: skip
+    found = numbers(lines)
+    np.testing.assert_allclose(np.diff(found[:, 0]), 50 if ms else 0.05, atol=1e-6)
+    assert found.shape == (ROWS, 5)
+
+
 @pytest.mark.parametrize("place", [0, 1, 4])
 def test_rows_of_two_sensors_are_told_wherever_their_name_stands(place: int) -> None:
     lines = []

@@ -19,16 +19,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
 from fieldcal.importing.words.heading_units import parse_unit
 from fieldcal.importing.words.heading_words import heading_meaning
 
-TIME = "utc time [s]"
-"""Name of the time that a monitor writes before a line."""
-
-TICKS = "time [ms]"
-"""Name of the time since a device started."""
-
-CLOCKS = frozenset((TIME, TICKS))
+CLOCKS = frozenset((TIME, TICKS, STAMP))
 """Names that each line of a row may have."""
 
 AXES = ("x", "y", "z")
@@ -105,6 +100,8 @@ def labelled_values(line: str) -> list[Labelled]:
     ([], [])
     """
     line = _COLOURS.sub("", line)
+    prefix = log_prefix(line)
+    line = line[prefix.length :] if prefix else line
     line = _LIST.sub(r" \1", _DICT.sub(r"[\1, \2, \3]", line))
     line = _LISTED.sub(r"\1: \2", line)
     line = _PAIR.sub(r"\1: ", line) if _PAIRS.fullmatch(line) else line
@@ -132,6 +129,7 @@ def labelled_values(line: str) -> list[Labelled]:
             read = _with_unit(read, behind)
     first = [(TIME, arrival[1].strip())] if read and arrival else []
     first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
+    first += [(prefix.name, prefix.value)] if read and prefix else []
     return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
 
 

@@ -62,10 +62,13 @@ def introduce_device(block: Block, gravity: float) -> DeviceIntroduction:
     gravity : m/s^2
 
     """
-    f: Array = np.nanmean(block.acc, axis=0)
-    size = float(np.linalg.norm(f))
     centred = _rates_are_zero(block.gyr)
     zero = ZEROED_NOTICE * centred
+    if not np.isfinite(block.acc).any(axis=0).all():
+        summary = "it sends no accelerations along all three axes"
+        return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)
+    f: Array = np.nanmean(block.acc, axis=0)
+    size = float(np.linalg.norm(f))
     if not abs(size - gravity) <= NORM * gravity:
         summary = f"it reads {size:.3g} m/s² at rest, and gravity is {gravity:.3g} m/s²"
         return DeviceIntroduction("", PLAIN_MOUNTING, centred, summary + zero)

@@ -52,6 +52,14 @@ def test_units_that_are_not_g_are_said() -> None:
     assert not known.up and "m/s² at rest, and gravity is 9.81 m/s²" in known.summary
 
 
+@pytest.mark.parametrize("axes", [slice(None), slice(1, 2)])
+def test_a_device_that_lacks_accelerometers_is_said(axes: slice) -> None:
+    block = at_rest(np.array([0.0, -9.81, 0.0]), np.full(3, 0.01))
+    block.acc[:, axes] = np.nan
+    known = introduce_device(block, 9.81)
+    assert not known.up and "no accelerations along all three axes" in known.summary
+
+
 def test_a_device_that_takes_its_bias_out_is_seen() -> None:
     f = np.array([0.0, -9.81, 0.0])
     centred = at_rest(f, np.zeros(3))

@@ -272,14 +272,16 @@ def _experience(
 def _joint_turns(source: RowSource) -> JointTurns:
     """Turns of the joints, as far as the positions' angles are known.
 
-    Measured attitudes are not used: their angles are not those of joints.
+    Measured attitudes are not used: their angles are not those of joints. Nor are
+    positions without samples: nobody knows when, or whether, the joints went there.
     """
     positions = source.about.positions
     if not positions:
         return JointTurns.none()
     known = np.column_stack([*alpha_beta_angles(positions), gamma_angles(positions)])
     known[np.isfinite(attitude_sigmas(positions))] = np.nan
-    return JointTurns.of(source.rest_began[: len(known)], known)
+    held = np.diff(window_bounds(source.block, source.about), axis=1)[:, 0] > 0
+    return JointTurns.of(source.rest_began[: len(known)][held], known[held])
 
 
 def _subtract_rotating_earth_rate(

@@ -70,6 +70,17 @@ def test_joints_are_those_of_angles_that_were_set_and_not_measured() -> None:
     assert turns.at.tolist() == [38.0] and turns.side[:, 0].tolist() == [-1.0]
 
 
+def test_joints_were_not_turned_to_where_the_device_was_never_held() -> None:
+    known = about(
+        place(3.0, 13.0), {"alpha_deg": 90.0, "beta_deg": 5.0},
+        place(25.0, 35.0, 45.0), place(100.0, 110.0, 90.0),
+    )  # fmt: skip
+    arrived = np.array([2.5, 2.0, 21.0, 2.0])
+    one = replace(source(samples(40.0), known), rest_began=arrived)
+    turns = reduce_to_rows(one).x.joint_turns
+    assert turns.at.tolist() == [21.0] and turns.side.tolist() == [[1.0, 0.0]]
+
+
 def test_a_device_that_sees_the_earth_has_its_rate() -> None:
     block, device = samples(20.0), {"grade": "navigation", "name": "a"}
     x = reduce_to_rows(source(block, about(place(3.0, 13.0), device=device))).x

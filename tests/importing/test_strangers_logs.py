@@ -309,6 +309,11 @@ FORMS: dict[str, Writer] = {
         "IMU: T: {:.3f} Ax: {:.5f} Ay: {:.5f} Az: {:.5f} Gx: {:.5f} Gy: {:.5f}"
         " Gz: {:.5f} | Flow: X: 0 Y: 1 | LiDAR: 812mm", ROWS
     ),
+    "values for Teleplot": lambda: "\n".join(
+        f">{name}:{UNIX * 1000 + round(row[0] * 1e3)}:{x:.6f}"
+        for row in ROWS.tolist()
+        for name, x in zip(SIX.split(","), row[1:], strict=True)
+    ),
     "messages of VectorNav": vectornav,
     "channels of RaceCapture": lambda: lines(
         np.round(T * 1e3), ["" if i % 10 else "12.4" for i in range(len(T))], A / G,

@@ -82,6 +82,9 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 """A line that holds nothing but a name."""
 
+_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
+"""A name, ms since 1970 and a value, as Teleplot reads them."""
+
 _LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
 """What programs write behind the time of a line."""
 
@@ -102,11 +105,15 @@ def labelled_values(line: str) -> list[Labelled]:
 
     >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
     [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
+    >>> labelled_values(">ax:1778789865000:0.1")
+    [('time [ms]', '1778789865000'), ('ax', '0.1')]
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
     if len(line) > LONGEST:
         return []
+    if plotted := _PLOTTED.fullmatch(line.strip()):
+        return [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line

@@ -309,6 +309,12 @@ FORMS: dict[str, Writer] = {
         "IMU: T: {:.3f} Ax: {:.5f} Ay: {:.5f} Az: {:.5f} Gx: {:.5f} Gy: {:.5f}"
         " Gz: {:.5f} | Flow: X: 0 Y: 1 | LiDAR: 812mm", ROWS
     ),
+    "a zone behind a space": lambda: lines(
+        [f"{c[:-3]} +0200" for c in clock("%Y-%m-%d %H:%M:%S.%f")], A / G, W,
+        head="loggingTime(txt),"
+        + ",".join(f"accelerometerAcceleration{x}(G)" for x in "XYZ") + ","
+        + ",".join(f"gyroRotation{x}(rad/s)" for x in "XYZ"),
+    ),
     "values for Teleplot": lambda: "\n".join(
         f">{name}:{UNIX * 1000 + round(row[0] * 1e3)}:{x:.6f}"
         for row in ROWS.tolist()

@@ -53,6 +53,9 @@ _ARRIVALS = (
 """Times that monitors write before a line: the Arduino IDE's; Tera Term's, in brackets;
 and CoolTerm's, parted by a space from columns that another sign parts."""
 
+_ZONED = re.compile(rf"\s*{_STAMP} +[-+](?:0\d|1[0-4]):?(?:00|15|30|45)[,;\t]")
+"""A time with its zone, which is no number of the row."""
+
 
 def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
     """Forms of a text by its first lines, in the order in which they are undone.
@@ -170,6 +173,8 @@ class ArrivalPrefix(TextForm):
     def of(cls, lines: Sequence[str], separator: str | None) -> ArrivalPrefix | None:
         """The form, if most lines have it."""
         if not is_true_of_most(lines, lambda line: _arrival(line) is not None):
+            return None
+        if is_true_of_most(lines, lambda line: _ZONED.match(line) is not None):
             return None
         said = _arrival(lines[-1])
         rest = lines[-1][said.end() :] if said else lines[-1]

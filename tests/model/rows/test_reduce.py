@@ -181,6 +181,21 @@ def test_what_a_dead_band_hides_of_gyroscopes_is_the_same_at_every_rest() -> Non
     assert (rows.window_error[:, 1:] < 1e-5).all()
 
 
+def test_where_the_force_points_is_not_known_of_two_axes() -> None:
+    """Of a free window; where the angles are known the two are as good as ever."""
+    block, held = samples(30.0), (place(2.0, 8.0), place(9.0, 14.0))
+    acc = block.acc.copy()
+    acc[block.t < 8.5, 1] = np.nan
+    some = replace(block, acc=acc)
+    free = [{k: v for k, v in one.items() if "deg" not in k} for one in held]
+    rows = reduce_to_rows(source(some, about(*free)))
+    first = rows.x.position == 0
+    assert not rows.used[first, :3].any() and rows.used[first, 3:].all()
+    assert rows.used[~first].all()
+    told = reduce_to_rows(source(some, about(*held)))
+    np.testing.assert_array_equal(told.used[first, :3], [[True, False, True]] * 6)
+
+
 def test_averages_between_any_bounds() -> None:
     block = samples(10.0)
     one = source(block, about(place(2.0, 5.0), place(6.0, 12.0)))

@@ -54,7 +54,7 @@ class SignalField:
     scale, offset : a and b
     special : raw numbers with a name in the DBC; these are no measurements
     size : bytes that a frame needs to hold it
-    states : raw numbers that a counter has, where the DBC states fewer than fit in
+    states : raw numbers that a counter has, where the DBC states them
 
     """
 
@@ -148,7 +148,7 @@ class SignalField:
 
 
 def _states(signal: Signal) -> int | None:
-    """How many numbers a signal has by its stated range; None if all that fit in.
+    """How many numbers a signal has by its stated range; None if none is stated.
 
     A counter of the E2E profile 1 has four bits and counts from 0 to 14.
     """
@@ -158,8 +158,7 @@ def _states(signal: Signal) -> int | None:
         return None  # also where they are no numbers
     if least != int(least) or most != int(most):
         return None
-    states = int(most - least) + 1
-    return states if states < 2**signal.length else None
+    return int(most - least) + 1
 
 
 def _first_bit(signal: Signal) -> int:

@@ -79,7 +79,8 @@ class CanAssembler:
         counter = self._channel("seq")
         self._sequence = SampleCounter()
         if counter:
-            self._sequence = SampleCounter(counter.field.span, counter.field.states)
+            states = counter.field.states
+            self._sequence = SampleCounter(counter.field.span, states, states is None)
         self._temperature = float("nan")
         count = len(self._needed)
         self._groups: FrameGrouper = SequenceGrouper(count, health, first, within)

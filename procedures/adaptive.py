@@ -67,9 +67,10 @@ def plan(
     held = yield from hold_each(about.positions, seconds, sigma)
     positions = list(about.positions)
     refused = {p.degrees for i, p in enumerate(positions) if i not in held}
-    content = False
+    so_far: InterimResult = yield Judge(quick=True)
+    # behind a lost link the plan begins anew, with all the positions asked for before
+    content = so_far.sufficient and len(positions) - 1 not in held
     while True:
-        so_far: InterimResult = yield Judge(quick=True)
         worth, places = _position_gains(so_far, about, positions, refused)
         allowed = max_positions(about, "adaptive") or MOST
         end = _reason_to_end(so_far, worth, len(positions), allowed, content)
@@ -91,6 +92,7 @@ def plan(
             yield from note(str(skipped))
             refused.add(one.degrees)
             content = so_far.sufficient
+        so_far = yield Judge(quick=True)
 
 
 def _run_table(about: Description) -> dict[str, Any]:

@@ -43,7 +43,10 @@ def run(args: argparse.Namespace) -> int:
     calibration = read_calibration(args.calibration or args.session)
     check_same_installed(calibration, session)
     nominal = Nominal(**{k: tuple(v) for k, v in session.about.nominal.items()})
+    known = len(session.warnings)
     block = calibration.apply(session.block, nominal)
+    for sentence in session.warnings[known:]:  # samples that were cut off or left out
+        sys.stderr.write(f"fieldcal apply: {sentence}\n")
     if kept := _nominal_parameters(calibration, block):
         sys.stderr.write(
             "fieldcal apply: not determined, the nominal value is taken:"

@@ -143,16 +143,29 @@ def comparison_table(found: Comparison) -> str:
     ):
         value, sigma = format_with_sigma(-float(d), float(s))
         sigma = sigma if s > 0 else "0"
+        # no ratio for what both know exactly: there is nothing to divide by
+        ratio = f"{-z:z.1f}" if s > 0 else "exact"
         mark = "  changed" if name in found.changed else ""
-        lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {-z:z12.1f}{mark}")
+        lines.append(f"{name:{width}}  {value:>14}  {sigma:>10}  {ratio:>12}{mark}")
     for which, names in (("first", found.only_first), ("second", found.only_second)):
         if names:
             lines.append(f"only in the {which}: {', '.join(names)}")
-    lines.append(
-        f"all together: χ² = {found.chi2:.1f} with {found.dof} degrees of freedom, "
+    lines.append(f"all together: {_together(found)}")
+    return "\n".join(lines) + "\n"
+
+
+def _together(found: Comparison) -> str:
+    """Whether anything has changed, by all parameters."""
+    if not np.isfinite(found.chi2):
+        exact = (found.sigma == 0) & (found.difference != 0)
+        names = [n for n, odd in zip(found.names, exact, strict=True) if odd]
+        return f"changed, since both have {', '.join(names)} exactly, and not the same"
+    if not found.dof:
+        return "the same; neither calibration has an uncertainty"
+    return (
+        f"χ² = {found.chi2:.1f} with {found.dof} degrees of freedom, "
         f"probability {found.chance:.2g} if nothing has changed"
     )
-    return "\n".join(lines) + "\n"
 
 
 def comparison_document(found: Comparison) -> dict[str, object]:

@@ -73,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
         installed_in(session),
         args.instance,
     )
-    for sentence in module.write(source, path):
+    known, said = len(session.warnings), list(module.write(source, path))
+    # what was cut off or left out of the samples, where the format holds them
+    for sentence in (*session.warnings[known:], *said):
         sys.stderr.write(f"fieldcal export: {sentence}\n")
     sys.stdout.write(f"{path}\n")
     return 0

@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
     from fieldcal.service.bounds import MIB, ServiceBounds
-    from fieldcal.service.jobs import JobStore
+    from fieldcal.service.jobs import JobStore, held_folder
     from fieldcal.service.queue import JobQueue
 
     few = ("upload_mib", "jobs", "kept", "minutes", "memory_mib")
@@ -95,7 +95,9 @@ def run(args: argparse.Namespace) -> int:
             pool = open_.enter_context(dask_pool(args.scheduler))
         else:
             pool = process_pool(1, ["fieldcal.service.work"])
-        jobs = JobStore((args.folder or _default_folder()).resolve(), bounds)
+        folder = (args.folder or _default_folder()).resolve()
+        open_.enter_context(held_folder(folder))
+        jobs = JobStore(folder, bounds)
         database = Database(args.history or default_location())
         queue = JobQueue(jobs, database, pool)
         service = Service.listen(host, port, jobs, queue, tokens, args.known_as)

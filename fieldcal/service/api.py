@@ -150,7 +150,10 @@ def create_app(jobs: JobStore, queue: JobQueue) -> Starlette:
 def _request_fault(name: str, said: dict[str, str]) -> str:
     """Fault in the file name and options of an upload; empty if there is none."""
     if not FILE_NAME.fullmatch(name):
-        return "filename is wanted: letters, digits, dots and dashes, no folder"
+        return (
+            "filename is wanted: letters, digits, dots and dashes, 100 at most, no"
+            " folder"
+        )
     for key, value in said.items():
         if key not in IMPORT_OPTIONS:
             known = ", ".join(IMPORT_OPTIONS)

@@ -11,15 +11,16 @@ import re
 import secrets
 import shutil
 import threading
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from fieldcal.core.errors import InputError
+from fieldcal.core.errors import InputError, SessionError
 from fieldcal.service.bounds import ServiceBounds
 from fieldcal.session.folder import write_atomically
+from fieldcal.session.lock import SessionLock
 
 JobState = Literal["waiting", "working", "done", "failed"]
 
@@ -64,6 +65,30 @@ class Job:
     good: bool | None = None
     verdict: str | None = None
     log: str = ""
+
+
+@contextmanager
+def held_folder(root: Path) -> Iterator[None]:
+    """Hold the folder of all jobs: a second service would delete what arrives here.
+
+    Raises
+    ------
+    InputError
+        If another service holds it.
+
+    """
+    root.mkdir(parents=True, exist_ok=True)
+    try:
+        lock = SessionLock(root)
+    except SessionError as error:
+        raise InputError(
+            f"{root}: another fieldcal serve keeps its sessions here: end that one"
+            " first, or name another --folder"
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 class JobStore:

@@ -10,6 +10,7 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Mapping
+from lzma import LZMAError
 from pathlib import Path, PurePosixPath
 
 from fieldcal.core.errors import InputError
@@ -19,6 +20,15 @@ from fieldcal.session import description
 from fieldcal.session.folder import DESCRIPTION
 
 BYTES_AT_ONCE = MIB
+
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    LZMAError,
+    EOFError,
+    NotImplementedError,
+)
+"""Errors of an archive whose files cannot be unpacked."""
 
 LONGEST_NAME = 100
 """Largest length of the name of a file in an archive, characters."""
@@ -132,9 +142,13 @@ def unpack(
                                 f"{escape_line(name)}: is larger than the archive says"
                             )
                         out.write(piece)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+    except DAMAGED as error:
         raise InputError(f"the archive is damaged: {error}; send it again") from error
     except OSError as error:
+        if error.errno is None:  # of bz2, and no fault of this computer
+            raise InputError(
+                f"the archive is damaged: {error}; send it again"
+            ) from error
         raise InputError(
             f"the archive cannot be unpacked: {error.strerror}; send it again later"
         ) from error

@@ -41,6 +41,9 @@ FLUSH_INTERVAL = 0.2
 SYNC_INTERVAL = 1.0
 """Longest time after which samples are on the disk, s; a power cut loses no more."""
 
+CLOSE_WITHIN_S = 5.0
+"""Time after which a Ctrl-C ends also the waiting for a disk to take the rest, s."""
+
 SAMPLES = "samples.arrows"
 
 
@@ -110,6 +113,8 @@ class Recorder:
         self._fault: OSError | None = None
         self._written = monotonic()
         self._stop, self._closed = Event(), False
+        self._ended = False
+        self._failed: Exception | None = None
         self._writer = ThreadPoolExecutor(1, "recorder writes")
         try:
             self._open(about)
@@ -263,19 +268,45 @@ class Recorder:
             raise self._refused(error) from error
 
     def close(self) -> None:
-        """Write the remaining samples and end the stream; safe to call twice."""
+        """Write the remaining samples and end the stream; safe to call twice.
+
+        A Ctrl-C meanwhile is raised once that is done, or if it takes too long.
+        """
         if self._closed:
             return
-        self._closed = True
+        pressed: BaseException | None = None
+        began = monotonic()
+        while not self._closed:
+            try:
+                self._finish()
+            except KeyboardInterrupt as ctrl_c:
+                pressed = ctrl_c
+                if monotonic() - began > CLOSE_WITHIN_S:
+                    raise
+        if raised := self._failed or pressed:
+            raise raised
+
+    def _finish(self) -> None:
+        """Close; once interrupted it can be done again, and goes on from there."""
         self._stop.set()
         self._watch.join()
-        try:
+        if not self._ended:
             self._in_writer(self._end)
-        finally:
-            self._writer.shutdown()
-            self._held.release()
+        self._writer.shutdown()
+        self._held.release()
+        self._closed = True
 
     def _end(self) -> None:
+        """Write the rest and close the files; in the writing thread, and once."""
+        if self._ended:
+            return
+        try:
+            self._write_end()
+        except Exception as error:
+            self._failed = error  # raised by whoever closes, also if interrupted
+        self._ended = True
+
+    def _write_end(self) -> None:
         told = self._fault is not None
         try:
             self._write_samples()

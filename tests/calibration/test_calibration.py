@@ -13,7 +13,7 @@ from observed import BIAS, COUPLING, SCALE, G, observe, outputs
 
 from fieldcal.calibration import Calibration, Nominal, compare
 from fieldcal.calibration.document import schema
-from fieldcal.commands.compare import comparison_document
+from fieldcal.commands.compare import comparison_document, comparison_table
 from fieldcal.core.errors import InputError
 from fieldcal.core.positions import FIVE_POSITIONS, SIX_FACES, WIDE_POSITIONS
 from fieldcal.core.samples import Array, Block
@@ -116,6 +116,12 @@ def test_what_both_know_exactly_is_the_same_or_has_changed() -> None:
     assert other.z[3] == -np.inf and other.changed == (NAMES[3],)
     assert other.chi2 == np.inf and other.chance == 0.0
     assert comparison_document(other)["chi2"] is None
+    said = comparison_table(other)
+    assert "inf" not in said and f"both have {NAMES[3]} exactly" in said
+    line = next(row for row in said.splitlines() if row.startswith(NAMES[3]))
+    assert line.split()[1:] == ["1e-09", "0", "exact", "changed"]
+    unknown = compare(made(0 * cov), made(0 * cov))
+    assert "all together: the same" in comparison_table(unknown)
     cov[3:5, 3:5] = 1e-8  # both off by the same amount
     alike = VALUES.copy()
     alike[3:5] += 2e-4

@@ -25,6 +25,7 @@ from fieldcal.drivers.can_frames import ERROR_FLAG, frame_row
 from fieldcal.drivers.can_map import read_map
 from fieldcal.drivers.can_samples import CanAssembler
 from fieldcal.drivers.options import Options
+from fieldcal.drivers.sample_counter import SampleCounter
 
 
 @pytest.fixture(scope="module")
@@ -233,9 +234,37 @@ def test_frames_of_noise_break_nothing_however_they_are_cut(
 
 
 @pytest.mark.parametrize(
+    ("states", "lost", "missing"),
+    [
+        (15, (), 0),
+        (16, (), 0),
+        (15, (14, 90), 0),  # nobody knows yet whether there is a 14
+        (15, (179, 240), 2),
+        (15, (165, 166), 2),
+        (16, (143, 144), 2),
+        (15, (7, 8), 2),
+    ],
+)
+@pytest.mark.parametrize("cut", [1, 7, 1000])
+def test_a_counter_of_unknown_range_tells_of_a_loss_where_it_is_certain(
+    states: int, lost: tuple[int, ...], missing: int, cut: int
+) -> None:
+    counter = SampleCounter(16, wraps_anywhere=True)
+    seq = np.array([float(i % states) for i in range(300) if i not in lost])
+    steps = [counter.steps(seq[at : at + cut]) for at in range(0, len(seq), cut)]
+    assert np.sum(np.concatenate(steps) - 1) == missing
+
+
+def test_a_counter_that_counts_by_twos_never_shows_its_last_number() -> None:
+    counter = SampleCounter(16, wraps_anywhere=True)
+    steps = counter.steps(np.arange(0.0, 100.0, 2.0) % 16)
+    assert (steps[1:] == 2).all()
+
+
+@pytest.mark.parametrize(
     ("stated", "least", "states", "missing"),
     [("0|14", 0, 15, 0), ("1|15", 1, 15, 0), ("0|15", 0, 16, 0), ("0|0", 0, 16, 0),
-     ("0|3", 0, 16, 0), ("0|0", 0, 15, 6), ("0|1e999", 0, 16, 0), ("0|14.5", 0, 16, 0)],
+     ("0|3", 0, 16, 0), ("0|0", 0, 15, 0), ("0|1e999", 0, 16, 0), ("0|14.5", 0, 16, 0)],
     ids=["E2E", "from 1", "all", "unstated", "wrongly stated", "unstated, and fewer",
          "endless", "no whole number"],
 )  # fmt: skip

@@ -29,6 +29,7 @@ from fieldcal.drivers.mavlink_installed import (
 from fieldcal.exporters import ExportSource, ardupilot, format_names, load_exporter, px4
 from fieldcal.session.folder import Session
 from fieldcal.session.recorder import Recorder
+from fieldcal.session.sample_files import find_samples
 from fieldcal.session.schemas import load_schema
 
 
@@ -395,6 +396,23 @@ def test_apply_says_of_which_axes_the_nominal_values_are_taken(
     source(tmp_path / "blind", few, blind)
     assert main(["apply", str(tmp_path / "blind"), str(out)]) == 0
     assert "nominal" not in capsys.readouterr().err
+
+
+def test_samples_that_were_cut_off_are_said_by_what_writes_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(9)
+    source(tmp_path / "s", calibration(rng, 0.0), samples(rng))
+    with Recorder(tmp_path / "s", None) as recorder:
+        recorder.append(samples(rng))
+    file = find_samples(tmp_path / "s")
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) * 3 // 4])
+    assert main(["apply", str(tmp_path / "s"), str(tmp_path / "out.csv")]) == 0
+    assert "was cut off" in capsys.readouterr().err
+    call = ["export", str(tmp_path / "s"), "-o", str(tmp_path / "out")]
+    assert main([*call, "--format", "mcap"]) == 0
+    assert "was cut off" in capsys.readouterr().err
 
 
 def test_a_sensor_that_was_not_recorded_is_said_as_it_is(tmp_path: Path) -> None:

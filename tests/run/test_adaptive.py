@@ -8,18 +8,19 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from fieldcal import procedures
 from fieldcal.calibration import Calibration, limits
 from fieldcal.commands.run_results import first_result
-from fieldcal.core.errors import Stopped
+from fieldcal.core.errors import Skipped, Stopped
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Block
 from fieldcal.evaluation.interim_result import InterimResult
 from fieldcal.history.store import History
 from fieldcal.model.posterior.probabilities import ProbableCause
-from fieldcal.planning.steps import Hold
+from fieldcal.planning.steps import Add, Hold, Judge, Note
 from fieldcal.procedures import adaptive
 from fieldcal.run import plan_file, session_run
 from fieldcal.run.judging import judge_session
@@ -211,6 +212,32 @@ def test_at_go_it_ends_if_a_further_position_is_left_out(
     assert bench.hand.told[-1].startswith("it is GO")
     assert found.info["decision"]["go"]
     assert full == [2, max(bench.numbers)]
+
+
+@pytest.mark.parametrize("go", [True, False])
+def test_what_was_left_out_at_go_ends_it_also_behind_a_lost_link(
+    monkeypatch: pytest.MonkeyPatch, go: bool
+) -> None:
+    """The plan begins anew then, and the third position is left out already."""
+    gains = SimpleNamespace(gain=np.array([1.0])), [Position.deg(45, 0)]
+    monkeypatch.setattr(adaptive, "_position_gains", lambda *_: gains)
+    monkeypatch.setattr(adaptive, "_certain_causes", lambda _: "")
+    monkeypatch.setattr(adaptive, "_reason_for_position", lambda *_: "one more")
+    monkeypatch.setattr(adaptive, "_final_calibration", lambda *_: "solved")
+    about = plan_file.task_from_tables({"run": ADAPTIVE, "position": THREE}, "").about
+    plan = adaptive.plan(about)
+    asked = [plan.send(reply) for reply in (None, 0, 1)]
+    assert [isinstance(step, Hold) and step.index for step in asked] == [0, 1, 2]
+    plan.throw(Skipped("left out by the operator"))
+    assert isinstance(plan.send(None), Judge)
+    step = plan.send(SimpleNamespace(sufficient=go, incremental=False))
+    assert isinstance(step, Note)
+    assert ("left out" in step.text) == go
+    if go:
+        with pytest.raises(StopIteration):
+            plan.send(None)
+    else:
+        assert isinstance(plan.send(None), Add)
 
 
 def test_it_takes_no_more_positions_than_it_may_and_those_of_its_ladder(

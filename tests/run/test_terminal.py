@@ -511,6 +511,19 @@ def test_a_key_that_arrives_in_parts_is_no_letter(hand: int, key: str) -> None:
     os.close(hand)
 
 
+def test_two_presses_of_s_leave_out_however_soon_they_follow(hand: int) -> None:
+    with Keyboard() as keyboard:
+        os.write(hand, b"ss")
+        assert [keyboard.pressed() for _ in range(3)] == ["skip", "skip", None]
+        os.write(hand, b"ssr")
+        assert keyboard.pressed() == "repeat" and keyboard.pressed() is None
+        os.write(hand, b"ss")
+        assert keyboard.pressed() == "skip"
+        keyboard.forget()  # the second one was not for the next position
+        assert keyboard.pressed() is None
+    os.close(hand)
+
+
 def test_a_terminal_that_is_gone_has_no_keys_and_ends_nothing(hand: int) -> None:
     with Keyboard() as keyboard:
         assert keyboard.has_keys

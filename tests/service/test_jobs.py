@@ -21,6 +21,7 @@ import pytest
 from processes import HANGS
 from session_folders import places, recorded, write_session
 
+from fieldcal.cli import main
 from fieldcal.core.errors import FieldcalError
 from fieldcal.core.samples import Block
 from fieldcal.fleet.workers import WorkerPool, process_pool, run_tasks
@@ -29,7 +30,7 @@ from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
 from fieldcal.service import limits, queue
 from fieldcal.service.bounds import MIB, ServiceBounds
-from fieldcal.service.jobs import Job, JobStore
+from fieldcal.service.jobs import Job, JobStore, held_folder
 from fieldcal.service.queue import JobQueue
 from fieldcal.service.work import JobTask, without_paths
 from fieldcal.session.sample_files import to_record_batch
@@ -100,6 +101,20 @@ def test_one_of_those_who_delete_a_job_at_once_has_deleted_it(tmp_path: Path) ->
     jobs = Moment(tmp_path, ServiceBounds())
     assert sorted(together(lambda _: jobs.remove(number))) == [False] * 3 + [True]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_service_on_the_same_folder_deletes_nothing_that_arrives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with held_folder(tmp_path):
+        part = uploaded(JobStore(tmp_path, ServiceBounds()))
+        store = str(tmp_path / "h.sqlite")
+        call = ["serve", "--listen", "192.0.2.1:1", "--folder", str(tmp_path)]
+        assert main([*call, "--history", store]) == 2
+        assert "another fieldcal serve" in capsys.readouterr().err
+        assert part.is_dir()
+    with held_folder(tmp_path):
+        pass
 
 
 def test_an_upload_is_taken_in_although_an_old_job_cannot_be_deleted(

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(
 
 SEND = """(async () => {
   const list = new DataTransfer();
-  list.items.add(new File(["%s"], "../<b>unit</b> 7.csv"));
+  list.items.add(new File(["%s"], "../<b>unit</b>" + " 7".repeat(60) + " unit.csv"));
   document.getElementById("file").files = list.files;
   document.getElementById("send").requestSubmit();
 })()"""
@@ -56,3 +56,17 @@ def test_what_is_sent_from_the_page_is_done_and_shown(address: str) -> None:
         shown = screen.text("rows")
         assert "GO" in shown and "report.html" in shown and "unit" in shown
         assert screen.value("document.querySelectorAll('#rows b').length") == 0
+
+
+def test_that_the_service_was_not_reached_is_said_until_it_is_again(
+    address: str,
+) -> None:
+    said = "document.getElementById('said').textContent"
+    with Screen() as screen:
+        screen.go(address)
+        screen.until("document.getElementById('go')?.disabled === false")
+        screen.value("window.kept = fetch; window.fetch = () => Promise.reject('x'); 1")
+        screen.value("look(); 1")
+        screen.until(f"{said}.includes('not reached')")
+        screen.value("window.fetch = window.kept; look(); 1")
+        screen.until(f"{said} === ''")

@@ -134,3 +134,18 @@ def test_two_sessions_a_broken_one_and_files_of_the_service_are_refused(
     own = b'format = 1\n[run]\nlimits = "/etc/passwd"\n'
     with pytest.raises(InputError, match="limits"):
         taken(packed(tmp_path / "o", {"session.toml": own}), tmp_path / "own")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_archive_damaged_on_its_way_says_so_however_it_is_packed(
+    tmp_path: Path, method: int
+) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("session.toml", "format = 1\n" * 99)
+        begins = archive.infolist()[0].header_offset + 30 + len("session.toml")
+    data = bytearray(path.read_bytes())
+    data[begins + 12 : begins + 30] = bytes(18)
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="the archive is damaged: .+; send it again"):
+        taken(path, tmp_path / "s")

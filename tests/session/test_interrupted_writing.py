@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import sys
 from pathlib import Path
@@ -9,11 +10,13 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
+import pytest
 from recorded import block
 
 from fieldcal.session import arrow_encoder, recorder
 from fieldcal.session.folder import Session
 from fieldcal.session.integrity import file_faults
+from fieldcal.session.lock import SessionLock
 from fieldcal.session.recorder import Recorder
 
 WATCHED = {recorder.__file__, arrow_encoder.__file__}
@@ -74,3 +77,44 @@ def test_whatever_ctrl_c_interrupts_each_sample_is_there_once(tmp_path: Path) ->
         if not struck:
             break
     assert line > 3
+
+
+def closed(folder: Path, line: int) -> bool:
+    """Record a batch and close, interrupted at a line; whether it was."""
+    ctrl_c = CtrlC(line)
+    made = Recorder(folder, {"format": 1})
+    made.append(block(0))
+    with contextlib.suppress(KeyboardInterrupt), ctrl_c:
+        made.close()
+    made.close()  # as whoever opened it does, if the first close had not begun yet
+    return ctrl_c.struck
+
+
+def test_ctrl_c_at_any_line_of_the_closing_loses_nothing(tmp_path: Path) -> None:
+    for line in itertools.count():
+        folder = tmp_path / str(line)
+        struck = closed(folder, line)
+        assert not list(file_faults(folder))
+        np.testing.assert_array_equal(Session.open(folder).block.seq, range(50))
+        SessionLock(folder).release()
+        if not struck:
+            break
+    assert line > 8
+
+
+def test_ctrl_c_while_closing_waits_is_raised_once_all_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Recorder(tmp_path / "s", {"format": 1})
+    made.append(block(0))
+    join, pressed = made._watch.join, [KeyboardInterrupt(), KeyboardInterrupt()]
+
+    def interrupted_join() -> None:
+        if pressed:
+            raise pressed.pop()
+        join()
+
+    monkeypatch.setattr(made._watch, "join", interrupted_join)
+    with pytest.raises(KeyboardInterrupt):
+        made.close()
+    np.testing.assert_array_equal(Session.open(tmp_path / "s").block.seq, range(50))

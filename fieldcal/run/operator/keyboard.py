@@ -54,7 +54,7 @@ class Keyboard:
         terminal = sys.stdin  # None where there is no console at all
         usable = terminal is not None and not terminal.closed and terminal.isatty()
         self._keys: Keys | None = None
-        self._stop, self._unfinished = False, ""
+        self._stop, self._skip, self._unfinished = False, False, ""
         if usable:
             windows = importlib.util.find_spec("termios") is None
             self._keys = WindowsKeys() if windows else PosixKeys(terminal.fileno())
@@ -74,8 +74,13 @@ class Keyboard:
             self._keys.close()
 
     def pressed(self) -> Wish | None:
-        """Wish of the keys since the last call: "stop" if any, else the last."""
-        stop, self._stop = self._stop, False
+        """Wish of the keys since the last call: "stop" if any, else the last.
+
+        Of two presses of s the second is the wish of the next call: it answers the
+        question that the first one asks, however soon it follows.
+        """
+        stop, skip = self._stop, self._skip
+        self._stop = self._skip = False
         text = self._keys.read() if self._keys else ""
         if text is None:
             self._keys = None  # the terminal is gone
@@ -83,7 +88,9 @@ class Keyboard:
         wishes = [KEYS[key] for key in letters if key in KEYS]
         if stop or "stop" in wishes:
             return "stop"
-        return wishes[-1] if wishes else None
+        self._skip = wishes[-2:] == ["skip", "skip"]
+        kept: Wish | None = "skip" if skip else None
+        return wishes[-1] if wishes else kept
 
     def _with_unfinished(self, text: str) -> str:
         """Keys behind the beginning of a sequence, without one at their own end.
@@ -99,7 +106,7 @@ class Keyboard:
 
     def forget(self) -> None:
         """Discard keys pressed so far, meant for an earlier step; a stop is for all."""
-        self._stop = self.pressed() == "stop"
+        self._stop, self._skip = self.pressed() == "stop", False
 
 
 class Keys(Protocol):

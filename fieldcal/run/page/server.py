@@ -131,7 +131,7 @@ def listening_socket(host: str, port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         raise InputError(
             f"the page cannot be served at {host}:{port}: {error}; give an address of"
-            " this computer and a free port, as in --page 192.168.1.5:8080"
+            " this computer and a free port, as in 192.168.1.5:8080"
         ) from error
 
 

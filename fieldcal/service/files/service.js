@@ -3,6 +3,8 @@
 // What is served is shown as text and never as markup.
 
 const EVERY_MS = 2000;
+const LONGEST_NAME = 100;
+let unreached = false;
 const say = (text) => { document.getElementById("said").textContent = text; };
 
 function cell(row, text) {
@@ -43,7 +45,10 @@ async function look() {
     const answer = await fetch("api/sessions");
     if (!answer.ok) throw new Error(await answer.text());
     show(await answer.json());
+    if (unreached) say("");
+    unreached = false;
   } catch (error) {
+    unreached = true;
     say(`not reached: ${error.message}`);
   }
 }
@@ -51,7 +56,8 @@ async function look() {
 document.getElementById("send").addEventListener("submit", async (event) => {
   event.preventDefault();
   const [file] = document.getElementById("file").files;
-  const name = file.name.replace(/[^A-Za-z0-9_.-]/g, "_").replace(/^[^A-Za-z0-9]+/, "");
+  const plain = file.name.replace(/[^A-Za-z0-9_.-]/g, "_");
+  const name = plain.slice(-LONGEST_NAME).replace(/^[^A-Za-z0-9]+/, "");  // with its ending
   say("sending …");
   try {
     const answer = await fetch(`api/sessions?filename=${encodeURIComponent(name || "recording")}`, {

@@ -4,11 +4,14 @@ phyphox and the Sensor Logger of Android and iOS write ``Accelerometer.csv``,
 ``Gyroscope.csv`` and others, with one clock for all. The name of the file says the
 sensor, its columns the axes; each sample of the accelerometer goes with the nearest of
 the gyroscope. ``TotalAcceleration`` goes before ``Accelerometer``, from which some
-programs take gravity out: ``Gravity``, if it is there, is added to it then.
+programs take gravity out: ``Gravity``, if it is there, is added to it then. Where
+``Metadata.csv`` says that iOS wrote it and nothing was standardised, the sign of the
+accelerations is turned, which count gravity downwards there.
 """
 
 from __future__ import annotations
 
+import csv
 import zipfile
 from collections.abc import Iterable, Iterator
 from copy import copy
@@ -34,6 +37,28 @@ SENSOR = {"a": "acc", "v": "acc", "g": "gyr"}
 
 FIRST_ROWS = 1 << 14
 """Rows at the beginning of a file that tell whether gravity is in it."""
+
+
+ABOUT = "metadata.csv"
+"""File of an archive that says the platform."""
+
+DOWNWARDS = (
+    "Metadata.csv says that iOS wrote it, not standardised, which counts gravity"
+    " downwards: the sign of the accelerations is turned"
+)
+
+
+def _counts_downwards(path: Path) -> bool:
+    """Whether an archive says that its accelerations are as iOS gives them."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            about = [n for n in archive.namelist() if Path(n).name.lower() == ABOUT]
+            text = archive.read(about[0]).decode("utf-8", "replace") if about else ""
+    except (zipfile.BadZipFile, OSError, RuntimeError, ValueError):
+        return False  # whoever reads the sensors says so
+    said = next(csv.DictReader(text.splitlines()), {})
+    platform, standard = (str(said.get(k)) for k in ("platform", "standardisation"))
+    return platform.lower() == "ios" and standard.lower() != "true"
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -111,14 +136,22 @@ class PhoneArchive(Recording):
         """The texts of each sensor, as they are in it."""
         if self._texts is None:
             texts = {}
+            wanted = self._with_sign()
             for kind, member in self._members().items():
-                text = TextColumns(self.path, self.wanted, self.repair)
+                text = TextColumns(self.path, wanted, self.repair)
                 text.member, text.sensor, text.from_first = member, SENSOR[kind], False
                 texts[kind] = text
             self._texts = texts
             self._without_needless_gravity(texts)
             self.wanted = self._said(texts.values())
         return self._texts
+
+    def _with_sign(self) -> ReadOptions:
+        """Options with the sign of accelerations that iOS counts the other way."""
+        if self.wanted.columns or not _counts_downwards(self.path):
+            return self.wanted
+        self.says.append(DOWNWARDS)
+        return replace(self.wanted, reversed=frozenset(("ax", "ay", "az")))
 
     def _without_needless_gravity(self, texts: dict[str, TextColumns]) -> None:
         """Leave gravity out where the accelerometer has it."""

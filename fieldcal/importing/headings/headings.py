@@ -23,6 +23,7 @@ from fieldcal.importing.words.heading_words import (
     heading_meaning,
     words_in_name,
 )
+from fieldcal.importing.words.telephone_names import sign_of_ios
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
                "magnitude", "norm", "drift", "delta",
@@ -292,6 +293,12 @@ def _match(
         found.append(f"{channel}={column.place}" if column.place else channel)
         if UNITS[said.kind]:
             units["t" if said.kind == "dt" else said.kind] = said.unit
+    forces = [n for n in chosen if n.says.kind in ("a", "l")]
+    apple = [columns[n.number].name for n in forces]
+    turned, told = sign_of_ios(apple, units.get("a"))
+    reversed_ = frozenset(n.says.kind + n.says.axis for n in forces if turned)
+    says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
     ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
-    return HeadingMatch(tuple(found), units, name, says, "rad/s" if ros else "")
+    usual = "rad/s" if ros else ""
+    return HeadingMatch(tuple(found), units, name, says, usual, reversed_)

@@ -14,7 +14,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings import headings
-from fieldcal.importing.headings.heading import Heading, HeadingMatch
+from fieldcal.importing.headings.heading import Heading, HeadingMatch, with_signs
 from fieldcal.importing.recording import (
     ImuStream,
     MeanScatter,
@@ -171,8 +171,10 @@ class ColumnRecording(Recording):
             for name, place in pairs
             if name != columns.SKIP or not place
         )
-        self.guessed["columns"] = f"{','.join(chosen)}: {told.why}"
         wanted = named[0].taken(self.wanted) if named else self.wanted
+        said = ",".join(with_signs(chosen, wanted.reversed))
+        self.guessed["columns"] = f"{said}: {told.why}"
+        self.says += [s for one in named[:1] for s in one.says if s not in self.says]
         return replace(wanted, columns=chosen)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:

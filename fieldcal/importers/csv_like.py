@@ -138,6 +138,27 @@ class TextColumns(ColumnRecording):
         (one,) = found.values()
         return dict.fromkeys(self._in_turn.names, one)
 
+    def _found(self) -> dict[str, ReadOptions]:
+        """Options of each IMU; times that were read of a clock are s, whoever asks."""
+        found = super()._found()
+        for name, one in found.items():
+            if self._is_by_clock(one):
+                unit = one.time_unit or "s"
+                found[name] = replace(one, time_unit=unit, named=one.named - {"t"})
+        return found
+
+    def _is_by_clock(self, wanted: ReadOptions) -> bool:
+        """Whether the times are those that were read of a clock."""
+        clocks = {form.clock for form in self._forms} - {None}
+        return bool({i for i, c in enumerate(wanted.columns) if c == "t"} & clocks)
+
+    @property
+    def first_days(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Days that the clock of its rows may count from."""
+        (one, *_) = self.imus().values()
+        days = (form.days for form in self._forms if form.days)
+        return next(days, ()) if self._is_by_clock(one) else ()
+
     def alone(self, stream: str) -> Recording:
         """The recording with one of its IMUs."""
         one = super().alone(stream)
@@ -242,9 +263,10 @@ class TextColumns(ColumnRecording):
             if not n:
                 continue
             if t0 is None:
-                t0 = self.began = float(block.t[0])
+                t0 = float(block.t[0])
+                self.began = t0 + self.later
             with np.errstate(invalid="ignore"):  # a time beyond all is no time
-                since = block.t - t0 if self.from_first else block.t
+                since = block.t - t0 if self.from_first else block.t + self.later
             yield replace(block, t=since)
         self.says += [s for s in samples.says if s not in self.says]
         if table is not None and table.headings:

@@ -18,6 +18,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.merge import (
     SeveralFiles,
+    count_from_one_day,
     stream_name,
     with_clock_times,
 )
@@ -51,6 +52,7 @@ def join_files(files: Sequence[Recording]) -> Recording:
         If there are several thermometers or IMUs in them.
 
     """
+    count_from_one_day(files)
     if any(part_of_force(_stem(one)) == "gravity" for one in files):
         files = _with_force(files)
     heads = [_head(one, PEEKED) for one in files]

@@ -155,9 +155,10 @@ class TextColumns(ColumnRecording):
     @property
     def first_days(self) -> tuple[int, ...]:  # type: ignore[override]
         """Days that the clock of its rows may count from."""
-        (one, *_) = self.imus().values()
-        days = (form.days for form in self._forms if form.days)
-        return next(days, ()) if self._is_by_clock(one) else ()
+        days = next((form.days for form in self._forms if form.days), ())
+        return (
+            days if days and all(map(self._is_by_clock, self.imus().values())) else ()
+        )
 
     def alone(self, stream: str) -> Recording:
         """The recording with one of its IMUs."""

@@ -29,6 +29,7 @@ from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.gravity_sum import GravitySum, lacks_gravity
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.file_names import ACC, GRAVITY, GYR, LINEAR, TOTAL
+from fieldcal.importing.words.telephone_names import UNTOLD
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
 
@@ -48,17 +49,17 @@ DOWNWARDS = (
 )
 
 
-def _counts_downwards(path: Path) -> bool:
-    """Whether an archive says that its accelerations are as iOS gives them."""
+def _platform(path: Path) -> tuple[str, bool]:
+    """Platform that wrote an archive, and whether what it wrote was standardised."""
     try:
         with zipfile.ZipFile(path) as archive:
             about = [n for n in archive.namelist() if Path(n).name.lower() == ABOUT]
             text = archive.read(about[0]).decode("utf-8", "replace") if about else ""
     except (zipfile.BadZipFile, OSError, RuntimeError, ValueError):
-        return False  # whoever reads the sensors says so
+        return "", False  # whoever reads the sensors says so
     said = next(csv.DictReader(text.splitlines()), {})
     platform, standard = (str(said.get(k)) for k in ("platform", "standardisation"))
-    return platform.lower() == "ios" and standard.lower() != "true"
+    return platform.lower(), standard.lower() == "true"
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -72,6 +73,7 @@ class PhoneArchive(Recording):
 
     asks_units = True
     _texts: dict[str, TextColumns] | None = None
+    _sign_is_known = False
 
     def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
@@ -148,7 +150,9 @@ class PhoneArchive(Recording):
 
     def _with_sign(self) -> ReadOptions:
         """Options with the sign of accelerations that iOS counts the other way."""
-        if self.wanted.columns or not _counts_downwards(self.path):
+        platform, standard = _platform(self.path)
+        self._sign_is_known = platform in ("ios", "android")
+        if self.wanted.columns or platform != "ios" or standard:
             return self.wanted
         self.says.append(DOWNWARDS)
         return replace(self.wanted, reversed=frozenset(("ax", "ay", "az")))
@@ -169,7 +173,8 @@ class PhoneArchive(Recording):
         said = self.wanted
         for text in texts:
             one = next(iter(text.imus().values()))
-            self.says += [s for s in text.says if s not in self.says]
+            without = [UNTOLD] if self._sign_is_known else []
+            self.says += [s for s in text.says if s not in (*self.says, *without)]
             said = replace(
                 said,
                 columns=tuple(dict.fromkeys((*said.columns, *one.columns))),

@@ -43,6 +43,20 @@ def test_sensors_whose_files_begin_before_and_behind_midnight(
     np.testing.assert_allclose(block.gyr[some], ROWS[some, 4:], atol=1e-8)
 
 
+def test_gravity_whose_file_begins_on_another_day_is_added(tmp_path: Path) -> None:
+    form = "%Y-%m-%d %H:%M:%S.%f"
+    free = np.column_stack([ROWS[:, 0], 0.001 * np.sin(ROWS[:, 1:4])])
+    down = np.column_stack([ROWS[:, 0] + 0.012, ROWS[:, 1:4]])
+    names = ("Linear Acceleration.csv", "Gravity.csv")
+    paths = [
+        written(tmp_path / name, rows, "x,y,z", form)
+        for name, rows in zip(names, (free, down), strict=True)
+    ]
+    block, _ = read_files(paths)
+    assert len(block) > len(ROWS) - 3
+    np.testing.assert_allclose(block.acc, ROWS[: len(block), 1:4], atol=0.002)
+
+
 def test_files_one_after_another_keep_the_time_between_them(tmp_path: Path) -> None:
     form, half = "%Y-%m-%d %H:%M:%S.%f", len(ROWS) // 2
     later = ROWS + 3600.0 * (np.arange(7) == 0)

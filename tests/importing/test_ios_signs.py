@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,9 @@ PARTED = (
     f"t (s),{axes('gravity.{}', 'xyz')},{axes('userAcceleration.{}', 'xyz')},"
     f"{axes('rotationRate.{}', 'xyz')}"
 )
+
+
+LOGGER = "time,seconds_elapsed,z,y,x"
 
 
 @pytest.mark.parametrize(
@@ -91,3 +95,27 @@ def test_an_archive_says_who_wrote_it(
     block, said = read_files([path])
     np.testing.assert_allclose(block.acc, A, atol=1e-6)
     assert (sign < 0) == any("iOS" in s for s in said)
+
+
+def test_a_log_of_all_its_sensors_with_a_zone(tmp_path: Path) -> None:
+    names = f"loggingTime(txt),{ACCELEROMETER},{MOTIONS}"
+    began = datetime(2024, 5, 3, 14, 20, 31, 250000)
+    found = [names]
+    whole = np.hstack([T + 1000, IOS, W, MOTION + [1000, *[0] * 9]])
+    for t, row in zip(T[:, 0], whole.tolist(), strict=True):
+        now = f"{began + timedelta(seconds=t):%Y-%m-%d %H:%M:%S.%f} +0200"
+        found.append(",".join([now, *(f"{x:.9f}" for x in row)]))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(found) + "\n")
+    block, _ = read_files([path])
+    np.testing.assert_allclose(block.t, T[:, 0], atol=1e-6)
+    np.testing.assert_allclose(block.acc, A, atol=1e-6)
+
+
+def test_a_file_of_sensor_logger_alone_does_not_tell(tmp_path: Path) -> None:
+    paths = [
+        write(tmp_path, np.hstack([T, T, three[:, ::-1]]), name, LOGGER)
+        for name, three in (("TotalAcceleration.csv", A), ("Gyroscope.csv", W))
+    ]
+    _, said = read_files(paths)
+    assert sum("the other sign on iOS" in s for s in said) == 1

@@ -305,7 +305,7 @@ def _match(
             units["t" if said.kind == "dt" else said.kind] = said.unit
     forces = [n for n in chosen if n.says.kind in ("a", "l")]
     apple = [columns[n.number].name for n in forces]
-    turned, told = sign_of_ios(apple, units.get("a"))
+    turned, told = sign_of_ios(apple, [c.name for c in columns], units.get("a"))
     reversed_ = frozenset(n.says.kind + n.says.axis for n in forces if turned)
     says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]

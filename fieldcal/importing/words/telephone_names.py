@@ -8,7 +8,7 @@ the same, with the same sign.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Sequence
 
 _APPLE = re.compile(
     r"accelerometer_?acceleration|motion_?gravity|user_?acceleration(?=\W|_|[xyz]\b)",
@@ -30,20 +30,32 @@ UNSURE = (
 )
 
 
-def sign_of_ios(names: Iterable[str], unit: str | None) -> tuple[bool, str]:
+UNTOLD = (
+    "Sensor Logger wrote it, whose accelerations have the other sign on iOS unless they"
+    " were standardised: if the axis that is up reads less than zero at rest, name them"
+    " -ax -ay -az in --columns; turns do not tell"
+)
+ELAPSED = "seconds_elapsed"
+"""A column of Sensor Logger, which writes the same names on Android and iOS."""
+
+
+def sign_of_ios(
+    names: Sequence[str], beside: Container[str], unit: str | None
+) -> tuple[bool, str]:
     """Whether accelerations count gravity downwards, and what to say of it.
 
     Parameters
     ----------
     names : of their columns
+    beside : of all columns of the file
     unit : that these say, or None
 
-    >>> sign_of_ios(["accelerometerAccelerationX(G)"], "g")[0]
+    >>> sign_of_ios(["accelerometerAccelerationX(G)"], [], "g")[0]
     True
-    >>> sign_of_ios(["acceleration_x"], "g")
+    >>> sign_of_ios(["acceleration_x"], [], "g")
     (False, '')
     """
     if not any(_APPLE.search(name) for name in names):
-        return False, ""
+        return False, UNTOLD if names and ELAPSED in beside else ""
     turned = unit in IN_G
     return turned, TURNED if turned else UNSURE

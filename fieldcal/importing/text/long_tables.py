@@ -35,8 +35,10 @@ class LongTable(TextForm):
 
     gathers = True
 
-    def __init__(self, names: Sequence[str], parted: str | None, head: str) -> None:
-        self.names, self._parted, self._head = (TIME, *names), parted, head
+    def __init__(
+        self, names: Sequence[str], parted: str | None, head: Sequence[str]
+    ) -> None:
+        self.names, self._parted, self._head = (TIME, *names), parted, [*head]
         self._separator = parted or "\t"
 
     @classmethod
@@ -44,8 +46,9 @@ class LongTable(TextForm):
         """The form, if all lines but one have it, and each time has as many names."""
         parted = separator or (find_separator(lines[-1]) if lines else None)
         rows = [split_cells(line, parted) for line in lines]
-        head, rows = (rows[0][0], rows[1:]) if rows and not _is_value(rows[0]) else (
-            TIME, rows)  # fmt: skip
+        head: list[str] = []
+        if rows and not _is_value(rows[0]):
+            head, rows = rows[0][:1], rows[1:]
         if not rows or not all(map(_is_value, rows)):
             return None
         groups = [[name for _, name, _ in some]
@@ -68,7 +71,7 @@ class LongTable(TextForm):
                 cells = split_cells(line, self._parted)
                 if not _is_value(cells):
                     # no value: whoever reads rows says so
-                    found += [line] if cells[:1] != [self._head] else []
+                    found += [line] if not cells or cells[:1] != self._head else []
                     continue
                 time, name, value = cells
                 if row and (row[TIME] != time or name in row):

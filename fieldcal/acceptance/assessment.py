@@ -29,6 +29,7 @@ from fieldcal.acceptance.verification import Verification, planned_verification,
 from fieldcal.calibration import Calibration
 from fieldcal.calibration.limits import GradeLimits
 from fieldcal.core.errors import FieldcalError
+from fieldcal.core.sampling import shows_losses
 from fieldcal.core.sentences import join_words
 from fieldcal.evaluation.observations import UsableWindows, angle_setting
 from fieldcal.history.store import History, HistoryRun, earlier_runs, family_runs
@@ -224,21 +225,24 @@ def _link(
 ) -> dict[str, int]:
     """Samples and missing samples in the windows; frames of the whole run, and refused.
 
-    Gaps between the used pieces of a window do not count as missing.
+    Gaps between the used pieces of a window do not count as missing. Nothing is said of
+    missing samples if the times show none.
     """
     samples = missing = 0
-    block, gaps = session.block, session.about.excluded_spans
+    block, gaps, shown = session.block, session.about.excluded_spans, True
     period = float(np.median(np.diff(block.t))) if len(block) > 1 else np.nan
     for window in windows:
         t = block.between(window.start, np.nextafter(window.end, np.inf)).t
         samples += len(t)
+        shown &= shows_losses(t)
         if len(t) > 1 and period > 0:
             lost = np.maximum(np.rint(np.diff(t) / period) - 1, 0)
             for start, end in gaps:
                 lost[(t[:-1] >= np.nextafter(start, -np.inf)) & (t[1:] <= end)] = 0
             missing += int(lost.sum())
     bad = sum(int(m.get("bad", 0)) for m in marks if m.get("event") == "link")
-    return {"samples": samples, "missing": missing, "bad": bad, "taken": len(block)}
+    counts = {"samples": samples, "bad": bad, "taken": len(block)}
+    return counts | ({"missing": missing} if shown else {})
 
 
 def _insisted_positions(marks: Sequence[Mapping[str, Any]]) -> list[str]:

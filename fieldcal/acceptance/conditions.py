@@ -43,12 +43,15 @@ def check_link(link: Mapping[str, int] | None, limits: GradeLimits) -> list[Chec
     """Check the shares of lost samples and of refused frames."""
     if not link or not link.get("samples"):
         return [Check("link", None, "losses of the link were not recorded")]
-    samples, missing, bad = (link.get(k, 0) for k in ("samples", "missing", "bad"))
-    checks = []
+    taken, checks = link.get("taken", link["samples"]), []
     for name, count, good, limit in (
-        ("samples missing", missing, samples, limits.lost_share),
-        ("frames refused", bad, link.get("taken", samples), limits.bad_share),
+        ("samples missing", link.get("missing"), link["samples"], limits.lost_share),
+        ("frames refused", link.get("bad", 0), taken, limits.bad_share),
     ):
+        if count is None:
+            says = f"the times are too uneven to show {name}"
+            checks.append(Check(f"link: {name}", None, says))
+            continue
         share = count / (good + count)
         ok = share <= limit
         says = (

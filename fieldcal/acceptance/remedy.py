@@ -14,7 +14,7 @@ position once more.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -219,10 +219,12 @@ def _further_positions(
     held, known = list(had), _KnownErrors.of(calibration, sigma)
     before = _expected_sigma(names, held, about, known)
     allowed = [limits.sigma(group_of(name)) or np.inf for name in names]
+    candidates = [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
+    if not candidates:  # all have a third angle: it is no ladder
+        return None
     chosen: list[Position] = []
     for _ in range(MAX_POSITIONS):
         ratios = []
-        candidates = [Position.deg(a, b) for a, b in ladder_settings(about.positions)]
         for one in candidates:
             then = _expected_sigma(names, [*held, *chosen, one], about, known)
             ratios.append(_largest_limit_ratio(names, over, before, then, allowed))
@@ -316,7 +318,7 @@ def _force_slopes(
 ) -> Array:
     """Derivative of the forces in device axes by an angle, (n, 3) m/s^2/rad."""
     off = [
-        Position(p.name, (p.alpha or 0.0) + alpha, (p.beta or 0.0) + beta)
+        replace(p, alpha=(p.alpha or 0.0) + alpha, beta=(p.beta or 0.0) + beta)
         for p in positions
     ]
     change = specific_forces(off, about.gravity) - specific_forces(

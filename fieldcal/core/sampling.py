@@ -15,6 +15,12 @@ BURST_SPAN = 50
 PAUSE_PERIODS = 3.5
 """Time without a sample that counts as a pause, in sampling periods."""
 
+REGULAR = 0.2
+"""Spread of the steps, in steps, up to which times can show a loss."""
+
+BURST_RATIO = 2.0
+"""Samples whose mean step is so many times their usual one come in bursts."""
+
 
 def sampling_rate(block: Block) -> float:
     """Sampling rate, Hz, from the times of the samples."""
@@ -43,3 +49,23 @@ def has_no_pause(t: Array, first: int, last: int, rate: float) -> bool:
     """
     steps = np.diff(t[max(first - 1, 0) : last + 1])
     return not (steps > PAUSE_PERIODS / rate).any()
+
+
+def shows_losses(t: Array) -> bool:
+    """Whether a missing sample shows as a gap in the times (n,).
+
+    It does not where steps are uneven, or where times come in bursts, as when a host
+    stamps what its buffer held.
+
+    >>> t = np.arange(200) * 0.01
+    >>> shows_losses(t), shows_losses(np.floor(t / 0.1) * 0.1 + 1e-4 * (t % 0.1))
+    (True, False)
+    """
+    step = np.diff(t)
+    if not len(step):
+        return True
+    usual = float(np.median(step))
+    if np.median(np.abs(step - usual)) > REGULAR * usual:
+        return False
+    over = t[BURST_SPAN::BURST_SPAN] - t[:-BURST_SPAN:BURST_SPAN]
+    return not (len(over) and np.median(over) > BURST_RATIO * BURST_SPAN * usual)

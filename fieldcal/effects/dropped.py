@@ -17,20 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array
+from fieldcal.core.sampling import shows_losses
 from fieldcal.physics.effect import Chain, Param
 from fieldcal.physics.recording import CheckedSamples, Fault
 
 PAUSE_S = 5.0
 """A gap outside windows that is longer is a pause of the recording, not a loss."""
 
-REGULAR = 0.2
-"""Spread of the steps, in steps, up to which times can show a loss."""
-
 WHOLE = 0.15
 """Mean distance of gaps from whole steps, in steps, up to which samples are missing."""
-
-BURST_SAMPLES, BURST_RATIO = 50, 2.0
-"""Samples that take so many times their steps' length come in bursts."""
 
 MIN_DROPPED = 2
 
@@ -38,16 +33,11 @@ MIN_DROPPED = 2
 def count_missing_samples(t: Array) -> NDArray[np.int_]:
     """Samples missing after each sample but the last, (n - 1,)."""
     step = np.diff(t)
-    usual = np.median(step)
-    spread = np.median(np.abs(step - usual))
-    lost: NDArray[np.int_]
-    if spread > REGULAR * usual:
-        lost = np.zeros(len(step), dtype=int)
+    lost: NDArray[np.int_] = np.zeros(len(step), dtype=int)
+    if not shows_losses(t):
         return lost
+    usual = np.median(step)
     lost = np.maximum(np.round(step / usual).astype(int) - 1, 0)
-    over = t[BURST_SAMPLES::BURST_SAMPLES] - t[:-BURST_SAMPLES:BURST_SAMPLES]
-    if len(over) and np.median(over) > BURST_RATIO * BURST_SAMPLES * usual:
-        lost[:] = 0
     gaps = step[lost > 0] / usual
     if len(gaps) and np.mean(np.abs(gaps - np.round(gaps))) > WHOLE:
         lost[:] = 0

@@ -6,7 +6,7 @@ respond in any window. Both are reported.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from fieldcal.calibration import Calibration, Nominal, limits
 from fieldcal.calibration.gauge import SI
 from fieldcal.core.errors import FieldcalError, SessionError
-from fieldcal.core.samples import ACC, GYR, Block, Grain
+from fieldcal.core.samples import ACC, CHANNELS, GYR, Block, Grain
+from fieldcal.core.sentences import join_words
 from fieldcal.core.version import __version__
 from fieldcal.evaluation.window_mean import (
     average_turntable_window,
@@ -201,7 +202,28 @@ def _average_windows(
         taken[i] = found
         if remark:
             said.append(f"{_position_label(session, i)}: {remark}")
+    for i, missing in _incomplete(taken, about).items():
+        del taken[i]
+        said.append(
+            f"{_position_label(session, i)} is left out: its window has no"
+            f" {join_words(missing)}, which others have; take it again"
+        )
     return taken
+
+
+def _incomplete(
+    taken: Mapping[int, Average], about: Description
+) -> dict[int, list[str]]:
+    """Channels that windows lack and others have, by position number.
+
+    Accelerometers are not used while a rate table turns.
+    """
+    turning = {i for i in taken if about.positions[i].on_turning_table}
+    wanted = np.array([[*[i not in turning] * 3, *[True] * 3] for i in taken], bool)
+    known = np.array([np.isfinite(a.mean) for a in taken.values()], bool)
+    lacking = wanted & ~known & (known & wanted).any(axis=0)
+    named = [[CHANNELS[c] for c in np.flatnonzero(row)] for row in lacking]
+    return {i: names for i, names in zip(taken, named, strict=True) if names}
 
 
 def _windows_of_means(session: Session) -> UsableWindows:

@@ -271,7 +271,7 @@ def _with_warnings(
     calibration = with_provenance(
         replace(calibration, warnings=warnings), prepared.session.about
     )
-    return _in_session_order(calibration, prepared.order)
+    return _with_numbers_of_session(calibration, prepared)
 
 
 def _shown_grade(calibration: Calibration, about: Description) -> GradeShown:
@@ -313,12 +313,26 @@ def _require_turns(
         )
 
 
-def _in_session_order(calibration: Calibration, order: list[int]) -> Calibration:
-    """Put the probabilities of bad positions in the order of session.toml."""
-    bad = calibration.info.get("bad_position")
-    if bad is None:
-        return calibration
-    listed = [0.0] * len(bad)
-    for i, p in zip(order, bad, strict=True):
-        listed[i] = p
-    return replace(calibration, info={**calibration.info, "bad_position": listed})
+def _with_numbers_of_session(
+    calibration: Calibration, prepared: PreparedSession
+) -> Calibration:
+    """Put what is said of single positions in the order of session.toml.
+
+    The probabilities of bad positions are those of the used windows; wrong positions
+    are numbered among all.
+    """
+    info = dict(calibration.info)
+    if (bad := info.get("bad_position")) is not None:
+        listed = [0.0] * len(bad)
+        for i, p in zip(prepared.order, bad, strict=True):
+            listed[i] = p
+        info["bad_position"] = listed
+    if "wrong_angles" in info:
+        numbers = prepared.about.position_numbers
+        info["wrong_angles"] = [
+            one
+            if one["position"] is None
+            else {**one, "position": numbers[one["position"]]}
+            for one in info["wrong_angles"]
+        ]
+    return replace(calibration, info=info)

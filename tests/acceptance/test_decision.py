@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from session_folders import CALM, NINE, SITE, places, recorded, write_session
 
 from fieldcal.acceptance import assessment
+from fieldcal.acceptance.conditions import check_link
 from fieldcal.acceptance.decision import Circumstances, Decision, decide, with_decision
 from fieldcal.acceptance.growth import navigation_errors
 from fieldcal.acceptance.verification import propose_verification, verify
@@ -456,6 +457,14 @@ def test_a_verification_that_was_not_measured_verifies_nothing(missing: str) -> 
     made = decided(calibration(), verification=seen)
     (said,) = made.reasons
     assert not made.go and "could not be measured" in said
+
+
+def test_missing_samples_that_the_times_cannot_show_are_not_counted() -> None:
+    """Nor is it said that there are none."""
+    uneven = {k: v for k, v in LINK.items() if k != "missing"}
+    (lost, refused) = check_link(uneven, BOUNDS)
+    assert lost.ok is None and "too uneven" in lost.says and refused.ok
+    assert [c.ok for c in check_link({**LINK, "missing": 50}, BOUNDS)] == [False, True]
 
 
 @pytest.mark.parametrize(

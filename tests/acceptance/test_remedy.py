@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomlkit
-from session_folders import recorded, write_session
+from session_folders import FACES, recorded, write_session
 
 from fieldcal.acceptance.assessment import assess
 from fieldcal.acceptance.remedy import cheapest_remedy
@@ -165,6 +165,37 @@ def test_what_two_positions_leave_open_is_asked_for(tmp_path: Path) -> None:
         )
         is None
     )
+
+
+def turned_thrice(folder: Path, gammas_deg: list[float]) -> Session:
+    """Six faces, once for each third angle."""
+    positions = [
+        {"alpha_deg": alpha, "beta_deg": beta, "gamma_deg": gamma}
+        for gamma in gammas_deg
+        for alpha, beta in FACES
+    ]
+    text = tomlkit.dumps({"format": 1, "position": positions})
+    (folder / "session.toml").write_text(text)
+    return Session.open(folder)
+
+
+def test_positions_with_a_third_angle_are_no_ladder_to_ask_for(tmp_path: Path) -> None:
+    names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xyz")
+    session = turned_thrice(tmp_path, [20.0])
+    args = range(6), LIMITS, ["acc_scale"], 1e-3, 30.0
+    found = found_with(names, [1.0] * 6)
+    assert cheapest_remedy(found, session.about, *args) is None
+
+
+def test_positions_with_a_third_angle_tell_as_much_as_others(tmp_path: Path) -> None:
+    """Beside eighteen positions three more do not take a tenth off; beside six, yes."""
+    names = tuple(f"acc_{g}.{a}" for g in ("bias", "scale") for a in "xyz")
+    session = turned_thrice(tmp_path, [0.0, 90.0, 90.0])
+    found = found_with(names, [1.01 * LIMITS.acc_bias_sigma] * 3 + [1e-4] * 3)
+    found = replace(found, info={"angle_sigma_deg": 0.05})
+    args = LIMITS, ["acc_bias"], 1e-3, 30.0
+    assert cheapest_remedy(found, session.about, range(18), *args) is None
+    assert cheapest_remedy(found, session.about, range(6), *args) is not None
 
 
 def test_a_position_that_disagrees_is_taken_again(tmp_path: Path) -> None:

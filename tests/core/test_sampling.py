@@ -7,7 +7,7 @@ import pytest
 
 from fieldcal.core import sampling
 from fieldcal.core.samples import Block
-from fieldcal.core.sampling import has_no_pause, sampling_rate
+from fieldcal.core.sampling import has_no_pause, sampling_rate, shows_losses
 
 
 def test_the_rate_is_that_of_the_clock_whatever_the_stamps() -> None:
@@ -48,3 +48,14 @@ def test_a_pause_counts_wherever_it_touches_the_samples(rate: float) -> None:
 
 def test_the_example_holds() -> None:
     assert doctest.testmod(sampling, extraglobs={"np": np}).failed == 0
+
+
+def test_losses_show_in_steps_that_are_even_and_not_in_others() -> None:
+    rng, t = np.random.default_rng(1), np.arange(1000) / 100.0
+    some = np.delete(t, rng.choice(1000, 50, replace=False))
+    for even in (t, some, t + rng.normal(0, 5e-4, 1000), t[:2], t[:1]):
+        assert shows_losses(even)
+    bursts = np.floor(t / 0.1) * 0.1 + 0.09 + 1e-4 * (np.arange(1000) % 10)
+    in_pairs = t - 0.009 * (np.arange(1000) % 2)
+    for uneven in (bursts, in_pairs, np.sort(t + rng.uniform(-4e-3, 4e-3, 1000))):
+        assert not shows_losses(uneven)

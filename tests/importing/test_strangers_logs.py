@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import warnings
 from collections.abc import Callable
@@ -24,8 +25,10 @@ from fieldcal.importing.columns import to_signed_16_bit
 from fieldcal.importing.recording import ReadOptions
 from fieldcal.importing.tables.column_physics import is_direction
 from fieldcal.importing.text.cell_forms import HexCells, ListCells
+from fieldcal.importing.text.labels import labelled_values
 from fieldcal.importing.text.line_forms import EchoedMessages
 from fieldcal.importing.times.row_times import RowTimes
+from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)
@@ -84,6 +87,16 @@ def echoed() -> str:
 def checked() -> str:
     bare = lines(["PIMU"] * len(T), T, A, W).split("\n")
     return "\n".join(f"${b}*{reduce(xor, b.encode(), 0):02X}" for b in bare)
+
+
+def vectornav() -> str:
+    """Behind the time at which they came, with angles and a field before the force."""
+    field = ["+012.000", "-001.000", "+003.000", "+00.2000", "+00.1000", "-00.4000"]
+    bare = lines([",".join(["VNYMR", *field])] * len(T), A, W).split("\n")
+    sums = [reduce(xor, b.encode(), 0) for b in bare]
+    return "\n".join(
+        f"{UNIX + t:.3f},${b}*{x:02X}" for t, b, x in zip(T, bare, sums, strict=True)
+    )
 
 
 def hexadecimal() -> str:
@@ -277,6 +290,49 @@ FORMS: dict[str, Writer] = {
         + ",/imu/data/angular_velocity_covariance[0],/imu/data/header/stamp,"
         + ",".join(f"/imu/data/linear_acceleration/{x}" for x in "xyz"),
     ),
+    "stamps beside arrivals": lambda: lines(
+        UNIX + T + 0.007 * np.sin(T), UNIX + np.floor(T), np.round(T % 1 * 1e9), W, A,
+        head="receive_time,ros_stamp_sec,ros_stamp_nanosec,angular_velocity_x,"
+        "angular_velocity_y,angular_velocity_z,linear_acceleration_x,"
+        "linear_acceleration_y,linear_acceleration_z",
+    ),
+    "a stamp beside its arrival": lambda: lines(
+        UNIX + T + 0.007 * np.sin(T), UNIX + T, W, A,
+        head="recv_time,msg_time,gx,gy,gz,ax,ay,az",
+    ),
+    "a chip before its values": lambda: "\n".join(
+        f"{c[:-3]} -> ASM330LHH: | Acc[mg]: {a[0]:.2f} {a[1]:.2f} {a[2]:.2f}"
+        f" | Gyr[mdps]: {w[0]:.1f} {w[1]:.1f} {w[2]:.1f} |"
+        for c, a, w in zip(clock("%H:%M:%S.%f"), A / G * 1e3, DEG * 1e3, strict=True)
+    ),
+    "a program before its values": lambda: each(
+        "IMU: T: {:.3f} Ax: {:.5f} Ay: {:.5f} Az: {:.5f} Gx: {:.5f} Gy: {:.5f}"
+        " Gz: {:.5f} | Flow: X: 0 Y: 1 | LiDAR: 812mm", ROWS
+    ),
+    "a zone behind a space": lambda: lines(
+        [f"{c[:-3]} +0200" for c in clock("%Y-%m-%d %H:%M:%S.%f")], A / G, W,
+        head="loggingTime(txt),"
+        + ",".join(f"accelerometerAcceleration{x}(G)" for x in "XYZ") + ","
+        + ",".join(f"gyroRotation{x}(rad/s)" for x in "XYZ"),
+    ),
+    "values for Teleplot": lambda: "\n".join(
+        f">{name}:{UNIX * 1000 + round(row[0] * 1e3)}:{x:.6f}"
+        for row in ROWS.tolist()
+        for name, x in zip(SIX.split(","), row[1:], strict=True)
+    ),
+    "messages of VectorNav": vectornav,
+    "channels of RaceCapture": lambda: lines(
+        np.round(T * 1e3), ["" if i % 10 else "12.4" for i in range(len(T))], A / G,
+        DEG[:, ::-1],
+        head='"Interval"|"ms"|0|0|1,"Battery"|"Volts"|0.0|20.0|1,'
+        + ",".join(f'"Accel{x}"|"G"|-3.0|3.0|50' for x in "XYZ") + ","
+        + ",".join(f'"{x}"|"Deg/Sec"|-120|120|50' for x in ("Yaw", "Pitch", "Roll")),
+    ),
+    "a rate behind a rule": lambda: lines(
+        DEG, A / G, sep="\t",
+        head="Test report\nMeasurement rate, Hz ________________ 50\n\n"
+        "Rate_X\tRate_Y\tRate_Z\tAcc_X\tAcc_Y\tAcc_Z",
+    ),
     "names in Spanish": lambda: lines(
         T, A / G, DEG, head="Tiempo (s),Aceleración X (g),Aceleración Y (g),"
         "Aceleración Z (g),Giroscopio X (°/s),Giroscopio Y (°/s),Giroscopio Z (°/s)",
@@ -385,12 +441,17 @@ def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
                head="Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),"
                "Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),"
                "Accelerometer Z (g)"), "no column is t"),
+        (lines(np.floor(T / 2.56), np.round(T % 2.56 * 50), W, A,
+               head="series_id,measurement_number,angular_velocity_X,"
+               "angular_velocity_Y,angular_velocity_Z,linear_acceleration_X,"
+               "linear_acceleration_Y,linear_acceleration_Z"), "no column is t"),
     ],
     ids=["rows that are counted", "a thermometer's counts", "a direction",
          "a time that a spreadsheet shortened", "a time that stays, without a name",
          "seconds or rows", "too slow in any unit", "too fast in any unit",
          "too slow as it says",
-         "ms that are called s", "too fast as it says", "messages that are counted"],
+         "ms that are called s", "too fast as it says", "messages that are counted",
+         "rows of pieces that are counted"],
 )  # fmt: skip
 def test_what_would_be_wrong_in_silence_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str
@@ -421,6 +482,71 @@ def test_one_row_a_second_by_a_clock_is_taken_so(tmp_path: Path) -> None:
     whole = [f"{UNIX + i}" for i in range(len(T))]
     path.write_text(lines(whole, A, 0 * W, head=f"t,{SIX}") + "\n")
     assert np.ptp(Session.open(imported(path)).block.t) == len(T) - 1
+
+
+@pytest.mark.parametrize("head", ["", "t,acc_x,acc_y,acc_z,q_w,q_x,q_y,q_z"])
+def test_an_attitude_is_no_rate(
+    tmp_path: Path, head: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, angle = tmp_path / "log.csv", np.cumsum(W, axis=0) / 50 / 2
+    attitude = np.column_stack([np.ones(len(T)), np.tan(angle / 2)])
+    attitude /= np.linalg.norm(attitude, axis=1)[:, None]
+    path.write_text(lines(T, A, np.round(attitude, 2), head=head) + "\n")
+    block = Session.open(imported(path)).block
+    np.testing.assert_allclose(block.acc, A, atol=1e-6)
+    assert np.isnan(block.gyr).all()
+    assert "nothing says what they are" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["T", "t", "T1"])
+def test_a_letter_behind_the_axes_is_a_thermometer_by_its_numbers(
+    tmp_path: Path, name: str
+) -> None:
+    path, warm = tmp_path / "log.csv", 24 + 0.1 * np.floor(T / 4)
+    path.write_text(
+        lines(A, DEG, warm, head=f"# Sample rate: 50 Hz\n{SIX},{name}") + "\n"
+    )
+    folder = imported(path)
+    assert_same(folder)
+    np.testing.assert_allclose(Session.open(folder).block.temperature, warm)
+
+
+def test_letters_behind_the_axes_are_no_times_and_which_is_near_nobody_knows(
+    tmp_path: Path,
+) -> None:
+    path, warm = tmp_path / "log.csv", 24 + 0.1 * np.floor(T / 4)
+    text = lines(T * 1e3, A, DEG, warm, warm + 5, head=f",{SIX},T1,T2")
+    path.write_text(text + "\n")
+    folder = imported(path)
+    assert_same(folder)
+    assert np.isnan(Session.open(folder).block.temperature).all()
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("{0}X {0}Y {0}Z", ("1", "2")),
+        ("{0}X ({1}) {0}Y ({1}) {0}Z ({1})", ("bmi", "mpu")),
+    ],
+)
+def test_names_that_come_again_are_of_several_imus(
+    tmp_path: Path, names: str, told: tuple[str, str]
+) -> None:
+    path, second = tmp_path / "log.csv", A + [0, 0, 1]
+    head = " ".join(
+        names.format(sensor, chip) for chip in ("BMI", "MPU") for sensor in ("Acc", "G")
+    )
+    text = lines(T, A, W, second, W, head=",".join(["t", *re.split(" (?!\\()", head)]))
+    path.write_text(text + "\n")
+    folder = imported(path)
+    assert_same(folder / told[0])
+    other = Session.open(folder / told[1]).block
+    np.testing.assert_allclose(other.acc, second, atol=1e-6)
+
+
+def test_a_dump_of_bytes_in_one_line_is_refused_soon() -> None:
+    dump = "AA FF F2 18 " * 20000
+    assert labelled_values(dump) == [] and heading_meaning(dump) is None
 
 
 def test_a_direction_is_one_though_a_row_is_not_whole() -> None:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from fieldcal.importing.headings.heading import Column, HeadingMatch
+from fieldcal.importing.headings.repeated_names import with_distinct_names
 from fieldcal.importing.words.heading_units import UNITS
 from fieldcal.importing.words.heading_words import (
     MEAN,
@@ -41,7 +42,9 @@ ROS = (("angular", "velocity"), ("linear", "acceleration"), ("ang", "vel"),
        ("lin", "acc"))  # fmt: skip
 """Words of the axes of ROS's sensor_msgs/Imu, which is defined in rad/s."""
 
-OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "log")
+OTHER_CLOCK = ("host", "utc", "gps", "system", "local", "unix", "arrival", "arrived",
+               "log", "receive", "received", "recv", "reception", "rx",
+               "recorded")  # fmt: skip
 """Words of times that are another clock's than the device's."""
 
 
@@ -68,6 +71,7 @@ def match_headings(
     weak : whether accelerations are taken that may lack gravity, with nothing beside
 
     """
+    columns = with_distinct_names(columns)
     named = [
         NamedColumn(i, said)
         for i, column in enumerate(columns)

@@ -45,6 +45,9 @@ NOISY = 0.1
 EXACT = 5e-5
 """Part by which a direction's length differs: a sensor has scatter and bias."""
 
+UNIT_LENGTH = 0.02
+"""Part by which the length of a quaternion of two decimals may differ from 1."""
+
 LEAST_COUNTS = 1000.0
 """Counts in a g by which an accelerometer is told without turns."""
 
@@ -93,7 +96,9 @@ def identify_columns(
     free = [i for i in range(table.shape[1]) if i not in {*known, *times}]
     acc = _named(known, "a")
     gyr = _named(known, "g")
-    threes = _axis_triples([i for i in free if _moves(table[:, i])], names)
+    attitude = _quaternions(table)
+    moving = [i for i in free if _moves(table[:, i]) and i not in attitude]
+    threes = _axis_triples(moving, names)
     found = _force_and_rate_triples(
         table, clock, [acc] if acc else threes, [gyr] if gyr else threes
     )
@@ -120,7 +125,7 @@ def unnamed_axes(
     """
     if len(table) < MIN_ROWS or table.shape[1] != len(names):
         return []
-    without = {*known, *_growing(table)}
+    without = {*known, *_growing(table), *_quaternions(table)}
     free = [i for i in range(table.shape[1]) if i not in without]
     moving = [i for i in free if _moves(table[:, i])]
     named = [three for three in _by_name(free, names) if {*three} & {*moving}]
@@ -148,6 +153,26 @@ def _counts(column: Array) -> bool:
     """Whether a column counts rows."""
     steps = np.diff(column[np.isfinite(column)])
     return bool((steps == 1).mean() > GROWS)
+
+
+def _quaternions(table: Array) -> set[int]:
+    """Columns that are an attitude: of four side by side the length is always 1.
+
+    That of an accelerometer in g beside a calm gyroscope is that of three of them.
+    """
+    found: set[int] = set()
+    for i in range(table.shape[1] - 3):
+        four = table[:, i : i + 4]
+        four = four[np.isfinite(four).all(axis=1)]
+        threes = (four[:, :3], four[:, 1:])
+        if _has_unit_length(four) and not any(map(_has_unit_length, threes)):
+            found |= {*range(i, i + 4)}
+    return found
+
+
+def _has_unit_length(values: Array) -> bool:
+    off = np.abs(np.linalg.norm(values, axis=1) - 1)
+    return bool(len(off) and off.max() < UNIT_LENGTH)
 
 
 def _moves(column: Array) -> bool:

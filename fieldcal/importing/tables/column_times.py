@@ -90,11 +90,31 @@ def split_seconds(table: Array, wholes: Iterable[int]) -> SplitSeconds | None:
                 continue
             if (np.diff(part)[steps == 1] < 0).mean() < LATER:
                 continue
+            if not _fills_second(part, steps, FRACTIONS[name]):
+                continue
             both = np.diff(seconds + part * FRACTIONS[name])
             # within a minute the seconds begin again
             if (both > 0).mean() > LATER - (steps < 0).mean():
                 return SplitSeconds(i, j, name)
     return None
+
+
+def _fills_second(part: Array, steps: Array, size: float) -> bool:
+    """Whether a fraction (n,) runs on to the end of each second.
+
+    A number of the rows of each of several pieces grows and begins again as well, but
+    ends anywhere: 0 to 127 are no milliseconds.
+
+    Parameters
+    ----------
+    part : the fractions
+    steps : (n - 1) s, of the whole seconds
+    size : s, of one in `part`
+
+    """
+    ends = part[:-1][steps == 1] * size
+    usual = float(np.median(np.diff(part)[steps == 0])) * size
+    return bool(np.median(ends) + NEAR_STEPS * usual > 1)
 
 
 def is_clock_number(t: Array) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from fieldcal.core.samples import Array
@@ -13,6 +15,14 @@ from fieldcal.importing.tables.column_times import (
 )
 from fieldcal.importing.units.time_units import shared_times
 from fieldcal.importing.words.heading_words import heading_meaning
+
+CELSIUS = "deg C"
+
+_LETTER = re.compile(r"[tT]\d?")
+"""What is a time or a thermometer."""
+
+DEVICES = -40.0, 125.0
+"""Temperatures at which devices work, deg C."""
 
 
 def with_checked_times(way: Heading, table: Array) -> Heading:
@@ -27,6 +37,7 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     table : (n, k) numbers of the first rows; nan where a cell is none
 
     """
+    way = _with_thermometer(way, table)
     said = [heading_meaning(column.name, column.unit) for column in way.columns]
     named = [i for i, one in enumerate(said) if one is not None and one.kind == "t"]
     if not named or table.shape[1] != len(way.columns) or not len(table):
@@ -37,13 +48,45 @@ def with_checked_times(way: Heading, table: Array) -> Heading:
     # what is beyond the whole seconds of another column is no time by itself
     split = split_seconds(table, range(table.shape[1]))
     fit = [i for i in fit if split is None or i != split.fraction]
+    # the seconds of a clock in two columns are shared, and whole with the other
+    whole = {split.whole} if split is not None else set()
     for lacks in (is_row_counter, are_shared_times):
-        fit = [i for i in fit if not lacks(table[:, i])] or fit
+        fit = [i for i in fit if i in whole or not lacks(table[:, i])] or fit
     fit = fit if fit and len(named) > 1 else [i for i in named if i not in empty]
     names = [*way.columns]
     for i in {*named} - {*fit}:
         names[i] = names[i]._replace(name="")
     return Heading(names, way.skip)
+
+
+def _with_thermometer(way: Heading, table: Array) -> Heading:
+    """A heading in which a ``T`` behind the axes is what its numbers are: deg C.
+
+    Who writes the time writes it first, and it grows from row to row. Of several, T1
+    and T2, nobody knows which is near the IMU: they are left out.
+    """
+    said = [heading_meaning(column.name, column.unit) for column in way.columns]
+    kinds = [one.kind if one is not None else "" for one in said]
+    if table.shape[1] != len(kinds):
+        return way
+    names = [*way.columns]
+    warm = [
+        i for i, column in enumerate(names)
+        if _LETTER.fullmatch(column.name.strip()) and not column.unit
+        and {"a", "g"} & {*kinds[:i]} and _is_warmth(table[:, i])
+    ]  # fmt: skip
+    alone = len(warm) == 1 and "temperature" not in kinds
+    for i in warm:
+        own = {"unit": CELSIUS} if alone else {"name": ""}
+        names[i] = names[i]._replace(**own)
+    return Heading(names, way.skip) if warm else way
+
+
+def _is_warmth(column: Array) -> bool:
+    """Whether numbers (n,) may be deg C, and are no times of their own rows."""
+    known = column[np.isfinite(column)]
+    within = len(known) and DEVICES[0] <= known.min() and known.max() <= DEVICES[1]
+    return bool(within and (not keeps_growing(column) or are_shared_times(column)))
 
 
 def are_shared_times(t: Array) -> bool:

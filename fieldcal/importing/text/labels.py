@@ -34,6 +34,9 @@ MIN_LABEL_SHARE = 0.5
 MAX_UNIT_LETTERS = 12
 """Letters of a unit; what is longer is a sentence."""
 
+LONGEST = 2000
+"""Characters of a line of values for people; a dump of bytes in one line has more."""
+
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(
     rf"(?<=[:=])\s*[\[({{<]\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*[\])}}>]"
@@ -60,7 +63,7 @@ _ALONE = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}\D*)")
 _SENSOR = re.compile(r"(.*?)[^\w(]*\b([A-Za-z_][\w ()./-]*?)\s*[:=]\s*", re.DOTALL)
 """What stands before an axis: something else, and the label of all its axes."""
 
-_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?\(([^()]+)\))( [xyzXYZ])?")
+_IN_UNIT = re.compile(r"(.+?)(?: in ([^ ]+)| ?[(\[]([^()\[\]]+)[)\]])( [xyzXYZ])?")
 """A label that says the unit of its values."""
 
 _LABEL = re.compile(r"(?<![\w./^²°])([A-Za-z_][^:=,;|\n]*?)\s*[:=]\s*(?=[-+.\d])")
@@ -79,10 +82,16 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TITLE = re.compile(r"\W*([A-Za-z][\w ]*(?:\([^()]*\))?)\W*")
 """A line that holds nothing but a name."""
 
+_PLOTTED = re.compile(rf">([^:|]+):(\d{{10,}}(?:\.\d+)?):({_NUMBER})(?:\|\w*)?")
+"""A name, ms since 1970 and a value, as Teleplot reads them."""
+
 _LEVEL = re.compile(r"[\[(|\s-]*(?:DEBUG|INFO|WARNING|WARN|ERROR|TRACE)\b[\])|\s:-]*")
 """What programs write behind the time of a line."""
 
 _ARRIVAL = re.compile(r"\s*\[?(\S*\s?\d+:\d\d:\d\d[.,]?\d*)\]?\s*(?:->|>|:|\s)\s*")
+
+_NAME = re.compile(r"\W*[A-Za-z][\w-]*:(?!\S)\W*")
+"""What stands alone before the first label: a chip or a program."""
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
@@ -96,9 +105,15 @@ def labelled_values(line: str) -> list[Labelled]:
 
     >>> labelled_values("Acceleration X: -0.1, Y: 0.2 m/s^2")
     [('Acceleration X [m/s^2]', '-0.1'), ('Acceleration Y [m/s^2]', '0.2')]
+    >>> labelled_values(">ax:1778789865000:0.1")
+    [('time [ms]', '1778789865000'), ('ax', '0.1')]
     >>> labelled_values("1.0, 2.0, 3.0"), labelled_values("a/g: 1 2 3 4 5 6")
     ([], [])
     """
+    if len(line) > LONGEST:
+        return []
+    if plotted := _PLOTTED.fullmatch(line.strip()):
+        return [(TICKS, plotted[2]), (plotted[1].strip(), plotted[3])]
     line = _COLOURS.sub("", line)
     prefix = log_prefix(line)
     line = line[prefix.length :] if prefix else line
@@ -192,7 +207,7 @@ def _split_labels(line: str) -> list[tuple[str, str]]:
         sensor = _SENSOR.fullmatch(texts[i])
         if sensor and label.lower() in AXES:
             texts[i], labels[i] = sensor[1], f"{sensor[2]} {label}"
-    if any(letter.isalnum() for letter in texts[0]):
+    if any(map(str.isalnum, _NAME.sub("", texts[0], 1))):
         return []
     return [*zip(labels, texts[1:], strict=True)]
 

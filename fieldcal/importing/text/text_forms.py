@@ -5,6 +5,7 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     IMU,0.01,0.1,0.2,9.8               lines of several kinds, by a word in each
     $IMU,0.01,0.1*5A                   lines with a checksum
     %RAWIMUSA,2209,4916.2;...*1fb76c28  messages of a receiver
+    $VNYMR,-131.1,+31.8,...*62         messages of a device by VectorNav
     0.01,0.1,0.2,9.8;                  lines with a mark at their end
     angular_velocity:\n  x: 0.1        messages as ROS shows them
     | 0.01 | 0.1 |   0.01,"[0.1, 0.2, 9.8]"   tables between bars, lists in a cell
@@ -41,6 +42,7 @@ from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
 from fieldcal.importing.text.text_top import find_separator, split_cells
+from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
 from fieldcal.importing.times.clock_text import (
     IN_LINE,
@@ -64,6 +66,9 @@ _ARRIVALS = (
 )
 """Times that monitors write before a line: the Arduino IDE's; Tera Term's, in brackets;
 and CoolTerm's, parted by a space from columns that another sign parts."""
+
+_ZONED = re.compile(rf"\s*{_STAMP} +[-+](?:0\d|1[0-4]):?(?:00|15|30|45)[,;\t]")
+"""A time with its zone, which is no number of the row."""
 
 
 def forms_of(lines: Sequence[str], separator: str | None) -> list[TextForm]:
@@ -183,6 +188,8 @@ class ArrivalPrefix(TextForm):
         """The form, if most lines have it."""
         if not is_true_of_most(lines, lambda line: _arrival(line) is not None):
             return None
+        if is_true_of_most(lines, lambda line: _ZONED.match(line) is not None):
+            return None
         said = _arrival(lines[-1])
         rest = lines[-1][said.end() :] if said else lines[-1]
         return cls(separator or find_separator(rest) or "\t")
@@ -279,7 +286,7 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 
 FORMS: tuple[type[TextForm], ...] = (
-    DataflashText, LabviewText, RateOnTop, ReceiverLines, CheckedLines,
+    DataflashText, LabviewText, RateOnTop, ReceiverLines, VectorNavLines, CheckedLines,
     EchoedMessages, EndedLines, DatabasePoints, QuotedCells, FortranNumbers, UnitCells,
     LongTable, LabelledValues, BarTable, ListCells,
     TaggedLines, ArrivalPrefix, HexCells, ClockColumn,

@@ -34,6 +34,9 @@ AXES = 3
 FEWEST = 2
 """Fewest columns that names are looked for of: a time and a thermometer."""
 
+MOST_COLUMNS = 5000
+"""Columns of a table; a line with more is none of names."""
+
 FULL = 50
 """Lines at the top by which the width of a row is judged."""
 
@@ -53,8 +56,9 @@ _RATE_WITHIN = re.compile(
 """A rate that stands among other words of a line."""
 
 _RATE = re.compile(
-    r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging)[ _]*"
-    r"(?:rate|frequency|freq)|frequency|odr)\b[ _]*(?:\(?hz\)?)?\s*[:=,;\t ]+\s*\"?"
+    r"[#%/\s\"]*(?:fs|(?:sample|sampling|output|update|data|logging|"
+    r"measurement)[ _]*"
+    r"(?:rate|frequency|freq)|frequency|odr)\b[ _,]*(?:\(?hz\)?)?\s*[:=,;\t _]+\s*\"?"
     r"([0-9]+(?:\.[0-9]+)?)\s*(?:hz)?\W*",
     re.IGNORECASE,
 )
@@ -169,7 +173,7 @@ def headings_above(lines: Sequence[str], separator: str | None) -> list[Heading]
         for line in tops
     ]
     found = [Heading(way, SKIP) for way in _ways(rows)]
-    return [one for one in found if len(one.columns) >= FEWEST]
+    return [one for one in found if FEWEST <= len(one.columns) <= MOST_COLUMNS]
 
 
 def _all_words(line: str) -> bool:
@@ -180,6 +184,11 @@ def _all_words(line: str) -> bool:
 
 def _ways(rows: Sequence[Sequence[str]]) -> Iterator[list[Column]]:
     for i, row in enumerate(rows):
+        parts = [[part.strip('" ') for part in cell.split("|")] for cell in row]
+        if len(row) > 2 and all(len(part) > 2 for part in parts):
+            # RaceCapture: name, unit, range and rate of each channel
+            yield [Column("", name, unit) for name, unit, *_ in parts]
+            continue
         yield [Column("", name) for name in row]
         if (filled := _fill_sensor_names(row)) != [*row]:
             yield [Column("", name) for name in filled]

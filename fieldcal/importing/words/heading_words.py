@@ -98,6 +98,9 @@ _WHOLE = {"seq": "seq", "sequence": "seq", "t_host": "t_host"}
 _FILLERS = ("field", "data", "msg", "sensor", "raw", "value", "imu", "calibrated")
 """Words that tell no IMU from another where all of one kind have them."""
 
+LONGEST = 300
+"""Characters of a name; what is longer is a line without columns."""
+
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _BRACKETS = re.compile(r"(.*?)\s*[\[({](.*)[\])}]\s*")
 _BRACKETED_AXIS = re.compile(r"[\[(]([xyzXYZ])[\])]")
@@ -143,6 +146,8 @@ def heading_meaning(name: str, unit: str = "") -> HeadingMeaning | None:
     >>> heading_meaning("imu1_GyroX (dps)")
     HeadingMeaning(kind='g', axis='x', unit='deg/s', label=('imu', '1'), weak=False)
     """
+    if len(name) > LONGEST:
+        return None
     name = _BARE.sub("", unicodedata.normalize("NFD", name))
     name = _BRACKETED_AXIS.sub(r" \1 ", name.strip().strip('"')).strip()
     if (whole := _WHOLE.get(name.lower())) is not None:
@@ -215,7 +220,7 @@ def _name_unit_splits(name: str, unit: str) -> Iterator[tuple[str, str | None]]:
 def _meaning_of_words(words: list[str], unit: str | None) -> HeadingMeaning | None:
     if not words:
         return None
-    words = with_axis_letter(words)
+    words = with_axis_letter(words, unit in UNITS["g"])
     if "t" in words and unit in TEMPERATURES:
         return HeadingMeaning(
             "temperature", "", unit, tuple(w for w in words if w != "t")

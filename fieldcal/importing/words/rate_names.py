@@ -15,15 +15,24 @@ ANGLES = {"roll": "x", "pitch": "y", "yaw": "z"}
 LETTERS = {"p": "x", "q": "y", "r": "z"}
 
 
-def with_axis_letter(words: Sequence[str]) -> list[str]:
+def with_axis_letter(words: Sequence[str], as_rate: bool = False) -> list[str]:
     """Words of a name with a rate's own name replaced by its axis.
+
+    Parameters
+    ----------
+    words : of a name
+    as_rate : whether its unit is that of a rate: "Yaw" in deg/s is a yaw rate
 
     >>> with_axis_letter(["yawrate", "dps"]), with_axis_letter(["gyro", "p"])
     (['rate', 'z', 'dps'], ['gyro', 'x'])
     >>> with_axis_letter(["yaw"]), with_axis_letter(["gyro", "yaw"])
     (['yaw'], ['gyro', 'yaw'])
+    >>> with_axis_letter(["yaw"], as_rate=True)
+    ['z', 'rate']
     """
     parted = [part for word in words for part in _split_name(word)]
+    if as_rate and {*parted} & {*ANGLES} and "rate" not in parted:
+        parted.append("rate")
     axes = LETTERS | (ANGLES if "rate" in parted else {})
     named = [word for word in parted if word in axes]
     if len(named) != 1 or not {*parted} & {*RATES}:

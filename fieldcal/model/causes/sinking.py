@@ -35,13 +35,18 @@ MIN_POSITIONS = 4
 
 
 def sinking(table: ColumnTable) -> Group | None:
-    """Group of all positions with known angles; None if there are too few."""
+    """Group of all positions with known angles; None if there are too few.
+
+    None also if nobody knows when each was held: means without times.
+    """
     x = table.x
     known = x.oriented & (x.position >= 0)
     if len(np.unique(x.position[known])) < MIN_POSITIONS:
         return None
-    tilt = effect_basis(catalogue()["base_tilt"], {}, 0)
     begin, end = float(x.t[known].min()), float(x.t[known].max())
+    if begin == end:
+        return None
+    tilt = effect_basis(catalogue()["base_tilt"], {}, 0)
 
     def columns(view: RowView) -> Array:
         out = np.zeros((len(view.x), 6, 2 * POLYNOMIALS))

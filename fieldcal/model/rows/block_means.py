@@ -53,6 +53,18 @@ def _triad_means(
     return np.where(count > 0, mean, np.nan), count
 
 
+def mean_of_known(values: Array) -> Array:
+    """Mean of each column over what is known, nan where nothing is.
+
+    >>> mean_of_known(np.array([[1.0, np.nan], [3.0, np.nan]]))
+    array([ 2., nan])
+    """
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    mean: Array = total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    return mean
+
+
 def _middle(values: Array) -> Array:
     """Median of each column over what is known, nan where nothing is."""
     out = np.full(values.shape[1], np.nan)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.physics.recording import grids_of
 from fieldcal.windows import noise
 from fieldcal.windows.noise import (
@@ -64,7 +65,7 @@ def shared_rounding_sigma(block: Block, windows: NDArray[np.intp], off: Array) -
     out = np.zeros(6)
     step = quantisation_steps(block, windows)[1]
     _, pieces = _pieces(block, windows)
-    mean = np.array([_mean_of_known(piece) for piece in pieces])
+    mean = np.array([mean_of_known(piece) for piece in pieces])
     sampled = np.nan_to_num([short_lag_noise(piece[:STEP_SAMPLES]) for piece in pieces])
     pairs = np.triu_indices(len(pieces), 1)
     for c in np.flatnonzero(step > 0):
@@ -76,14 +77,6 @@ def shared_rounding_sigma(block: Block, windows: NDArray[np.intp], off: Array) -
             share = max(float(np.mean(shared)) / own, 0.0)
             out[3 + c] = np.sqrt(share * np.mean(off[:, 3 + c] ** 2))
     return out
-
-
-def _mean_of_known(piece: Array) -> Array:
-    """Means of the finite samples (n, c); nan without any."""
-    known = np.isfinite(piece)
-    total = np.where(known, piece, 0.0).sum(axis=0)
-    mean: Array = total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-    return mean
 
 
 def quantisation_steps(block: Block, windows: NDArray[np.intp]) -> tuple[Array, Array]:

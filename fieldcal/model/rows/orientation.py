@@ -13,6 +13,7 @@ from fieldcal.core.positions import (
     unknown_axis_speeds,
 )
 from fieldcal.core.samples import Array
+from fieldcal.model.rows.block_means import mean_of_known
 from fieldcal.model.rows.turntable import GyroReadings
 from fieldcal.session.description import Description
 
@@ -57,9 +58,12 @@ def force_from_outputs(
 
 
 def force_along_mean(gravity: float, position: NDArray[np.intp], f: Array) -> Array:
-    """Force of length g along the mean of each position's force `f`, (n, 3)."""
+    """Force of length g along the mean of each position's force `f`, (n, 3).
+
+    The mean is over the rows that an axis was measured in: an axis may lack some.
+    """
     out = np.zeros((len(position), 3))
     for p in np.unique(position):
-        mean = np.nanmean(np.nan_to_num(f[position == p]), axis=0)
-        out[position == p] = gravity * mean / max(np.linalg.norm(mean), 1e-12)
+        mean = np.nan_to_num(mean_of_known(f[position == p]))
+        out[position == p] = gravity * mean / max(float(np.linalg.norm(mean)), 1e-12)
     return out

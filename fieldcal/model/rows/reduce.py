@@ -224,11 +224,23 @@ def average_rows(
     span = np.column_stack([block.t[bound[:, 0]], block.t[bound[:, 1] - 1]])
     length = np.diff(bound, axis=1)[:, 0] / sampling_rate(block)
     x = _experience(source, position, y, span.mean(axis=1), length, variance)
-    sd[~x.force_known, :3] = np.nan
+    sd[~x.force_known | _lacks_direction(x, y), :3] = np.nan
     scale = source.about.nominal["gyr_scale"]
     _subtract_rotating_earth_rate(x, y[:, 3:], sd[:, 3:], length, scale)
     still = np.zeros((len(y), 3))
     return Rows(x, y, sd, np.zeros_like(sd), length, noise, span, still)
+
+
+def _lacks_direction(x: Experience, y: Array) -> NDArray[np.bool_]:
+    """Rows of free positions in which an accelerometer was never measured, (n,).
+
+    The other two do not tell where the force points.
+    """
+    out = np.zeros(len(y), dtype=bool)
+    for p in np.unique(x.position[~x.oriented]):
+        here = x.position == p
+        out[here] = np.isnan(y[here, :3]).all(axis=0).any()
+    return out
 
 
 def _experience(
@@ -272,14 +284,16 @@ def _experience(
 def _joint_turns(source: RowSource) -> JointTurns:
     """Turns of the joints, as far as the positions' angles are known.
 
-    Measured attitudes are not used: their angles are not those of joints.
+    Measured attitudes are not used: their angles are not those of joints. Nor are
+    positions without samples: nobody knows when, or whether, the joints went there.
     """
     positions = source.about.positions
     if not positions:
         return JointTurns.none()
     known = np.column_stack([*alpha_beta_angles(positions), gamma_angles(positions)])
     known[np.isfinite(attitude_sigmas(positions))] = np.nan
-    return JointTurns.of(source.rest_began[: len(known)], known)
+    held = np.diff(window_bounds(source.block, source.about), axis=1)[:, 0] > 0
+    return JointTurns.of(source.rest_began[: len(known)][held], known[held])
 
 
 def _subtract_rotating_earth_rate(

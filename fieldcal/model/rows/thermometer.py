@@ -173,7 +173,17 @@ def _line(t: Array, y: Array, weight: Array, half: float) -> tuple[Array, Array]
 
 
 def _slope(t: Array, y: Array, weight: Array, half: float) -> Array:
-    """Slopes of local parabolas, by running sums: at an end a line has another's."""
+    """Slopes of local parabolas: at an end a line has another's.
+
+    No span reaches over a longer pause; fourth powers of a time on its other side would
+    leave nothing of those within a span.
+    """
+    runs = np.split(np.arange(len(t)), np.flatnonzero(np.diff(t) > half) + 1)
+    return np.concatenate([_slope_of_run(t[r], y[r], weight[r], half) for r in runs])
+
+
+def _slope_of_run(t: Array, y: Array, weight: Array, half: float) -> Array:
+    """Slopes of local parabolas in means without a longer pause, by running sums."""
     s = t - t[len(t) // 2]
     powers = s[:, None] ** np.arange(5)
     terms = np.hstack([powers, powers[:, :3] * (y - y[0])[:, None]])

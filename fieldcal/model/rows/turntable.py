@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.positions import Position, table_rates, unknown_axis_speeds
 from fieldcal.core.samples import Array
+from fieldcal.model.rows.block_means import mean_of_known
 
 MIN_REVOLUTIONS = 1.0
 """Whole turns of a window from which what goes round is told from the mean."""
@@ -123,7 +124,7 @@ class GyroReadings:
         mean = np.zeros((len(self.positions), 3))
         held = np.unique(self.position)
         for p in held:
-            mean[p] = np.nan_to_num(self.w[self.position == p]).mean(axis=0)
+            mean[p] = np.nan_to_num(mean_of_known(self.w[self.position == p]))
         here = [p for p in held if not any(self.positions[p].rate or ())]
         length = np.where(speed > 0, speed, self.earth)
         bias, known = _bias_from_norms(mean[here], length[here])

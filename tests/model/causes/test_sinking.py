@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -102,3 +103,20 @@ def test_columns_are_what_a_small_tilt_makes_times_a_polynomial() -> None:
 
 def test_positions_that_nobody_set_are_left_to_lean() -> None:
     assert sinking(dictionary(ladder(free=range(6)))) is None
+
+
+def test_means_that_nobody_timed_do_not_tell_what_sinks(tmp_path: Path) -> None:
+    x = ladder(rows=1)
+    assert sinking(dictionary(x)) is not None
+    assert sinking(dictionary(replace(x, t=np.zeros(len(x))))) is None
+    held = [{**p, "sigma": [2e-3] * 3, "start_s": i - 0.5, "end_s": i + 0.5}
+            for i, p in enumerate(PLACES)]  # fmt: skip
+    angles = np.deg2rad(ANGLES).tolist()
+    forces = [force(alpha, beta, g=G) for alpha, beta in angles]
+    block = Block.of(np.arange(len(held)) * 1.0, ACC + np.array(forces))
+    folder = write_session(
+        tmp_path / "s", block, held, site=SITE, means={"timed": False}
+    )
+    session = Session.open(folder)
+    found = solve_session(session, usable_windows(session))
+    np.testing.assert_allclose(found.vector("acc_bias")[0], ACC, atol=1e-3)

@@ -70,6 +70,17 @@ def test_joints_are_those_of_angles_that_were_set_and_not_measured() -> None:
     assert turns.at.tolist() == [38.0] and turns.side[:, 0].tolist() == [-1.0]
 
 
+def test_joints_were_not_turned_to_where_the_device_was_never_held() -> None:
+    known = about(
+        place(3.0, 13.0), {"alpha_deg": 90.0, "beta_deg": 5.0},
+        place(25.0, 35.0, 45.0), place(100.0, 110.0, 90.0),
+    )  # fmt: skip
+    arrived = np.array([2.5, 2.0, 21.0, 2.0])
+    one = replace(source(samples(40.0), known), rest_began=arrived)
+    turns = reduce_to_rows(one).x.joint_turns
+    assert turns.at.tolist() == [21.0] and turns.side.tolist() == [[1.0, 0.0]]
+
+
 def test_a_device_that_sees_the_earth_has_its_rate() -> None:
     block, device = samples(20.0), {"grade": "navigation", "name": "a"}
     x = reduce_to_rows(source(block, about(place(3.0, 13.0), device=device))).x
@@ -168,6 +179,21 @@ def test_what_a_dead_band_hides_of_gyroscopes_is_the_same_at_every_rest() -> Non
     assert not rows.session_error[:5].any()
     np.testing.assert_allclose(rows.window_error[:, 0], 0.04 / 3**0.5, rtol=0.1)
     assert (rows.window_error[:, 1:] < 1e-5).all()
+
+
+def test_where_the_force_points_is_not_known_of_two_axes() -> None:
+    """Of a free window; where the angles are known the two are as good as ever."""
+    block, held = samples(30.0), (place(2.0, 8.0), place(9.0, 14.0))
+    acc = block.acc.copy()
+    acc[block.t < 8.5, 1] = np.nan
+    some = replace(block, acc=acc)
+    free = [{k: v for k, v in one.items() if "deg" not in k} for one in held]
+    rows = reduce_to_rows(source(some, about(*free)))
+    first = rows.x.position == 0
+    assert not rows.used[first, :3].any() and rows.used[first, 3:].all()
+    assert rows.used[~first].all()
+    told = reduce_to_rows(source(some, about(*held)))
+    np.testing.assert_array_equal(told.used[first, :3], [[True, False, True]] * 6)
 
 
 def test_averages_between_any_bounds() -> None:

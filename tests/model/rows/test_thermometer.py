@@ -91,6 +91,14 @@ def test_a_pause_makes_no_longer_steps() -> None:
     assert len(found.t) == 600
 
 
+def test_the_rate_is_told_on_both_sides_of_a_night() -> None:
+    day = 86_400.0
+    t = np.concatenate([np.arange(0.0, 600.0, 0.5), day + np.arange(0.0, 600.0, 0.5)])
+    values = 20.0 + 0.01 * (t % day)
+    found = Thermometer.of(Block.of(t, np.zeros((len(t), 3)), None, values))
+    np.testing.assert_allclose(found.heating, 0.01, rtol=1e-3)
+
+
 def test_few_values_are_no_thermometer() -> None:
     t, still = np.arange(20.0), np.zeros((20, 3))
     for known in (7, 8):

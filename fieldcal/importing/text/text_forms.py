@@ -56,13 +56,10 @@ CLOCK = "utc time [s]"
 """What a column is called whose clock was read; a device's own time goes before it."""
 
 _STAMP = r"(\S*\s?\d+:\d\d:\d\d(?:[.,]\d+)?)"
-_ZONE = r"(?:[-+](?:\d\d:\d\d|0\d[0134][05])|\+1[0-4][0134][05])[,;\t]"
-"""The zone of a time, which is no value behind it: ``14:20:31.25 +0200,``."""
-
 _ARRIVALS = (
     re.compile(rf"\s*\[?{_STAMP}\]?\s*->\s*"),
     re.compile(rf"\s*\[{_STAMP}\][ \t]*(?=[-+.\d])"),
-    re.compile(rf"\s*{_STAMP} +(?!{_ZONE})(?=[-+.\d][^\s,;]*[,;\t])"),
+    re.compile(rf"\s*{_STAMP} +(?=[-+.\d][^\s,;]*[,;\t])"),
 )
 """Times that monitors write before a line: the Arduino IDE's; Tera Term's, in brackets;
 and CoolTerm's, parted by a space from columns that another sign parts."""

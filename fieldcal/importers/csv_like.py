@@ -23,6 +23,11 @@ from fieldcal.importing import columns
 from fieldcal.importing.columns import SKIP
 from fieldcal.importing.files.text_encoding import is_mostly_text, utf16_encoding
 from fieldcal.importing.headings.heading import Column, Heading
+from fieldcal.importing.headings.sensor_columns import (
+    AXES,
+    of_sensor,
+    with_clock_column,
+)
 from fieldcal.importing.recording import ReadOptions, Recording
 from fieldcal.importing.tables.column_recording import ColumnRecording
 from fieldcal.importing.text.instances import ImuInstances, find_instances
@@ -45,11 +50,8 @@ from fieldcal.importing.text.text_top import (
     parse_numbers,
 )
 from fieldcal.importing.words.file_names import SENSOR, sensor_of_file_name
-from fieldcal.importing.words.heading_words import heading_meaning
 
 WHAT = "text with columns"
-
-AXES = ("x", "y", "z")
 
 NAMED = 50
 """Lines at the top by which their width is judged."""
@@ -109,7 +111,7 @@ class TextColumns(ColumnRecording):
             if form.names:
                 found = [Heading([Column("", name) for name in form.names], SKIP)]
             if form.clock is not None:
-                found = [_with_clock_column(one, form.clock) for one in found]
+                found = [with_clock_column(one, form.clock, CLOCK) for one in found]
         found = [one for way in found if (one := self._fitted(way)) is not None]
         sensor = self.sensor or sensor_of_file_name(self.path.name.split(".")[0])
         if not sensor:
@@ -117,7 +119,7 @@ class TextColumns(ColumnRecording):
         if not found and self._numbers.shape[1] == len(AXES):
             found = [Heading([Column("", axis) for axis in AXES], SKIP)]
         ways = [
-            Heading([_of_sensor(sensor, c) for c in way.columns], way.skip)
+            Heading([of_sensor(sensor, c) for c in way.columns], way.skip)
             for way in found
         ]
         if not self.sensor and ways != found:
@@ -137,6 +139,28 @@ class TextColumns(ColumnRecording):
             return found
         (one,) = found.values()
         return dict.fromkeys(self._in_turn.names, one)
+
+    def _found(self) -> dict[str, ReadOptions]:
+        """Options of each IMU; times that were read of a clock are s, whoever asks."""
+        found = super()._found()
+        for name, one in found.items():
+            if self._is_by_clock(one):
+                unit = one.time_unit or "s"
+                found[name] = replace(one, time_unit=unit, named=one.named - {"t"})
+        return found
+
+    def _is_by_clock(self, wanted: ReadOptions) -> bool:
+        """Whether the times are those that were read of a clock."""
+        clocks = {form.clock for form in self._forms} - {None}
+        return bool({i for i, c in enumerate(wanted.columns) if c == "t"} & clocks)
+
+    @property
+    def first_days(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Days that the clock of its rows may count from."""
+        days = next((form.days for form in self._forms if form.days), ())
+        return (
+            days if days and all(map(self._is_by_clock, self.imus().values())) else ()
+        )
 
     def alone(self, stream: str) -> Recording:
         """The recording with one of its IMUs."""
@@ -242,9 +266,10 @@ class TextColumns(ColumnRecording):
             if not n:
                 continue
             if t0 is None:
-                t0 = self.began = float(block.t[0])
+                t0 = float(block.t[0])
+                self.began = t0 + self.later
             with np.errstate(invalid="ignore"):  # a time beyond all is no time
-                since = block.t - t0 if self.from_first else block.t
+                since = block.t - t0 if self.from_first else block.t + self.later
             yield replace(block, t=since)
         self.says += [s for s in samples.says if s not in self.says]
         if table is not None and table.headings:
@@ -305,24 +330,3 @@ class TextColumns(ColumnRecording):
                 f"{self.path}: has {width} columns, {named} are named{more};"
                 f" its line {self._skip + 1} is {line[:60]!r}"
             )
-
-
-def _of_sensor(sensor: str, column: Column) -> Column:
-    """Column of which a bare axis, whose unit does not say it, is the sensor's."""
-    bare = column.name.strip().strip('"').strip()
-    axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
-    said = heading_meaning(bare, column.unit)
-    told = said is not None and bool(said.kind)
-    if said is not None and said.kind == "v" and sensor == "acc":
-        # of a file of gravity, which is part of the force
-        return Column(column.place, f"{sensor} {said.axis}", said.unit or "")
-    return column._replace(name=f"{sensor} {bare}" if axis and not told else bare)
-
-
-def _with_clock_column(heading: Heading, clock: int) -> Heading:
-    """A heading with the column of which the clock was read."""
-    named = [
-        Column("", CLOCK) if i == clock else column
-        for i, column in enumerate(heading.columns)
-    ]
-    return Heading(named, heading.skip)

@@ -4,11 +4,14 @@ phyphox and the Sensor Logger of Android and iOS write ``Accelerometer.csv``,
 ``Gyroscope.csv`` and others, with one clock for all. The name of the file says the
 sensor, its columns the axes; each sample of the accelerometer goes with the nearest of
 the gyroscope. ``TotalAcceleration`` goes before ``Accelerometer``, from which some
-programs take gravity out: ``Gravity``, if it is there, is added to it then.
+programs take gravity out: ``Gravity``, if it is there, is added to it then. Where
+``Metadata.csv`` says that iOS wrote it and nothing was standardised, the sign of the
+accelerations is turned, which count gravity downwards there.
 """
 
 from __future__ import annotations
 
+import csv
 import zipfile
 from collections.abc import Iterable, Iterator
 from copy import copy
@@ -26,6 +29,7 @@ from fieldcal.importing.times.alignment import AlignedPair
 from fieldcal.importing.times.gravity_sum import GravitySum, lacks_gravity
 from fieldcal.importing.times.row_validator import RowValidator
 from fieldcal.importing.words.file_names import ACC, GRAVITY, GYR, LINEAR, TOTAL
+from fieldcal.importing.words.telephone_names import UNTOLD
 
 WHAT = "archives of telephones: phyphox, Sensor Logger"
 
@@ -34,6 +38,28 @@ SENSOR = {"a": "acc", "v": "acc", "g": "gyr"}
 
 FIRST_ROWS = 1 << 14
 """Rows at the beginning of a file that tell whether gravity is in it."""
+
+
+ABOUT = "metadata.csv"
+"""File of an archive that says the platform."""
+
+DOWNWARDS = (
+    "Metadata.csv says that iOS wrote it, not standardised, which counts gravity"
+    " downwards: the sign of the accelerations is turned"
+)
+
+
+def _platform(path: Path) -> tuple[str, bool]:
+    """Platform that wrote an archive, and whether what it wrote was standardised."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            about = [n for n in archive.namelist() if Path(n).name.lower() == ABOUT]
+            text = archive.read(about[0]).decode("utf-8", "replace") if about else ""
+    except (zipfile.BadZipFile, OSError, RuntimeError, ValueError):
+        return "", False  # whoever reads the sensors says so
+    said = next(csv.DictReader(text.splitlines()), {})
+    platform, standard = (str(said.get(k)) for k in ("platform", "standardisation"))
+    return platform.lower(), standard.lower() == "true"
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -47,6 +73,7 @@ class PhoneArchive(Recording):
 
     asks_units = True
     _texts: dict[str, TextColumns] | None = None
+    _sign_is_known = False
 
     def streams(self) -> list[ImuStream]:
         """Return the one IMU."""
@@ -111,14 +138,24 @@ class PhoneArchive(Recording):
         """The texts of each sensor, as they are in it."""
         if self._texts is None:
             texts = {}
+            wanted = self._with_sign()
             for kind, member in self._members().items():
-                text = TextColumns(self.path, self.wanted, self.repair)
+                text = TextColumns(self.path, wanted, self.repair)
                 text.member, text.sensor, text.from_first = member, SENSOR[kind], False
                 texts[kind] = text
             self._texts = texts
             self._without_needless_gravity(texts)
             self.wanted = self._said(texts.values())
         return self._texts
+
+    def _with_sign(self) -> ReadOptions:
+        """Options with the sign of accelerations that iOS counts the other way."""
+        platform, standard = _platform(self.path)
+        self._sign_is_known = platform in ("ios", "android")
+        if self.wanted.columns or platform != "ios" or standard:
+            return self.wanted
+        self.says.append(DOWNWARDS)
+        return replace(self.wanted, reversed=frozenset(("ax", "ay", "az")))
 
     def _without_needless_gravity(self, texts: dict[str, TextColumns]) -> None:
         """Leave gravity out where the accelerometer has it."""
@@ -136,7 +173,8 @@ class PhoneArchive(Recording):
         said = self.wanted
         for text in texts:
             one = next(iter(text.imus().values()))
-            self.says += [s for s in text.says if s not in self.says]
+            without = [UNTOLD] if self._sign_is_known else []
+            self.says += [s for s in text.says if s not in (*self.says, *without)]
             said = replace(
                 said,
                 columns=tuple(dict.fromkeys((*said.columns, *one.columns))),

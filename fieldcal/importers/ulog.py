@@ -15,7 +15,7 @@ sensor. Source: message definitions of PX4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -30,10 +30,10 @@ from fieldcal.drivers.mavlink_installed import (
     InstalledCalibration,
     parameter_names,
 )
+from fieldcal.importing.messages.ulog_fifo import FifoReader
 from fieldcal.importing.messages.ulog_messages import Table, Topic, UlogMessages
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.alignment import AlignedPair
-from fieldcal.importing.times.fifo_time import FifoTimes
 from fieldcal.importing.times.row_validator import RowValidator
 
 WHAT = "PX4 log, .ulg"
@@ -54,9 +54,6 @@ SAYS = {
 
 NOT_UPDATED = 0x7FFFFFFF
 """What accelerometer_timestamp_relative says where nothing new came."""
-
-MAX_FIFO_SAMPLES = 32
-"""Samples that a message of a FIFO has room for."""
 
 
 def recognises(head: bytes, path: Path) -> bool:
@@ -168,16 +165,12 @@ class UlogFile(Recording):
     def _pairs(self, topic: str, number: int) -> Iterator[Block]:
         mine = (topic, number)
         other = (PARTNERS[topic], self._partner(topic, number))
-        forces, rates = _reader(topic), _reader(topic)
-        reads: dict[Topic, Callable[[Table], Block]] = {
-            mine: forces,
-            other: lambda table: _as_rates(rates(table)),
-        }
         both = {mine, other} & self._log.topics
         flow = (
-            {some: reads[some](table) for some, table in tables.items()}
-            for tables in self._log.tables(both)
-        )
+            {some: _as_rates(block) if some == other else block
+             for some, block in read.items()}
+            for read in self._read_tables(both)
+        )  # fmt: skip
         if other not in both:
             yield from (block for read in flow for block in read.values())
             return
@@ -188,6 +181,16 @@ class UlogFile(Recording):
                 f"{stream} goes with {other[0]}.{other[1]}, the gyroscope of the same"
                 " device"
             )
+
+    def _read_tables(self, topics: set[Topic]) -> Iterator[dict[Topic, Block]]:
+        """Samples of sensors, each as if of an accelerometer."""
+        fifos = {some: FifoReader(_stamps) for some in topics if "fifo" in some[0]}
+        for tables in self._log.tables(topics):
+            yield {
+                some: fifos[some].read(table) if some in fifos else _sensor(table)
+                for some, table in tables.items()
+            }
+        yield {some: fifo.rest() for some, fifo in fifos.items()}
 
     def _judged(
         self, acc: Topic, gyr: Topic, flow: Iterable[Mapping[Topic, Block]]
@@ -270,38 +273,12 @@ def _integrals(table: Table) -> Block:
     return Block.of(_stamps(table) - middle, *triads)
 
 
-def _reader(topic: str) -> Callable[[Table], Block]:
-    """Function that converts the tables of a sensor to samples."""
-    if topic != "sensor_accel_fifo":
-        return _sensor
-    fifo = FifoTimes()
-    return lambda table: _unpacked(table, fifo)
-
-
 def _sensor(table: Table) -> Block:
     """Samples of one sensor, as if of an accelerometer."""
     temperature = table.get("temperature")
     return Block.of(
         _stamps(table), _axis_columns(table, "{}", "xyz"), None, temperature
     )
-
-
-def _unpacked(table: Table, fifo: FifoTimes) -> Block:
-    """Samples of the FIFO of one sensor, as if of an accelerometer."""
-    number = table["samples"].astype(int).clip(0, MAX_FIFO_SAMPLES)
-    some = number > 0
-    number = number[some]
-    if not len(number):
-        return concat([])
-    period = 1e-6 * table["dt"][some].astype(float)
-    t = fifo.times(_stamps(table)[some], number, period)
-    valid = np.arange(MAX_FIFO_SAMPLES) < number[:, None]
-    scale = np.repeat(table["scale"][some].astype(float), number)
-    axes = [
-        _axis_columns(table, f"{axis}[{{}}]", range(MAX_FIFO_SAMPLES))[some][valid]
-        for axis in "xyz"
-    ]
-    return Block.of(t, scale[:, None] * np.column_stack(axes))
 
 
 def _axis_columns(table: Table, pattern: str, parts: Iterable[object]) -> Array:

@@ -10,7 +10,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.core.sentences import join_words
 from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.times.repeats import RepeatFinder
+from fieldcal.importing.times.repeats import NO_VALUES, RepeatFinder
 from fieldcal.importing.times.row_times import FRACTIONS, RowTimes
 from fieldcal.importing.units.missing_numbers import MissingNumbers
 from fieldcal.importing.units.scales import MIN_ROWS
@@ -174,7 +174,8 @@ class ColumnReader:
         """Times (n,) of the next rows; one that was written again has the same."""
         if not (self._wanted.written_again and n):
             return self._times.of(columns, n)
-        again = self._repeats.of([*columns.values()])
+        values = [one for name, one in columns.items() if name not in NO_VALUES]
+        again = self._repeats.of(values)
         first = np.flatnonzero(~again)
         t = self._times.of({k: one[first] for k, one in columns.items()}, len(first))
         known = np.append(self._last, t)

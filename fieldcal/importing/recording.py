@@ -203,6 +203,12 @@ class Recording(ABC):
     """
 
     ends_early = lacks_gravity = False
+    first_days: tuple[int, ...] = ()
+    """Days, counted from the year 1, that its clock may count from."""
+
+    later = 0.0
+    """Added to times by its clock, s: where it counts from another day than others."""
+
     sensor = ""
     began = float("nan")
     from_first = True

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array, Block
+from fieldcal.importing import recording as recordings
 from fieldcal.importing.times.fifo_time import FifoTimes
 from fieldcal.session.folder import Session
 
@@ -124,6 +125,33 @@ def test_a_gap_in_a_fifo_is_not_filled(tmp_path: Path) -> None:
     gap = np.diff(block.t).max()
     assert gap == pytest.approx(47e-3 - 3 * 250e-6, abs=2e-6)
     assert mark(out, "imported")["gaps"] == 1
+
+
+@pytest.mark.parametrize("wrong", [900.0, 0.001])
+@pytest.mark.parametrize("size", [1 << 20, 997])
+def test_a_wrong_stamp_of_a_fifo_costs_its_own_samples_alone(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    wrong: float,
+    size: int,
+) -> None:
+    n, at = 4, 7
+    read = 1 + 1e-3 * np.arange(60)
+    read[at] = wrong
+    values = counts(1, n * len(read))
+    rows = fifo(0, 5, read, values, 0.01, n)
+    path = tmp_path / "f.ulg"
+    topic = "sensor_accel_fifo.0"
+    path.write_bytes(log({"sensor_accel_fifo": FIFO}, [topic], [r for _, r in rows]))
+    monkeypatch.setattr(recordings.Recording.pieces, "__defaults__", (size,))
+    assert main(["import", str(path), "-o", str(tmp_path / "no")]) == 2
+    assert f"row {at * n + 1}" in capsys.readouterr().err
+    assert main(["import", str(path), "-o", str(tmp_path / "s"), "--repair"]) == 0
+    block = Session.open(tmp_path / "s").block
+    mine = np.repeat(np.arange(len(read)) == at, n)
+    np.testing.assert_allclose(block.acc, values[~mine] * float(np.float32(0.01)))
+    assert block.t[-1] - block.t[0] < 0.07
 
 
 @given(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,29 @@ def test_columns_that_are_not_used_make_no_row_another(tmp_path: Path) -> None:
     heading = "arrival," + HEADING
     block = brought(tmp_path, np.column_stack([arrived, twice]), heading)
     np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("heading", [HEADING, "time,ax,ay,az,gx,gy,gz"])
+def test_a_counter_of_the_rows_as_written_makes_no_row_another(
+    tmp_path: Path, heading: str
+) -> None:
+    twice = np.repeat(ROWS, 2, axis=0)
+    rows = np.column_stack([twice, np.arange(len(twice))])
+    block = brought(tmp_path, rows, heading + ",seq")
+    np.testing.assert_allclose(block.t, ROWS[:, 0], atol=1e-9)
+    np.testing.assert_allclose(block.six, ROWS[:, 1:], atol=1e-9)
+    np.testing.assert_array_equal(np.diff(block.seq), 1)  # none is missing
+
+
+@pytest.mark.parametrize("size", [1, 7, 50])
+def test_a_counter_goes_on_behind_rows_that_were_written_again(size: int) -> None:
+    t = np.repeat(np.arange(20.0), [1, 2, 3, 1] * 5)
+    seq = np.arange(len(t)) + 5.0 * (t >= 9)
+    whole = replace(Block.of(t, np.tile(t + 1, (3, 1)).T), seq=seq)
+    judge = RowValidator("log", str, repair=False)
+    pieces = (whole[i : i + size] for i in range(0, len(t), size))
+    found = concat(judge.through(pieces)).seq
+    np.testing.assert_array_equal(np.diff(found), 1 + 5.0 * (np.arange(19) == 8))
 
 
 def test_a_few_rows_that_are_there_twice_need_no_repair(tmp_path: Path) -> None:

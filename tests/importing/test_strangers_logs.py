@@ -310,7 +310,7 @@ FORMS: dict[str, Writer] = {
         " Gz: {:.5f} | Flow: X: 0 Y: 1 | LiDAR: 812mm", ROWS
     ),
     "a zone behind a space": lambda: lines(
-        [f"{c[:-3]} +0200" for c in clock("%Y-%m-%d %H:%M:%S.%f")], A / G, W,
+        [f"{c[:-3]} +0200" for c in clock("%Y-%m-%d %H:%M:%S.%f")], -A / G, W,
         head="loggingTime(txt),"
         + ",".join(f"accelerometerAcceleration{x}(G)" for x in "XYZ") + ","
         + ",".join(f"gyroRotation{x}(rad/s)" for x in "XYZ"),

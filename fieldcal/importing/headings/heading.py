@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from shlex import quote
 from typing import NamedTuple
@@ -41,6 +41,16 @@ class Heading(NamedTuple):
     skip: str = ""
 
 
+def with_signs(columns: Iterable[str], other_way: Container[str]) -> Iterator[str]:
+    """Columns as ``--columns`` names them, with a minus where the sign is turned.
+
+    >>> list(with_signs(["t=time", "ax=f"], {"ax"}))
+    ['t=time', '-ax=f']
+    """
+    for one in columns:
+        yield f"-{one}" if one.partition("=")[0] in other_way else one
+
+
 @dataclass(frozen=True, slots=True)
 class HeadingMatch:
     """Columns of one IMU, identified by their names.
@@ -52,6 +62,7 @@ class HeadingMatch:
     name : of the IMU, "0" where there is one
     says : what the user must know of them, a sentence each
     usual : unit that rates of such names are in; "" where names tell none
+    reversed : channels whose sign is the other one, by what writes such names
 
     """
 
@@ -60,6 +71,7 @@ class HeadingMatch:
     name: str = "0"
     says: tuple[str, ...] = ()
     usual: str = ""
+    reversed: frozenset[str] = frozenset()
 
     def taken(self, wanted: ReadOptions) -> ReadOptions:
         """Return what the user says, with what the names say."""
@@ -76,11 +88,12 @@ class HeadingMatch:
             or TEMPERATURES.get(units.get("temperature") or "", ""),
             named=frozenset(by_name),
             usual=self.usual,
+            reversed=wanted.reversed | self.reversed,
         )
 
     def sentence(self, wanted: ReadOptions) -> str:
         """Say what is taken from the names, as options that do the same."""
-        text = f"--columns {quote(','.join(self.columns))}"
+        text = f"--columns {quote(','.join(with_signs(self.columns, self.reversed)))}"
         if "t" not in self.units and not wanted.rate_hz:
             text += " --rate HZ"
         for kind, (option, given) in {

@@ -20,20 +20,18 @@ from fieldcal.importing.words.heading_words import (
     REFERENCE,
     SCATTER,
     HeadingMeaning,
+    bare_axis,
     bare_label,
     heading_meaning,
     words_in_name,
 )
+from fieldcal.importing.words.telephone_names import sign_of_ios
+from fieldcal.importing.words.thermometer_words import BESIDE_THERMOMETERS, FOREIGN
 
 NOT_SAMPLES = (*SCATTER, "min", "max", "median", "bias", "offset", "cov", "filtered",
                "magnitude", "norm", "drift", "delta",
                "covariance")  # fmt: skip
 """Words of columns that are no samples of a sensor."""
-
-FOREIGN = ("baro", "barometer", "bmp", "ms", "pressure", "mag", "ambient", "air",
-           "board", "env", "cpu", "case", "gps", "room", "motor", "esc", "battery",
-           "engine", "water", "oil", "outside", "chamber")  # fmt: skip
-"""Words of thermometers that lie apart from the IMU."""
 
 G_FORCE = (("g",), ("g", "force"))
 """Words of ``gFx``: a program that writes it calls ``ax`` what has no gravity in it."""
@@ -128,11 +126,24 @@ def columns_without_axes(columns: Sequence[Column]) -> list[int]:
 def _match_thermometer_file(
     columns: Sequence[Column], named: Sequence[NamedColumn], skip: str
 ) -> tuple[HeadingMatch, ...]:
-    """Match a file that contains only times and temperatures."""
-    kinds = [n.says.kind for n in named]
-    if sorted(kinds) != ["t", "temperature"] or len(columns) != len(kinds):
+    """Match a file of times and temperatures, one of which is clearly the sensor's.
+
+    What else it holds is no axis: it is called otherwise, or is in one or two columns.
+    """
+    times = [n for n in named if n.says.kind == "t"]
+    warm = [n for n in named if n.says.kind == "temperature"]
+    near = [n for n in warm if not {*n.says.label} & {*FOREIGN}]
+    chosen = near if len(near) == 1 else warm
+    others = {*range(len(columns))} - {n.number for n in (*times, *warm)}
+    words = [words_in_name(columns[i].name) for i in others]
+    unknown = [one for one in words if not {*one} & {*BESIDE_THERMOMETERS}]
+    if not times or len(chosen) != 1 or len(unknown) >= len(AXES):
         return ()
-    return (_match(columns, named, skip, "0", ()),)
+    if any(n.says.axis for n in named) or any(map(bare_axis, unknown)):
+        return ()
+    clock = _plainest(_stamps(times), OTHER_CLOCK)
+    _, says = _thermometer(chosen, ()) if others else ([], ())
+    return (_match(columns, [*clock, *chosen], skip, "0", says),)
 
 
 def _with_temperature(
@@ -296,6 +307,12 @@ def _match(
         found.append(f"{channel}={column.place}" if column.place else channel)
         if UNITS[said.kind]:
             units["t" if said.kind == "dt" else said.kind] = said.unit
+    forces = [n for n in chosen if n.says.kind in ("a", "l")]
+    apple = [columns[n.number].name for n in forces]
+    turned, told = sign_of_ios(apple, [c.name for c in columns], units.get("a"))
+    reversed_ = frozenset(n.says.kind + n.says.axis for n in forces if turned)
+    says = (*says, told) if told else says
     axes = [words_in_name(columns[n.number].name) for n in chosen if n.says.axis]
     ros = all(any({*part} <= {*words} for part in ROS) for words in axes)
-    return HeadingMatch(tuple(found), units, name, says, "rad/s" if ros else "")
+    usual = "rad/s" if ros else ""
+    return HeadingMatch(tuple(found), units, name, says, usual, reversed_)

@@ -18,6 +18,7 @@ from fieldcal.core.samples import Block
 from fieldcal.importing.recording import Recording
 from fieldcal.importing.session.merge import (
     SeveralFiles,
+    count_from_one_day,
     stream_name,
     with_clock_times,
 )
@@ -51,8 +52,11 @@ def join_files(files: Sequence[Recording]) -> Recording:
         If there are several thermometers or IMUs in them.
 
     """
+    opened = files
     if any(part_of_force(_stem(one)) == "gravity" for one in files):
         files = _with_force(files)
+    # of what sensor a file is, is said by now
+    count_from_one_day(opened)
     heads = [_head(one, PEEKED) for one in files]
     warm = [h for h in heads if not (h.measures("acc") or h.measures("gyr"))]
     others = [h for h in heads if h not in warm]

@@ -12,6 +12,7 @@ import numpy as np
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
+from fieldcal.importing.times.clock_text import DAY
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
@@ -20,6 +21,17 @@ AS_NAMED = (
     f"that of the files as they are named, {BETWEEN:g} s apart, since their times start"
     " anew: a drift from file to file cannot be estimated"
 )
+
+
+def count_from_one_day(files: Sequence[Recording]) -> None:
+    """Let the clocks of files that say their dates count from the first one's day.
+
+    Each counts from the midnight before its own first row.
+    """
+    dated = [one for one in files if one.first_days]
+    for one in dated[1:]:
+        away = [b - a for a in dated[0].first_days for b in one.first_days]
+        one.later = DAY * min(away, key=abs)
 
 
 class SeveralFiles(Recording):
@@ -77,6 +89,7 @@ class FilesInOrder(SeveralFiles):
     def __init__(self, parts: Sequence[Recording]) -> None:
         super().__init__(parts)
         self._rows: list[int] = []
+        count_from_one_day(parts)
         for part in parts:
             # only their own zeros tell whether one clock ran through them all
             part.from_first = False

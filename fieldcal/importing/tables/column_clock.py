@@ -27,7 +27,7 @@ from fieldcal.importing.tables.column_times import (
     rate_hint,
     split_seconds,
 )
-from fieldcal.importing.times.repeats import distinct_rows
+from fieldcal.importing.times.repeats import NO_VALUES, distinct_rows
 from fieldcal.importing.times.row_times import FRACTIONS
 from fieldcal.importing.units.gravity_size import are_means
 from fieldcal.importing.units.time_units import (
@@ -155,7 +155,8 @@ class ColumnClock:
         if not 0 <= i < table.shape[1]:
             return wanted
         # of rows that were written several times, each counts once
-        wanted_too = (j for name, j in at.items() if name != columns.SKIP)
+        no_values = (columns.SKIP, *NO_VALUES)
+        wanted_too = (j for name, j in at.items() if name not in no_values)
         used = [j for j in wanted_too if j < table.shape[1]]
         once = distinct_rows(table[:, used], table[:, i])
         table = table[once]

@@ -14,7 +14,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
 from fieldcal.importing import columns
 from fieldcal.importing.headings import headings
-from fieldcal.importing.headings.heading import Heading, HeadingMatch
+from fieldcal.importing.headings.heading import Heading, HeadingMatch, with_signs
 from fieldcal.importing.recording import (
     ImuStream,
     MeanScatter,
@@ -133,7 +133,8 @@ class ColumnRecording(Recording):
         ]
         named = max((found for found, _ in ways), key=_match_quality, default=())
         way = next((w for found, w in ways if found and found is named), None)
-        if len(named) < 2 and not _is_complete(named):
+        thermometer = bool(named) and not _channels(named[0]) & {"ax", "gx"}
+        if len(named) < 2 and not (thermometer or _is_complete(named)):
             told = self._told(named, way or next((w for _, w in ways), None))
             if told is not None:
                 return {"0": told}
@@ -171,8 +172,10 @@ class ColumnRecording(Recording):
             for name, place in pairs
             if name != columns.SKIP or not place
         )
-        self.guessed["columns"] = f"{','.join(chosen)}: {told.why}"
         wanted = named[0].taken(self.wanted) if named else self.wanted
+        said = ",".join(with_signs(chosen, wanted.reversed))
+        self.guessed["columns"] = f"{said}: {told.why}"
+        self.says += [s for one in named[:1] for s in one.says if s not in self.says]
         return replace(wanted, columns=chosen)
 
     def _say_unnamed(self, named: Sequence[HeadingMatch], way: Heading | None) -> None:
@@ -237,8 +240,13 @@ def _is_complete(named: Sequence[HeadingMatch]) -> bool:
     """Whether names identify specific force, rate and time."""
     if not named:
         return False
-    known = {c.partition("=")[0] for c in named[0].columns}
+    known = _channels(named[0])
     return {"ax", "gx"} <= known and columns.has_time(known)
+
+
+def _channels(named: HeadingMatch) -> set[str]:
+    """Channels of an IMU that names identify."""
+    return {c.partition("=")[0] for c in named.columns}
 
 
 def _known(named: Sequence[HeadingMatch], way: Heading | None) -> dict[int, str]:

@@ -21,6 +21,7 @@ class TextForm(ABC):
     ----------
     names : of its columns, where its lines say them; else empty
     clock : number of the column whose clock is read, or None
+    days : that its first row may be of, where its clock has a date
     gathers : whether rows are not simply lines
     says : what the user must know, or nothing
 
@@ -28,6 +29,7 @@ class TextForm(ABC):
 
     names: tuple[str, ...] = ()
     clock: int | None = None
+    days: tuple[int, ...] = ()
     gathers = False
     says = ""
 

@@ -12,6 +12,9 @@ r"""Texts that are not plain columns, written as such: quotes, labels, times of 
     FF3A 0012                          counts in hexadecimal digits
     2024-05-03 23:59:50.123, 0.1, 0.2  times of a clock, in one column or two
 
+    0.981D+01  9.81 m/s²               numbers as Fortran writes them, or with units
+    0.01,ax,0.12                       a line for each value; points of a database
+
 Which of these a text is, its first lines tell. Each form turns lines into lines, so
 that everything behind it knows columns of numbers alone.
 """
@@ -33,13 +36,21 @@ from fieldcal.importing.text.labels import (
 )
 from fieldcal.importing.text.labview_text import LabviewText
 from fieldcal.importing.text.line_forms import CheckedLines, EchoedMessages, EndedLines
+from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.tagged_lines import TaggedLines
 from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
 from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
-from fieldcal.importing.times.clock_text import IN_LINE, ClockText, is_clock, is_date
+from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
+from fieldcal.importing.times.clock_text import (
+    IN_LINE,
+    ClockText,
+    is_clock,
+    is_date,
+    possible_days,
+)
 
 CLOCK = "utc time [s]"
 """What a column is called whose clock was read; a device's own time goes before it."""
@@ -217,7 +228,10 @@ class ClockColumn(TextForm):
             return None
         parted = separator or find_separator(lines[-1])
         if parted is None and (place := _of_two_words(lines)) is not None:
-            return cls(place, None, None, True)
+            form = cls(place, None, None, True)
+            words = (said[0] for line in lines if (said := IN_LINE.search(line)))
+            form.days = possible_days(next(words, ""))
+            return form
         rows = [split_cells(line, parted) for line in lines]
         clock = next((i for i, cell in enumerate(rows[-1]) if is_clock(cell)), None)
         if clock is None:
@@ -226,7 +240,11 @@ class ClockColumn(TextForm):
         if many <= MOSTLY * len(rows):
             return None
         day = next((i for i, cell in enumerate(rows[-1]) if is_date(cell)), None)
-        return cls(clock, day, parted, False)
+        form = cls(clock, day, parted, False)
+        wide = [row for row in rows if len(row) > max(clock, day or 0)]
+        first = next(row for row in wide if is_clock(row[clock]))
+        form.days = possible_days(first[clock], first[day] if day is not None else "")
+        return form
 
     def reader(self) -> Reader:
         """Return what reads a text of this form from its beginning."""
@@ -266,7 +284,8 @@ def _of_two_words(lines: Sequence[str]) -> int | None:
 
 FORMS: tuple[type[TextForm], ...] = (
     DataflashText, LabviewText, RateOnTop, ReceiverLines, VectorNavLines, CheckedLines,
-    EchoedMessages, EndedLines, QuotedCells, LabelledValues, BarTable, ListCells,
+    EchoedMessages, EndedLines, DatabasePoints, QuotedCells, FortranNumbers, UnitCells,
+    LongTable, LabelledValues, BarTable, ListCells,
     TaggedLines, ArrivalPrefix, HexCells, ClockColumn,
 )  # fmt: skip
 """Forms in the order in which they are looked for."""

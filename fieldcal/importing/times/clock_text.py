@@ -84,6 +84,22 @@ def _usual_form(text: str) -> str:
     return f"{said['day']}-{said['month']}-{said['year']} {said['time']}"
 
 
+def possible_days(text: str, day: str = "") -> tuple[int, ...]:
+    """Days, counted from the year 1, that a time with its date may be of; () of none.
+
+    Parameters
+    ----------
+    text : with or without a date
+    day : the date, where it has a column of its own
+
+    >>> possible_days("2024-05-03 23:59:50"), possible_days("23:59:50")
+    ((739009,), ())
+    """
+    said = _CLOCK.fullmatch(_usual_form(text))
+    written = (said["date"] if said else "") or day.strip()
+    return tuple(_possible_dates(written)) if is_date(written) else ()
+
+
 class ClockText:
     """Reads the times of one column, in the order of the file.
 

@@ -15,6 +15,10 @@ are there as often as usual, where rows were written several times: a few may be
 damaged. Of samples that came together, noise makes nearly all differ."""
 
 
+NO_VALUES = ("seq", "t_host")
+"""Channels that are no values: a row that was written twice may be counted twice."""
+
+
 def repeated_rows(table: Array) -> NDArray[np.bool_]:
     """Whether each row (n, k) has the values of the row before; nan is one of them.
 
@@ -57,6 +61,8 @@ def distinct_rows(table: Array, t: Array) -> NDArray[np.bool_]:
 def repeats(block: Block) -> NDArray[np.bool_]:
     """Whether each row has the time and the values of the row before.
 
+    A counter is no value, so two rows that differ in nothing else are the same.
+
     >>> force = np.array([[0.1, 0.2, 9.8]] * 3) + [[0.0], [0.0], [0.1]]
     >>> repeats(Block.of(np.array([1.0, 1.0, 1.0]), force)).tolist()
     [False, True, False]
@@ -64,7 +70,7 @@ def repeats(block: Block) -> NDArray[np.bool_]:
     again = np.zeros(len(block), dtype=bool)
     some = np.flatnonzero(block.t[1:] == block.t[:-1])
     if len(some):
-        values = [block.acc, block.gyr, block.temperature[:, None], block.seq[:, None]]
+        values = [block.acc, block.gyr, block.temperature[:, None]]
         again[some + 1] = repeated_rows(np.hstack(values))[some + 1]
     return again
 

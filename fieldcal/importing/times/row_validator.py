@@ -10,6 +10,7 @@ values, was written several times: it is taken once, which is said.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class RowValidator:
         self._held, self._held_row = concat([]), -1
         self._runs: list[tuple[str, str, int, int]] = []
         self._more = [0, 0]
-        self._first_repeated = -1
+        self._first_repeated, self._counted_again = -1, 0.0
         self.left_out = self.repeated = 0
 
     @property
@@ -147,14 +148,29 @@ class RowValidator:
         return whole
 
     def _without_repeats(self, block: Block, numbers: Index) -> tuple[Block, Index]:
-        """Rows, and their numbers in the file, without those that repeat the last."""
+        """Rows, and their numbers in the file, without those that repeat the last.
+
+        A counter that counted them as well is set back: no sample is missing there.
+        """
         again = repeats(block)
+        block = self._with_counter(block, again)
         if not again.any():
             return block, numbers
         if not self.repeated:
             self._first_repeated = int(numbers[np.argmax(again)])
         self.repeated += int(again.sum())
         return _rows_of(block, ~again), numbers[~again]
+
+    def _with_counter(self, block: Block, again: Rows) -> Block:
+        """Rows whose counter does not count those that repeat the last."""
+        if not np.isfinite(block.seq).any():
+            return block
+        seq = block.seq.copy()
+        # the row that was held back is set back already
+        seq[len(self._held) :] -= self._counted_again
+        counted = np.cumsum(again & (np.diff(seq, prepend=np.nan) > 0))
+        self._counted_again += float(counted[-1])
+        return replace(block, seq=seq - counted)
 
     def _leave_out(self, count: int) -> None:
         """Count bad rows; refuse them where no repair was asked for."""

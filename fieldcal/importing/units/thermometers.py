@@ -25,6 +25,19 @@ def temperature_fits(values: Array) -> Mapping[str, float]:
     return found
 
 
+USUAL = (5.0, 60.0)
+"""Temperatures of a sensor at work, deg C: of counts, other ones may be anything."""
+
+
+def is_usual_temperature(celsius: float) -> bool:
+    """Whether a temperature is that of a sensor at work.
+
+    >>> is_usual_temperature(25.3), is_usual_temperature(-24.9)
+    (True, False)
+    """
+    return USUAL[0] <= celsius <= USUAL[1]
+
+
 _THERMOMETERS = ((256.0, 25.0), (340.0, 36.53), (333.87, 21.0))
 """Counts in 1 K, and deg C at count 0, of the usual sensors."""
 

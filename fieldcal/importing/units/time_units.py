@@ -16,6 +16,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import IMPOSSIBLE_RATE_HZ, Array
 from fieldcal.importing.recording import TIME_UNITS
 from fieldcal.importing.units.scales import MIN_ROWS, MIN_ROWS_ALONE
+from fieldcal.importing.units.slow_times import turns_at_once
 
 RATES_HZ = (0.9, 8000.0)
 """What a logger of an IMU writes in a second: of 1 Hz, a clock shows a little less."""
@@ -23,6 +24,10 @@ RATES_HZ = (0.9, 8000.0)
 STATED_HZ = 0.2
 """Rate of times in a stated unit below which it is asked about, Hz: logs from 0.2 kHz
 down read less where ms are called s."""
+
+SLOW_HZ = 0.02
+"""Slowest rate of a log that is not asked about where something tells that it is one,
+Hz."""
 
 SLOWEST_HZ = 1e-3
 """Slowest rate of what anyone calls a recording, Hz: a reading in a quarter of an
@@ -64,12 +69,17 @@ def possible_time_units(t: Array) -> list[str]:
     usual = [u for u, n in TIME_SIZES.items() if low <= n / step <= high]
     if both := [u for u in usual if u in day]:
         return both
+    if slow := [u for u in day if SLOW_HZ <= TIME_SIZES[u] / step < low]:
+        # of a slow log, the time of day tells as much as a usual rate
+        return slow + usual
     span = float(steps.sum())
     return [u for u in usual if span / TIME_SIZES[u] >= MIN_RECORDING_S] or usual
 
 
-def assumed_time_unit(name: str, t: Array) -> tuple[str, str]:
+def assumed_time_unit(name: str, t: Array, acc: Array | None = None) -> tuple[str, str]:
     """Unit taken for the times (n,) of a recording, and why; "" where it is s.
+
+    Forces (n, 3) tell a slow log in s from a fast one in ms.
 
     Raises
     ------
@@ -78,6 +88,13 @@ def assumed_time_unit(name: str, t: Array) -> tuple[str, str]:
 
     """
     fits, step = possible_time_units(t), _step(t)
+    if len(fits) == 1 and step and SLOW_HZ <= 1 / step < RATES_HZ[0]:
+        size = TIME_UNITS[fits[0]]
+        if acc is not None and turns_at_once(acc, size * step):
+            why = f"in {fits[0]} it would be turned faster than anything is"
+            return "s", f"s, which makes {1 / step:.4g} Hz: {why}"
+        brief = size * float(np.nanmax(t) - np.nanmin(t)) < MIN_RECORDING_S
+        fits = ["s", *fits] if brief and 1 / step >= STATED_HZ else fits
     if len(fits) > 1:
         rates = (f"{1 / (TIME_UNITS[u] * step):.4g} Hz in {u}" for u in fits)
         raise InputError(

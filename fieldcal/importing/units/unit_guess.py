@@ -35,7 +35,11 @@ from fieldcal.importing.units.scales import (
     gain_scales,
     rounded_text,
 )
-from fieldcal.importing.units.thermometers import temperature_counts, temperature_fits
+from fieldcal.importing.units.thermometers import (
+    is_usual_temperature,
+    temperature_counts,
+    temperature_fits,
+)
 from fieldcal.importing.units.time_units import (
     assumed_time_unit,
     check_stated_times,
@@ -145,7 +149,7 @@ class _Guess:
         self._name, self.said, self._read = name, said, said
         # of means, the pauses between them say nothing
         if not (said.time_unit or said.rate_hz or are_means(block.acc)):
-            unit, why = assumed_time_unit(name, block.t)
+            unit, why = assumed_time_unit(name, block.t, block.acc)
             self.said = replace(said, time_unit=unit)
             self.found |= {"time": why} if why else {}
         elif "t" in said.named and not are_means(block.acc):
@@ -279,8 +283,10 @@ class _Guess:
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         known = values[np.isfinite(values)]
         # who writes one sensor's registers as they are, may write the other's so too
-        raw = self.said.acc_lsb != 1 and bool((known == np.round(known)).all())
-        if len(fits) != 1 or raw:
+        scaled = self.said.acc_lsb == self.said.gyr_lsb == 1
+        scaled &= self.said.acc_unit not in UNSCALED
+        raw = not scaled and bool((known == np.round(known)).all())
+        if len(fits) != 1 or raw or not is_usual_temperature(*fits.values()):
             self._ask(
                 f"its temperature reads {low:.6g} to {high:.6g}, which is no deg C",
                 [

@@ -1,0 +1,29 @@
+"""Columns whose names the file, or the form of its lines, completes."""
+
+from __future__ import annotations
+
+from fieldcal.importing.headings.heading import Column, Heading
+from fieldcal.importing.words.heading_words import heading_meaning
+
+AXES = ("x", "y", "z")
+
+
+def of_sensor(sensor: str, column: Column) -> Column:
+    """Column of which a bare axis, whose unit does not say it, is the sensor's."""
+    bare = column.name.strip().strip('"').strip()
+    axis = bare[:1].lower() in AXES and not bare[1:2].isalpha()
+    said = heading_meaning(bare, column.unit)
+    told = said is not None and bool(said.kind)
+    if said is not None and said.kind == "v" and sensor == "acc":
+        # of a file of gravity, which is part of the force
+        return Column(column.place, f"{sensor} {said.axis}", said.unit or "")
+    return column._replace(name=f"{sensor} {bare}" if axis and not told else bare)
+
+
+def with_clock_column(heading: Heading, clock: int, name: str) -> Heading:
+    """A heading with the name of the column of which the clock was read."""
+    named = [
+        Column("", name) if i == clock else column
+        for i, column in enumerate(heading.columns)
+    ]
+    return Heading(named, heading.skip)

@@ -27,7 +27,8 @@ if its values are rounded a little."""
 def dead_bands(block: Block) -> Array:
     """Size below which each output is zero, (6,) m/s^2 and rad/s; 0 without a band.
 
-    Samples that are zero on all axes of a sensor were lost, and are ignored.
+    Samples that are zero on all six channels were lost, and are ignored. So are those
+    of accelerometers that are zero on all axes: at rest they feel gravity.
 
     >>> swings = np.sin(np.arange(200.0))[:, None] * [1.0, 2.0, 3.0]
     >>> held = np.where(np.abs(swings) < 0.2, 0.0, swings)
@@ -35,12 +36,13 @@ def dead_bands(block: Block) -> Array:
     >>> dead_bands(block).round(1).tolist()
     [0.0, 0.0, 0.0, 0.2, 0.2, 0.2]
     """
-    return np.concatenate([_bands(block.acc), _bands(block.gyr)])
+    felt = (block.acc != 0).any(axis=1)
+    there = (block.six != 0).any(axis=1)
+    return np.concatenate([_bands(block.acc[felt]), _bands(block.gyr[there])])
 
 
 def _bands(triad: Array) -> Array:
-    some = np.isfinite(triad).all(axis=1) & (triad != 0).any(axis=1)
-    size = np.abs(triad[some])
+    size = np.abs(triad[np.isfinite(triad).all(axis=1)])
     least = np.where(size > 0, size, np.inf).min(axis=0, initial=np.inf)
     first, last = (factor * least for factor in BEYOND)
     zeros = np.count_nonzero(size == 0, axis=0)

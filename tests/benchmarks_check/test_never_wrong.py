@@ -125,6 +125,7 @@ def test_faces_of_which_no_output_tells_anything_are_no_fault(
         (90_000_036, (), 4.3),  # a kink at zero beside a K2 that is determined
         (92_004_008, ("sway",), 3.6),  # attitudes at the ends of turns
         (98_220_007, ("dead band",), 6.0),  # means of values that were set to zero
+        (75_100_475, ("dead band",), 27.5),  # the same of gyroscopes at rest
     ],
 )
 def test_what_is_off_is_in_the_uncertainties(

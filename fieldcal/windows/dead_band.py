@@ -36,20 +36,24 @@ def dead_bands(block: Block) -> Array:
     >>> dead_bands(block).round(1).tolist()
     [0.0, 0.0, 0.0, 0.2, 0.2, 0.2]
     """
-    felt = (block.acc != 0).any(axis=1)
-    there = (block.six != 0).any(axis=1)
-    return np.concatenate([_bands(block.acc[felt]), _bands(block.gyr[there])])
+    found = np.array([_nearest_value(v) for v in (*block.acc.T, *block.gyr.T)])
+    if found.any():
+        felt = (block.acc != 0).any(axis=1)
+        there = felt | (block.gyr != 0).any(axis=1)
+        zeros = [(t == 0).sum(axis=0) for t in (block.acc[felt], block.gyr[there])]
+        found[np.concatenate(zeros) < MIN_SAMPLES] = 0.0
+    return found
 
 
-def _bands(triad: Array) -> Array:
-    size = np.abs(triad[np.isfinite(triad).all(axis=1)])
-    least = np.where(size > 0, size, np.inf).min(axis=0, initial=np.inf)
+def _nearest_value(values: Array) -> float:
+    """Size of the value nearest to zero, if an output (n,) may have a band; else 0."""
+    if np.count_nonzero(values == 0) < MIN_SAMPLES:
+        return 0.0
+    size = np.abs(values)
+    least = float(size.min(where=size > 0, initial=np.inf))
     first, last = (factor * least for factor in BEYOND)
-    zeros = np.count_nonzero(size == 0, axis=0)
-    beyond = np.count_nonzero((size > first) & (size < last), axis=0)
-    there = (zeros >= MIN_SAMPLES) & (beyond >= MIN_SAMPLES)
-    out: Array = np.where(there & np.isfinite(least), least, 0.0)
-    return out
+    beyond = np.count_nonzero((size > first) & (size < last))
+    return least if beyond >= MIN_SAMPLES else 0.0
 
 
 def error_of_means(mean: Array, band: Array) -> Array:

@@ -70,3 +70,4 @@ def test_that_the_service_was_not_reached_is_said_until_it_is_again(
         screen.until(f"{said}.includes('not reached')")
         screen.value("window.fetch = window.kept; look(); 1")
         screen.until(f"{said} === ''")
+        assert not screen.text("said")

@@ -117,10 +117,6 @@ def _with_force(files: Sequence[Recording]) -> list[Recording]:
 class SummedFiles(SeveralFiles):
     """A file of accelerations without gravity, and one of gravity."""
 
-    def place(self, row: int) -> str:
-        """Name a sample as the file of accelerations does."""
-        return self._parts[0].place(row)
-
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples of the specific force.
 
@@ -142,10 +138,7 @@ class SummedFiles(SeveralFiles):
             if np.isnan(begin) and len(block):
                 begin = self.began = float(block.t[0])
             yield replace(block, t=block.t - begin) if self.from_first else block
-        for judge, one in zip(judges, both, strict=True):
-            one.mended += [f"{one.path.name}: {said}" for said in judge.mended]
-            one.says += [f"{one.path.name}: {said}" for said in judge.says]
-        self._tell(both)
+        self._tell_judged(judges, both)
         if total.none:
             raise InputError(
                 f"{both[1].path}: no sample is at a time at which {both[0].path.name}"
@@ -156,10 +149,6 @@ class SummedFiles(SeveralFiles):
 
 class WarmedFiles(SeveralFiles):
     """Files of an IMU, joined, and that of a thermometer with times of its own."""
-
-    def place(self, row: int) -> str:
-        """Name a sample as the file of the IMU does."""
-        return self._parts[0].place(row)
 
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples with the temperature at their times.

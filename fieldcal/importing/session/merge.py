@@ -13,6 +13,7 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block, concat
 from fieldcal.importing.recording import ImuStream, Recording
 from fieldcal.importing.times.clock_text import DAY
+from fieldcal.importing.times.row_validator import RowValidator
 
 BETWEEN = 10.0
 """Time taken to have passed between two files of which no clock tells, s."""
@@ -75,6 +76,19 @@ class SeveralFiles(Recording):
     def files(self) -> list[Path]:
         """The files that it is read from."""
         return [path for part in self.parts for path in part.files()]
+
+    def place(self, row: int) -> str:
+        """Name a sample as the first file does."""
+        return self._parts[0].place(row)
+
+    def _tell_judged(
+        self, judges: Sequence[RowValidator], parts: Sequence[Recording]
+    ) -> None:
+        """Say also what was found of the times of each file, by its name."""
+        for judge, part in zip(judges, parts, strict=True):
+            part.mended += [f"{part.path.name}: {said}" for said in judge.mended]
+            part.says += [f"{part.path.name}: {said}" for said in judge.says]
+        self._tell(parts)
 
     def _tell(self, parts: Iterable[Recording]) -> None:
         """Say what the files said while they were read, each sentence once."""

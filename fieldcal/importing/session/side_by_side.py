@@ -25,10 +25,6 @@ PEEKED = 64
 class MergedFiles(SeveralFiles):
     """Files of the same time, each with other channels."""
 
-    def place(self, row: int) -> str:
-        """Name a sample as the first file does."""
-        return self._parts[0].place(row)
-
     def blocks(self, stream: str) -> Iterator[Block]:
         """Samples with the channels of every file.
 
@@ -77,10 +73,7 @@ class MergedFiles(SeveralFiles):
                 begin = self.began = float(block.t[0])
             together = together or bool(np.isfinite(block.gyr).any())
             yield replace(block, t=block.t - begin)
-        for judge, one in zip(judges, both, strict=True):
-            one.mended += [f"{one.path.name}: {said}" for said in judge.mended]
-            one.says += [f"{one.path.name}: {said}" for said in judge.says]
-        self._tell(both)
+        self._tell_judged(judges, both)
         if not together:
             raise InputError(
                 f"{gyr.path}: no sample is at a time at which {acc.path.name} has one;"

@@ -11,7 +11,12 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Self
 
-from fieldcal.importing.text.text_form import Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_form import (
+    Reader,
+    TextForm,
+    is_true_of_most,
+    take_row,
+)
 from fieldcal.importing.text.text_top import find_separator, is_number, split_cells
 from fieldcal.importing.times.clock_text import is_clock
 from fieldcal.importing.words.heading_words import heading_meaning
@@ -75,20 +80,15 @@ class LongTable(TextForm):
                     continue
                 time, name, value = cells
                 if row and (row[TIME] != time or name in row):
-                    found.append(self._row(row))
+                    found.append(take_row(row, self.names, self._separator))
                 row[TIME] = time
                 if name in self.names:
                     row[name] = value
             if not lines and row:
-                found.append(self._row(row))
+                found.append(take_row(row, self.names, self._separator))
             return found
 
         return read
-
-    def _row(self, row: dict[str, str]) -> str:
-        text = self._separator.join(row.get(name, "") for name in self.names)
-        row.clear()
-        return text
 
 
 def _is_value(row: Sequence[str]) -> bool:

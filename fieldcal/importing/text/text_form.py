@@ -53,3 +53,15 @@ class TextForm(ABC):
 def is_true_of_most(lines: Sequence[str], is_so: Callable[[str], bool]) -> bool:
     """Whether a condition is true of most lines."""
     return sum(map(is_so, lines)) > MOSTLY * len(lines)
+
+
+def take_row(row: dict[str, str], names: Sequence[str], separator: str) -> str:
+    """Text of the values that were gathered for a row, which is empty then.
+
+    >>> row = {"ax": "0.1", "t": "3"}
+    >>> take_row(row, ("t", "ax", "ay"), ","), row
+    ('3,0.1,', {})
+    """
+    text = separator.join(row.get(name, "") for name in names)
+    row.clear()
+    return text

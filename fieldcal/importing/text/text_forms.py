@@ -40,7 +40,13 @@ from fieldcal.importing.text.long_tables import DatabasePoints, LongTable
 from fieldcal.importing.text.rate_on_top import RateOnTop
 from fieldcal.importing.text.receiver_lines import ReceiverLines
 from fieldcal.importing.text.tagged_lines import TaggedLines
-from fieldcal.importing.text.text_form import MOSTLY, Reader, TextForm, is_true_of_most
+from fieldcal.importing.text.text_form import (
+    MOSTLY,
+    Reader,
+    TextForm,
+    is_true_of_most,
+    take_row,
+)
 from fieldcal.importing.text.text_top import find_separator, split_cells
 from fieldcal.importing.text.vectornav_lines import VectorNavLines
 from fieldcal.importing.text.written_numbers import FortranNumbers, UnitCells
@@ -156,19 +162,14 @@ class LabelledValues(TextForm):
                     # no row: whoever reads rows says so
                     found.append(line)
                 if (row.keys() & values.keys()) - CLOCKS:
-                    found.append(self._row(row))
+                    found.append(take_row(row, self.names, self._separator))
                 # a row has the time of its first line
                 row.update({k: v for k, v in values.items() if k not in row})
                 if len(row) == len(self.names):
-                    found.append(self._row(row))
+                    found.append(take_row(row, self.names, self._separator))
             return found
 
         return read
-
-    def _row(self, row: dict[str, str]) -> str:
-        text = self._separator.join(row.get(name, "") for name in self.names)
-        row.clear()
-        return text
 
 
 class ArrivalPrefix(TextForm):

@@ -7,6 +7,7 @@ white samples of deviation s is s / sqrt(n); s is measured in the recording (`no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
@@ -175,13 +176,7 @@ def reduce_to_rows(
         noise,
         np.repeat(shaken.variance, rows, axis=0),
     )
-    rounded = rounding_sigma(block, windows[held])
-    alike = shared_rounding_sigma(block, windows[held], rounded)
-    off = np.repeat(rounded, rows, axis=0)
-    # what a band hides of a gyroscope at rest is the same in each window
-    hidden = error_of_means(out.y, dead_bands(block))
-    off[:, :3] = np.hypot(off[:, :3], hidden[:, :3])
-    alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
+    off, alike = _errors_of_values(block, windows[held], out.y, rows)
     if source.sway_variance is not None:
         off = np.hypot(off, np.sqrt(source.sway_variance[out.x.position]))
     # the direction of the Earth's rate is unknown in device axes, except in a device
@@ -195,6 +190,32 @@ def reduce_to_rows(
         out.sd[ends, :3] = np.nan
         out.sd[~ends, 3:] = np.nan
     return replace(out, window_error=off, session_error=alike)
+
+
+def _errors_of_values(
+    block: Block, windows: NDArray[np.intp], y: Array, rows: Sequence[int]
+) -> tuple[Array, Array]:
+    """Errors by rounding and dead bands, which no average makes smaller.
+
+    Parameters
+    ----------
+    windows, rows : (w, 2) samples of each window, and its number of rows
+    y : (n, 6) means of the rows
+
+    Returns
+    -------
+    Standard deviations of what all rows of a window share, (n, 6), and of what all
+    windows share, (6,).
+
+    """
+    rounded = rounding_sigma(block, windows)
+    alike = shared_rounding_sigma(block, windows, rounded)
+    off = np.repeat(rounded, rows, axis=0)
+    hidden = error_of_means(y, dead_bands(block))
+    off[:, :3] = np.hypot(off[:, :3], hidden[:, :3])
+    # what a band hides of a gyroscope at rest is the same in each window
+    alike[3:] = np.hypot(alike[3:], hidden[:, 3:].max(axis=0, initial=0.0))
+    return off, alike
 
 
 def average_rows(

@@ -53,6 +53,11 @@ def latitude_unsaid(written: Written, bench: Bench, rng: Rng) -> Written:
     return _site(written, latitude_deg=None, height_m=None)
 
 
+def only_gravity_said(written: Written, bench: Bench, rng: Rng) -> Written:
+    """Gravity is stated as surveyed, and not where the bench is."""
+    return _site(written, latitude_deg=None, height_m=None, gravity=bench.gravity)
+
+
 def other_hemisphere(written: Written, bench: Bench, rng: Rng) -> Written:
     """The latitude has the wrong sign."""
     return _site(written, latitude_deg=-bench.latitude)
@@ -195,6 +200,7 @@ SAID: dict[str, After] = {
     "windows begun early": begun_early,
     "windows ended late": ended_late,
     "latitude not said": latitude_unsaid,
+    "only gravity said": only_gravity_said,
     "other hemisphere": other_hemisphere,
     "level and angles not said": level_unsaid,
     "mounting not said": default_mounting,

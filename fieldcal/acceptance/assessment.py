@@ -23,7 +23,11 @@ from fieldcal.acceptance.family_at_temperature import (
 )
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.mean_removal import removed_bias_sentences
-from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
+from fieldcal.acceptance.site import (
+    gravity_contradiction,
+    gravity_missing_warning,
+    latitude_missing_warning,
+)
 from fieldcal.acceptance.temperature import effect_of_temperature_change
 from fieldcal.acceptance.verification import Verification, planned_verification, verify
 from fieldcal.calibration import Calibration
@@ -115,6 +119,8 @@ def with_faults(
     """
     about, of_acc = session.about, "acc_scale" in calibration.groups
     unknown = [gravity_missing_warning(about)] if of_acc else []
+    if "gyr_bias" in calibration.groups:
+        unknown.append(latitude_missing_warning(about))
     wrong = [gravity_contradiction(about)] if of_acc else []
     wrong += [
         _undetermined_by_omission(calibration, session, windows, limits),

@@ -27,7 +27,11 @@ from fieldcal.acceptance.harmless import harmless_scatter_note
 from fieldcal.acceptance.jump import bias_jump_warning
 from fieldcal.acceptance.level import check_level
 from fieldcal.acceptance.remedy import Remedy, cheapest_remedy
-from fieldcal.acceptance.site import gravity_contradiction, gravity_missing_warning
+from fieldcal.acceptance.site import (
+    gravity_contradiction,
+    gravity_missing_warning,
+    latitude_missing_warning,
+)
 from fieldcal.acceptance.turn_agreement import turn_disagreement
 from fieldcal.acceptance.uncertainty import UNCERTAINTY, check_uncertainty
 from fieldcal.acceptance.verification import Verification
@@ -294,10 +298,12 @@ def _first_warning(calibration: Calibration) -> str:
 
 
 def _site_checks(calibration: Calibration, about: Description) -> list[Check]:
-    """Check whether gravity is known: the scale factors refer to it."""
-    if "acc_scale" not in calibration.groups:
-        return []
-    wrong = gravity_missing_warning(about) or gravity_contradiction(about)
+    """Check whether what calibrates the sensors is known: gravity, the Earth's rate."""
+    wrong = ""
+    if "acc_scale" in calibration.groups:
+        wrong = gravity_missing_warning(about) or gravity_contradiction(about)
+    if not wrong and "gyr_bias" in calibration.groups:
+        wrong = latitude_missing_warning(about)
     return [Check("site", False, wrong)] if wrong else []
 
 

@@ -1,4 +1,4 @@
-"""Whether gravity at the site is known: scale factors refer to it.
+"""Whether gravity and the Earth's rate at the site are known, as references.
 
 From the equator to a pole gravity grows by half a percent, more than most scale factors
 are off. The samples do not show the latitude, since a common scale factor of all three
@@ -10,6 +10,7 @@ between the sea and the highest villages.
 
 from __future__ import annotations
 
+from fieldcal.core.frames import EARTH_RATE
 from fieldcal.core.gravity import normal_gravity
 from fieldcal.session.description import Description
 
@@ -33,10 +34,22 @@ def gravity_missing_warning(about: Description) -> str:
     )
 
 
+def latitude_missing_warning(about: Description) -> str:
+    """Sentence with the remedy if gyroscopes need a latitude; else empty."""
+    if about.grade != "navigation" or about.latitude_deg is not None:
+        return ""
+    return (
+        "the latitude is not stated: gyroscopes of navigation grade are calibrated by"
+        f" the Earth's rate, and their biases contain up to {EARTH_RATE:.1e} rad/s of"
+        " it: state it (--latitude; afterwards latitude_deg in [site] of"
+        " session.toml)"
+    )
+
+
 def site_remedy(about: Description) -> str:
     """Remedy if the site is not fully stated, as part of a sentence; else empty."""
     site = about.raw.get("site", {})
-    if "latitude_deg" not in site:
+    if about.latitude_deg is None:
         return "; the stated gravity is not checked: state the site (--latitude)"
     return "" if "height_m" in site else "; state the height of the site (--height)"
 
@@ -51,7 +64,7 @@ def gravity_contradiction(about: Description) -> str:
         normal_gravity(90.0),
         "anywhere on Earth",
     )
-    if "latitude_deg" in site:
+    if about.latitude_deg is not None:
         height = site.get("height_m")
         high, low = (VILLAGES, 0.0) if height is None else (height, height)
         most = normal_gravity(about.latitude_deg, low)

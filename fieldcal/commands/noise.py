@@ -169,7 +169,7 @@ def noise_result(
     recalibrate, since = _recalibration_times(model, allowed, serial, history)
     gyroscopes = [c.averaging for n, c in model.channels.items() if n[0] == "g"]
     compass = None
-    if grade == "navigation" and gyroscopes:
+    if grade == "navigation" and gyroscopes and about.latitude_deg is not None:
         compass = gyrocompass_heading(gyroscopes, about.latitude)
     device = {k: str(about.device[k]) for k in ("name", "serial") if k in about.device}
     return NoiseResult(

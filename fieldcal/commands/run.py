@@ -307,11 +307,15 @@ def _missing_statements(task: PlanTask) -> list[str]:
     from fieldcal import procedures
     from fieldcal.acceptance.angles import unstated_angles_warning
     from fieldcal.acceptance.level import level_warning_before_run
-    from fieldcal.acceptance.site import gravity_missing_warning
+    from fieldcal.acceptance.site import (
+        gravity_missing_warning,
+        latitude_missing_warning,
+    )
 
     unsaid = [unstated_angles_warning(task.about)]
     if procedures.max_positions(task.about, task.procedure) is None:
         unsaid.append(level_warning_before_run(task.about))
+    unsaid.append(latitude_missing_warning(task.about))
     unsaid.append(gravity_missing_warning(task.about))  # the most important one last
     return [sentence for sentence in unsaid if sentence]
 

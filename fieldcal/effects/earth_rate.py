@@ -15,6 +15,9 @@ array([[ 0.   , -7.292,  0.   ]])
 
 from __future__ import annotations
 
+import numpy as np
+
+from fieldcal.core.errors import InputError
 from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.physics.effect import Motion, Values
 from fieldcal.physics.experience import Experience
@@ -33,6 +36,18 @@ class EarthRate(Motion):
     order = -1
 
     def change(self, x: Experience, values: Values) -> Experience:
-        """Add the Earth's rate to what turns with the device."""
+        """Add the Earth's rate to what turns with the device.
+
+        Raises
+        ------
+        InputError
+            If the latitude is not known.
+
+        """
+        if np.isnan(x.latitude):
+            raise InputError(
+                "[model] has earth_rate, and the latitude is not stated: add"
+                " latitude_deg to [site] of session.toml"
+            )
         rate = earth_rate_at_home(x.latitude) + x.transport
         return x.turned(base_rate=rate)  # (39)

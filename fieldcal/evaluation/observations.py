@@ -53,7 +53,7 @@ def build_observations(
         [about.positions[i] for i in numbers],
         averages,
         about.gravity,
-        latitude=about.latitude,
+        latitude=None if about.latitude_deg is None else about.latitude,
         base_motion=about.base_motion,
         mounting=about.mounting,
         grade=about.grade,

@@ -80,7 +80,7 @@ def run_setup(about: Description, used: list[int]) -> tuple[RunSetup, Array]:
     """
     if not about.positions or not all(p.oriented for p in about.positions):
         raise InputError("session.toml: give each [[position]] the attitude of its run")
-    if "latitude_deg" not in about.raw.get("site", {}):
+    if about.latitude_deg is None:
         raise InputError("[site] latitude_deg is lacking: a navigator turns with Earth")
     table = about.raw.get("navigator", {})
     azimuth = np.deg2rad(float(table.get("azimuth_deg", 0.0)))

@@ -36,7 +36,8 @@ class NoiseResult:
     model : the processes
     recalibrate : when each channel's bias leaves its limit
     since : start of that time, ISO 8601
-    alignment : gyrocompassing; None unless the gyroscopes are of navigation grade
+    alignment : gyrocompassing; None unless the gyroscopes are of navigation grade, and
+        the latitude is stated
 
     """
 

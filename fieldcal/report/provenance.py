@@ -22,6 +22,7 @@ from fieldcal.report.blocks import (
     table,
 )
 from fieldcal.report.gather import ReportMaterial
+from fieldcal.session.description import Description
 from fieldcal.session.folder import DESCRIPTION
 
 OWN = ("report.html", "report.png", "report.pdf")
@@ -41,7 +42,7 @@ def provenance_section(material: ReportMaterial, made: datetime) -> Section:
         ("software", f"fieldcal {__version__}"),
         *([("calibrated by", by)] if by else []),
         ("libraries", _libraries()),
-        ("latitude, height", f"{about.latitude_deg:g}°, {about.height_m:g} m"),
+        ("latitude, height", f"{_latitude(about)}, {about.height_m:g} m"),
         ("gravity", f"{about.gravity:.5f} m/s²"),
         ("mounting", ", ".join(about.axes)),
         ("grade", about.grade),
@@ -53,6 +54,10 @@ def provenance_section(material: ReportMaterial, made: datetime) -> Section:
     text = (session.folder / DESCRIPTION).read_text(encoding="utf-8")
     blocks.append(Collapsible(DESCRIPTION, (FileText(text),)))
     return Section("provenance", "Provenance", tuple(blocks))
+
+
+def _latitude(about: Description) -> str:
+    return "not stated" if about.latitude_deg is None else f"{about.latitude_deg:g}°"
 
 
 def _libraries() -> str:

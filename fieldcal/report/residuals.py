@@ -18,7 +18,6 @@ import numpy as np
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.frames import (
-    EARTH_RATE,
     angles_of_force_direction,
     axis_projections,
     direction_cosines,
@@ -32,6 +31,7 @@ from fieldcal.evaluation.observations import build_observations
 from fieldcal.model.causes.planned import state_of
 from fieldcal.physics.experience import Experience
 from fieldcal.report.gather import ReportMaterial
+from fieldcal.solve.base_rate import known_earth_rate
 from fieldcal.solve.observations import Observations
 
 
@@ -104,23 +104,23 @@ def predicted_outputs(found: Calibration, seen: Observations) -> Array:
 def _estimate_earth_rate(seen: Observations, left: Array) -> Array:
     """Estimate the Earth's rate in the windows, (n, 3) rad/s, device axes."""
     known = seen.oriented & np.isfinite(left).all(axis=1)
-    if seen.latitude is None or not known.any():
+    if not known.any():
         return np.zeros((len(seen), 3))
     away = np.zeros((len(seen), 3, 3))
     turns = (*seen.angles, gamma_angles(seen.positions))
     away[known] = axis_projections(seen.rates[known]) @ (
         seen.mounting.T @ direction_cosines(*(angle[known] for angle in turns))
     )
-    home = earth_rate_at_home(seen.latitude) + seen.base_motion.rate
-    down = away[..., 1] * home[1]
-    level = away[known][..., [0, 2]].reshape(-1, 2)
-    # a prior of the size it can have keeps few windows from explaining anything with it
-    size = EARTH_RATE * np.cos(seen.latitude)
+    home, sigma = known_earth_rate(seen.latitude, False, None, seen.base_motion)
+    size = np.array(sigma)
+    free = np.flatnonzero(size)
     noise = np.sqrt(np.einsum("nii->ni", seen.covariance)[known][:, 3:]).ravel()
-    rows = np.vstack([level / noise[:, None], np.eye(2) / size])
-    target = np.concatenate([(left - down)[known].ravel() / noise, np.zeros(2)])
-    fitted = np.linalg.lstsq(rows, target, rcond=None)[0]
-    earth: Array = down + away[..., [0, 2]] @ fitted
+    unknown = away[known][..., free].reshape(-1, len(free)) / noise[:, None]
+    # a prior of the size it can have keeps few windows from explaining anything with it
+    rows = np.vstack([unknown, np.diag(1 / size[free])])
+    target = (left - away @ home)[known].ravel() / noise
+    fitted = np.linalg.lstsq(rows, np.append(target, np.zeros(len(free))), rcond=None)
+    earth: Array = away @ home + away[..., free] @ fitted[0]
     return earth
 
 

@@ -27,11 +27,11 @@ from fieldcal.core.frames import (
     specific_force_at_home,
 )
 from fieldcal.core.grade import Grade
-from fieldcal.core.gravity import normal_gravity
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
 from fieldcal.session.position_tables import excluded_spans, parse_positions
 from fieldcal.session.schemas import schema_fault, validator
+from fieldcal.session.site import Site, velocity
 from fieldcal.session.units import UNITS, full_scales, output_gauge, parse_nominal
 
 FORMAT_VERSION = 1
@@ -50,7 +50,8 @@ class Description:
     rate_hz : nominal sampling rate, None where unknown
     units : of "acceleration" and "angular_rate" in the samples
     limits : full scale of the same two, in SI; absent where unknown
-    latitude_deg, height_m, gravity : the site; gravity in m/s^2, less the vertical
+    latitude_deg, height_m, gravity : the site; latitude_deg is None if it is not
+        stated, and gravity then that of 45 degrees; gravity in m/s^2, less the vertical
         force due to the motion of the base
     base_motion : rate and force due to the motion of the base; without navigation grade
         the heading is unknown, and only the parts about and along the vertical are kept
@@ -80,7 +81,7 @@ class Description:
     rate_hz: float | None
     units: Mapping[str, str]
     limits: Mapping[str, float]
-    latitude_deg: float
+    latitude_deg: float | None
     height_m: float
     gravity: float
     base_motion: BaseMotion
@@ -107,13 +108,14 @@ class Description:
 
     @property
     def latitude(self) -> float:
-        """Latitude in rad."""
-        return float(np.deg2rad(self.latitude_deg))
+        """Latitude in rad; nan if it is not stated."""
+        stated = np.nan if self.latitude_deg is None else self.latitude_deg
+        return float(np.deg2rad(stated))
 
     @property
     def velocity(self) -> tuple[float, float]:
         """Velocity of the base towards north and east, m/s."""
-        return _velocity(self.raw.get("site", {}))
+        return velocity(self.raw.get("site", {}))
 
     @property
     def base_force(self) -> Array:
@@ -126,9 +128,14 @@ class Description:
 
     @property
     def base_rate(self) -> Array:
-        """Rate of the base in base axes, (3,) rad/s; 0 unless of navigation grade."""
+        """Known rate of the base in base axes, (3,) rad/s.
+
+        Zero unless the grade is navigation and the latitude is stated.
+        """
+        if self.grade != "navigation" or self.latitude_deg is None:
+            return np.zeros(3)
         rate: Array = earth_rate_at_home(self.latitude) + self.base_motion.rate
-        return rate * (self.grade == "navigation")
+        return rate
 
     @property
     def gravity_stated(self) -> bool:
@@ -249,11 +256,9 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
     """
     if wrong := schema_fault(raw, validator("session")):
         raise InputError(wrong)
-    device, site = raw.get("device", {}), raw.get("site", {})
+    device, table = raw.get("device", {}), raw.get("site", {})
     given = raw.get("units", {})
     units = {k: given.get(k, next(iter(known))) for k, known in UNITS.items()}
-    latitude = float(site.get("latitude_deg", 45.0))
-    height = float(site.get("height_m", 0.0))
     positions, windows = parse_positions(raw.get("position", ()))
     axes = raw.get("frame", {}).get("mounting", ("+x", "+y", "+z"))
     mounting_matrix(axes)
@@ -261,10 +266,9 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
     gauge = output_gauge(units, usual)
     nominal = {n: v / gauge.size[n.startswith("gyr")] for n, v in usual.items()}
     grade: Grade = device.get("grade", "tactical")
-    moving = BaseMotion.from_velocity(
-        *_velocity(site), float(np.deg2rad(latitude)), height
-    )
-    level = _optional_float(site.get("level_deg"))
+    site = Site.of(table)
+    moving = site.motion
+    level = _optional_float(table.get("level_deg"))
     if grade != "navigation" and level is not None:
         level = float(np.hypot(level, np.rad2deg(moving.force_tilt)))
     return Description(
@@ -273,13 +277,12 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
         rate_hz=_optional_float(raw.get("sampling", {}).get("rate_hz")),
         units=units,
         limits=full_scales(raw.get("range", {}), units, gauge),
-        latitude_deg=latitude,
-        height_m=height,
-        gravity=float(site.get("gravity") or normal_gravity(latitude, height))
-        - float(moving.force[1]),
+        latitude_deg=site.latitude_deg,
+        height_m=site.height_m,
+        gravity=site.gravity,
         base_motion=moving if grade == "navigation" else moving.vertical_part,
         level_deg=level,
-        angle_setting_deg=_optional_float(site.get("angle_setting_deg")),
+        angle_setting_deg=_optional_float(table.get("angle_setting_deg")),
         **{name: _optional_float(device.get(name)) for name in FACTORY_KEYS},
         axes=tuple(axes),
         nominal=nominal,
@@ -307,11 +310,6 @@ def with_added_positions(
     return parse_description(
         {**about.raw, "position": [*about.raw.get("position", ()), *more]}
     )
-
-
-def _velocity(site: Mapping[str, Any]) -> tuple[float, float]:
-    """Velocity towards north and east, m/s."""
-    return float(site.get("north_m_s", 0.0)), float(site.get("east_m_s", 0.0))
 
 
 def _optional_float(value: float | None) -> float | None:

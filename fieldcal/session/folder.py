@@ -109,7 +109,7 @@ class Session:
 
     @property
     def latitude(self) -> float:
-        """Latitude, rad."""
+        """Latitude, rad; nan if it is not stated."""
         return self.about.latitude
 
     @property

@@ -32,7 +32,7 @@ Geodesy, 4th edition: free-air anomalies of 30 mGal)."""
 def gravity_sigma(about: Description) -> float:
     """Standard deviation of the stated gravity, m/s^2."""
     site = about.raw.get("site", {})
-    if "latitude_deg" not in site:
+    if about.latitude_deg is None:
         return float(UNKNOWN_PLACE_SIGMA)
     if "height_m" not in site:
         fall = normal_gravity(about.latitude_deg) - normal_gravity(

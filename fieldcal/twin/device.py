@@ -29,6 +29,7 @@ from fieldcal.model.state import State, Term
 from fieldcal.physics.effect import Chain, Effect, Scatter
 from fieldcal.physics.recording import lsb_of
 from fieldcal.session.description import Description
+from fieldcal.session.site import MIDDLE_LATITUDE_DEG
 from fieldcal.sim_device import vocabulary
 from fieldcal.sim_device.effect import SimulatedEffect
 from fieldcal.sim_device.profile import (
@@ -74,13 +75,20 @@ def twin_profile(
         effects += line_effects(tone, start)
     for one in found.effects:
         effects += effects_on_samples(explanation, one, start)
-    return device_profile(explanation, known.state, _without_repeats(effects))
+    effects = _without_repeats(effects)
+    return device_profile(explanation, known.state, effects, known.latitude)
 
 
 def device_profile(
-    explanation: Explanation, state: State, effects: list[SimulatedEffect]
+    explanation: Explanation,
+    state: State,
+    effects: list[SimulatedEffect],
+    latitude: float,
 ) -> Profile:
-    """Profile of a device with the calibration of a state and some effects."""
+    """Profile of a device with the calibration of a state and some effects.
+
+    The latitude is in rad; nan if nobody knows it, and nothing depends on it.
+    """
     source = explanation.prepared.source
     about = source.about
     bias, loud = state.bias.copy(), 0.0
@@ -99,7 +107,7 @@ def device_profile(
         ),
         sampling=Sampling(float(f"{sampling_rate(source.block):.9g}")),
         site=Site(
-            about.latitude_deg,
+            MIDDLE_LATITUDE_DEG if np.isnan(latitude) else float(np.rad2deg(latitude)),
             about.height_m,
             about.gravity + float(about.base_motion.force[1]),
             *about.velocity,

@@ -1,8 +1,9 @@
 """Makes the fitted state one that a device can have.
 
 In the model the rate of the base is three free parameters e. A device measures the
-Earth's rate at its latitude, rotated about the vertical by its heading, or none. Given
-that rate e', the other estimates become
+Earth's rate at its latitude, rotated about the vertical by its heading, or none. If no
+latitude is stated, it is that of the vertical part of the estimate. Given the rate e',
+the other estimates become
 
     m' = m + C_e C_ee^-1 (e' - m_e)                                                (1)
 
@@ -22,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldcal.core.frames import earth_rate_at_home
+from fieldcal.core.frames import EARTH_RATE, earth_rate_at_home
 from fieldcal.core.samples import Array, Index
 from fieldcal.diagnosis.explain import Explanation
 from fieldcal.model.search.inference import Inference
@@ -45,21 +46,27 @@ class TwinState:
     ----------
     state : its calibration and effects
     heading : of the fixture, rad; None if no Earth's rate was fitted
+    latitude : rad; nan if it is neither stated nor fitted
 
     """
 
     state: State
     heading: float | None = None
+    latitude: float = float("nan")
 
 
 def physical_twin_state(explanation: Explanation) -> TwinState:
     """State of the twin with all causes that were found."""
     best, heading, rate = explanation.best, None, np.zeros(3)
+    x = best.rows.x
     if explanation.shows_earth_rate:
-        heading = _best_heading(best)
-        rate = _earth_rates_by_heading(best.rows.x, np.array([heading]))[0]
+        if np.isnan(x.latitude):
+            x = replace(x, latitude=_fitted_latitude(best))
+        heading = _best_heading(best, x)
+        rate = _earth_rates_by_heading(x, np.array([heading]))[0]
     state = _state_given_rate(explanation, best, rate)
-    return TwinState(from_one_instant(state, best.dictionary.since), heading)
+    state = from_one_instant(state, best.dictionary.since)
+    return TwinState(state, heading, x.latitude)
 
 
 def state_without_earth_rate(explanation: Explanation, fitted: FittedSet) -> State:
@@ -106,10 +113,16 @@ def _base_rate_columns(fitted: FittedSet) -> Index:
     return np.flatnonzero(np.isin(fitted.set.state.columns, first + np.arange(3)))
 
 
-def _best_heading(fitted: FittedSet) -> float:
+def _fitted_latitude(fitted: FittedSet) -> float:
+    """Latitude of the vertical part of the fitted rate, rad (39)."""
+    down = float(fitted.set.state.estimate[_base_rate_columns(fitted)][1])
+    return float(np.arcsin(np.clip(-down / EARTH_RATE, -1.0, 1.0)))
+
+
+def _best_heading(fitted: FittedSet, x: Experience) -> float:
     """Heading that best agrees with the fitted rate, rad; 0 if north agrees with it."""
     found, at = fitted.set.state, _base_rate_columns(fitted)
-    off = _earth_rates_by_heading(fitted.rows.x, HEADINGS) - found.estimate[at]
+    off = _earth_rates_by_heading(x, HEADINGS) - found.estimate[at]
     known = np.linalg.inv(found.inverse[np.ix_(at, at)])
     square = np.einsum("ni,ij,nj->n", off, known, off)
     north = float(np.interp(0.0, HEADINGS, square))

@@ -126,7 +126,7 @@ def _replay_cases(
     refitted = physical.state_without_earth_rate(explanation, raw)
 
     def simulated(state: State) -> _ReplayCase:
-        device = twin.device_profile(explanation, state, effects)
+        device = twin.device_profile(explanation, state, effects, raw.rows.x.latitude)
         return _replay_case(explanation, device, raw, state, np.zeros(raw.rows.y.shape))
 
     return {

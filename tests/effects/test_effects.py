@@ -7,9 +7,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from fieldcal.core.errors import InputError
 from fieldcal.core.frames import earth_rate_at_home
 from fieldcal.core.samples import Array
 from fieldcal.effects import catalogue
+from fieldcal.effects.earth_rate import EarthRate
 from fieldcal.model.causes.columns import RowView, effect_basis
 from fieldcal.model.state import State
 from fieldcal.physics.effect import Effect, Line, Motion, Sensor
@@ -142,3 +144,9 @@ def test_tilt_and_offset_differ_once_both_joints_turn() -> None:
     apart = tilt.change(x, [1.0, 1.0]).f - offset.change(x, [1.0, 1.0]).f
     np.testing.assert_allclose(apart[0], 0, atol=1e-12)
     assert abs(apart[1, 2]) == pytest.approx(0.05, abs=0.005)  # the errata's number
+
+
+def test_the_rate_of_the_earth_at_a_place_nobody_stated_is_refused() -> None:
+    x = Experience.at_rest(np.zeros(1), np.zeros(1), 9.8)
+    with pytest.raises(InputError, match="latitude_deg"):
+        EarthRate().change(x, [])

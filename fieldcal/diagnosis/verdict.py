@@ -50,6 +50,7 @@ from fieldcal.model import thresholds
 from fieldcal.model.posterior.probabilities import ProbableCause
 from fieldcal.model.rows.window_bounds import window_bounds
 from fieldcal.session.description import Description
+from fieldcal.windows.dead_band import dead_band_messages
 
 
 def diagnose(block: Block, about: Description) -> Diagnosis:
@@ -283,6 +284,8 @@ def _undetermined(explanation: Explanation) -> list[str]:
 
 def _warnings(explanation: Explanation) -> tuple[str, ...]:
     out = list(explanation.prepared.checked.unused)
+    block = explanation.prepared.source.block
+    out += dead_band_messages(block, explanation.rows.y)
     numbers = calibration_of_set(explanation, explanation.best.set)
     for name, first in (("accelerometers", 0), ("gyroscopes", 3)):
         if explanation.rows.used[:, first : first + 3].any():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from session_folders import places, recorded, write_session
 
+from fieldcal.diagnosis import diagnose
 from fieldcal.evaluation.observations import usable_windows
 from fieldcal.evaluation.solution import solve_session
 from fieldcal.session.folder import Session
@@ -43,3 +44,15 @@ def test_their_biases_are_read_from_the_turns_which_leave_the_band(
             name = f"gyr_{group}.{axis}"
             assert abs(found.value(name) - true[i]) < 4 * found.uncertainty(name), name
     assert any("zero where less than 0.0035 rad/s" in w for w in found.warnings)
+
+
+def test_diagnose_says_that_there_is_a_band(tmp_path: Path) -> None:
+    positions = places(FACES[:3], 5.0, 3.0)
+    block = recorded(DEVICE, positions, seed=1)
+    gyr = np.where(np.abs(block.gyr) < BAND, 0.0, block.gyr)
+    for band, samples in ((True, replace(block, gyr=gyr)), (False, block)):
+        folder = write_session(tmp_path / f"{band}", samples, positions)
+        session = Session.open(folder)
+        found = diagnose(session.block, session.about)
+        said = [w for w in found.warnings if "zero where less than 0.0035 rad/s" in w]
+        assert len(said) == band

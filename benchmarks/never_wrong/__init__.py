@@ -56,7 +56,8 @@ GROUPED = {
         "level said wrongly",
     ),
     "latitude not said, its sign wrong, gravity wrong": (
-        "latitude not said", "other hemisphere", "gravity said wrongly",
+        "latitude not said", "only gravity said", "other hemisphere",
+        "gravity said wrongly",
     ),
     "mounting not said; outputs or triads reversed or exchanged": (
         "mounting not said", "an output reversed", "outputs exchanged",

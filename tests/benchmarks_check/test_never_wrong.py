@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.never_wrong import mistakes
+from benchmarks.never_wrong import GROUPED, mistakes
 from benchmarks.never_wrong.bench import drawn
-from benchmarks.never_wrong.bench_mistakes import spoilt
+from benchmarks.never_wrong.bench_mistakes import BEFORE, spoilt
 from benchmarks.never_wrong.judging import (
     WRONG,
     Judged,
@@ -17,7 +17,7 @@ from benchmarks.never_wrong.judging import (
     judged,
     write,
 )
-from benchmarks.never_wrong.mistakes import session
+from benchmarks.never_wrong.mistakes import AFTER, session
 
 LIMIT = 600.0
 
@@ -42,6 +42,11 @@ def test_an_error_beyond_a_limit_counts_beside_the_chance_of_one() -> None:
     assert not over
     assert chance == pytest.approx(1 - (1 - 0.3173) * (1 - 0.0455), abs=1e-4)
     assert beyond_limit([one, ("acc_bias.y", 0.0797, 0.01)], truth, limits)[0]
+
+
+def test_every_mistake_has_its_row_in_the_table() -> None:
+    grouped = [name for names in GROUPED.values() for name in names]
+    assert sorted(grouped) == sorted({*BEFORE, *AFTER})
 
 
 @pytest.mark.thorough

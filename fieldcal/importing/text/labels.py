@@ -18,6 +18,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from fieldcal.importing.text.log_prefixes import STAMP, TICKS, TIME, log_prefix
 from fieldcal.importing.words.heading_units import parse_unit
@@ -36,6 +37,9 @@ MAX_UNIT_LETTERS = 12
 
 LONGEST = 2000
 """Characters of a line of values for people; a dump of bytes in one line has more."""
+
+SHAPES = 256
+"""Kinds of lines whose names are remembered: a program prints a few."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LIST = re.compile(
@@ -99,6 +103,9 @@ _NAMED = re.compile(r"([A-Za-z_]\w*)\s*[:=]")
 Labelled = tuple[str, str]
 """A label and its value."""
 
+NamedUnit = tuple[str, str]
+"""The name of a value and its unit."""
+
 
 def labelled_values(line: str) -> list[Labelled]:
     """Labels and values of a line; empty if it holds something else.
@@ -125,27 +132,49 @@ def labelled_values(line: str) -> list[Labelled]:
     rest = line[arrival.end() :] if arrival else line
     rest = rest[ticks.end() :] if ticks else rest
     rest = _LEVEL.sub("", rest, 1) if _LEVEL.match(rest) else rest
-    read: list[tuple[str, str, str]] = []
-    for label, text in _split_labels(rest):
+    split = _split_labels(rest)
+    parts, values = [], []
+    for label, text in split:
         said = _VALUES.fullmatch(text)
-        values = re.findall(_NUMBER, said[1]) if said else []
-        if said is None or len(values) not in (1, len(AXES)):
+        behind = re.findall(_NUMBER, said[1]) if said else []
+        if said is None or len(behind) not in (1, len(AXES)):
             return []
+        values += behind
+        parts.append((label, len(behind), said[2].strip(" \t,;|")))
+    names = _names(tuple(parts))
+    if names is None:
+        return []
+    read = [*zip(names, values, strict=True)]
+    first = [(TIME, arrival[1].strip())] if read and arrival else []
+    first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
+    first += [(prefix.name, prefix.value)] if read and prefix else []
+    return first + read
+
+
+@lru_cache(SHAPES)
+def _names(parts: tuple[tuple[str, int, str], ...]) -> tuple[str, ...] | None:
+    """Names of the values of a line, with their units; None if it is a sentence.
+
+    They are the same in all lines that a program prints in the same way.
+
+    Parameters
+    ----------
+    parts : of each label its text, how many values follow, and what stands behind them
+
+    """
+    read: list[NamedUnit] = []
+    for label, many, behind in parts:
         label, moved = _split_unit(label, read)
         if moved and read:
             read = _with_unit(read, moved)
         label, unit = _complete_label(label, read)
-        names = [f"{label} {a}" for a in AXES] if len(values) > 1 else [label]
-        read += [(n, v, unit) for n, v in zip(names, values, strict=True)]
-        behind = said[2].strip(" \t,;|")
+        names = [f"{label} {a}" for a in AXES] if many > 1 else [label]
+        read += [(name, unit) for name in names]
         if len(behind) > MAX_UNIT_LETTERS:
-            return []
+            return None
         if parse_unit(behind):
             read = _with_unit(read, behind)
-    first = [(TIME, arrival[1].strip())] if read and arrival else []
-    first += [(TICKS, ticks[1] or ticks[2])] if read and ticks else []
-    first += [(prefix.name, prefix.value)] if read and prefix else []
-    return first + [(f"{n} [{u}]" if u else n, v) for n, v, u in read]
+    return tuple(f"{name} [{unit}]" if unit else name for name, unit in read)
 
 
 def _of_temperature(line: str) -> str:
@@ -212,7 +241,7 @@ def _split_labels(line: str) -> list[tuple[str, str]]:
     return [*zip(labels, texts[1:], strict=True)]
 
 
-def _split_unit(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, str]:
+def _split_unit(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
     """A label, and the unit of the value before it that stands before it.
 
     In ``A Z: 3 G X: 4 G Y: 5`` the G is no unit: A X has been read, and G is what the
@@ -222,7 +251,7 @@ def _split_unit(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, 
     rest = rest.strip()
     if not rest or not parse_unit(first):
         return label, ""
-    names = [name for name, _, _ in read]
+    names = [name for name, _ in read]
     own = rest.lower() in AXES and (
         _complete_label(rest, read)[0] in names
         or (bool(names) and names[-1].rpartition(" ")[0] == first)
@@ -230,11 +259,9 @@ def _split_unit(label: str, read: Sequence[tuple[str, str, str]]) -> tuple[str, 
     return (label, "") if own else (rest, first)
 
 
-def _complete_label(
-    label: str, read: Sequence[tuple[str, str, str]]
-) -> tuple[str, str]:
+def _complete_label(label: str, read: Sequence[NamedUnit]) -> tuple[str, str]:
     """A label and its unit; of an axis alone with what the one before it says."""
-    before, _, unit = read[-1] if read else ("", "", "")
+    before, unit = read[-1] if read else ("", "")
     bare, _, axis = before.rpartition(" ")
     if bare and label.lower() in AXES and axis.lower() in AXES:
         return f"{bare} {label}", unit
@@ -244,9 +271,7 @@ def _complete_label(
     return label, ""
 
 
-def _with_unit(
-    read: Sequence[tuple[str, str, str]], unit: str
-) -> list[tuple[str, str, str]]:
+def _with_unit(read: Sequence[NamedUnit], unit: str) -> list[NamedUnit]:
     """Values with the unit behind the last one, which applies to all axes."""
     last = read[-1][0]
     stem = _STEM.fullmatch(last)
@@ -255,7 +280,7 @@ def _with_unit(
         other = _STEM.fullmatch(name)
         return name == last or bool(stem and other and other[1] == stem[1])
 
-    return [(n, v, u or (unit if mine(n) else "")) for n, v, u in read]
+    return [(n, u or (unit if mine(n) else "")) for n, u in read]
 
 
 def line_shape(line: str) -> str:

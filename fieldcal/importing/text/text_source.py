@@ -17,6 +17,9 @@ from fieldcal.importing.recording import Recording
 from fieldcal.importing.text.text_form import TextForm
 from fieldcal.importing.text.text_lines import split_lines, top_lines
 
+AT_ONCE = 1 << 12
+"""Lines whose forms are undone at once: who looks at the top need not wait for more."""
+
 
 class TextSource:
     """Lines of a text.
@@ -42,12 +45,14 @@ class TextSource:
             if not readers:
                 yield data
                 continue
-            lines = split_lines(data)
-            for read in readers:
-                # no lines at all would be the end of the text
-                lines = read(lines) if lines else []
-            if lines:
-                yield ("\n".join(lines) + "\n").encode()
+            whole = split_lines(data)
+            for first in range(0, len(whole), AT_ONCE):
+                lines = whole[first : first + AT_ONCE]
+                for read in readers:
+                    # no lines at all would be the end of the text
+                    lines = read(lines) if lines else []
+                if lines:
+                    yield ("\n".join(lines) + "\n").encode()
         lines = []
         for read in readers:
             lines = [*(read(lines) if lines else []), *read([])]

@@ -199,3 +199,16 @@ def namespace() -> Iterator[tuple[str, ...]]:
         yield inside
     finally:
         subprocess.run(["ip", "netns", "del", name], check=True)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Any]:
+    """An engine on a virtual device of its own, which records."""
+    from engine_bench import make
+
+    from fieldcal.session.recorder import Recorder
+    from fieldcal.sim_device import VirtualDevice
+    from fieldcal.sim_device.in_process import InProcess
+
+    with Recorder(tmp_path / "s", {"format": 1}) as recorder:
+        yield make(recorder, InProcess(VirtualDevice(seed=3)))

@@ -1,11 +1,8 @@
-"""Logs as strangers write them: each form is read as what it is, with nothing said."""
+"""Logs as people and their programs write them, of one recording."""
 
 from __future__ import annotations
 
 import json
-import re
-import shutil
-import warnings
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from functools import reduce
@@ -13,29 +10,26 @@ from operator import xor
 from pathlib import Path
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from laid_about import G, turned
-from small_files import write_workbook
 
 from fieldcal.cli import main
 from fieldcal.core.samples import Array
-from fieldcal.importing.columns import to_signed_16_bit
-from fieldcal.importing.recording import ReadOptions
-from fieldcal.importing.tables.column_physics import is_direction
-from fieldcal.importing.text.cell_forms import HexCells, ListCells
-from fieldcal.importing.text.labels import labelled_values
-from fieldcal.importing.text.line_forms import EchoedMessages
-from fieldcal.importing.times.row_times import RowTimes
-from fieldcal.importing.words.heading_words import heading_meaning
 from fieldcal.session.folder import Session
 
 ROWS = turned(5, 50.0, 2.0)
+
+
 T, A, W = ROWS[:, 0], ROWS[:, 1:4], ROWS[:, 4:]
+
+
 DEG, UP = np.rad2deg(W), A / np.linalg.norm(A, axis=1)[:, None]
+
+
 BEGAN = datetime(2024, 5, 3, 14, 20, 31)
+
+
 UNIX = 1714746031
+
 
 Writer = Callable[[], str]
 
@@ -144,6 +138,8 @@ def clock(form: str) -> list[str]:
 
 
 SIX = "ax,ay,az,gx,gy,gz"
+
+
 FORMS: dict[str, Writer] = {
     "lines of several kinds": mixed,
     "two sensors in turn": in_turn,
@@ -355,304 +351,3 @@ def assert_same(folder: Path, per_row: float = 0.02, tolerance: float = 1e-3) ->
     np.testing.assert_allclose(np.diff(block.t), per_row, atol=1.1e-3)
     np.testing.assert_allclose(block.acc, A[:n], atol=10 * tolerance)
     np.testing.assert_allclose(block.gyr, W[:n], atol=tolerance)
-
-
-@pytest.mark.parametrize("name", FORMS)
-def test_a_form_is_read_with_nothing_said(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "log.txt"
-    path.write_text(FORMS[name]() + "\n", encoding="utf-8")
-    assert_same(imported(path))
-
-
-@pytest.mark.parametrize(
-    "slow",
-    [slice(0, 3), pytest.param(slice(3, 6), marks=pytest.mark.thorough)],
-    ids=["acc", "gyr"],
-)
-def test_a_sensor_that_is_slower_than_the_rows_is_read_with_the_other(
-    tmp_path: Path, slow: slice, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "log.csv"
-    rows = [f"t,{SIX}"]
-    for i, row in enumerate(ROWS.tolist()):
-        cells = [f"{x:.8g}" for x in row[1:]]
-        cells[slow] = cells[slow] if i % 2 == 0 else [""] * 3
-        rows.append(",".join([f"{row[0]:.4f}", *cells]))
-    path.write_text("\n".join(rows) + "\n")
-    session = Session.open(imported(path))
-    np.testing.assert_allclose(session.block.acc, A[::2], rtol=1e-6)
-    np.testing.assert_allclose(session.block.gyr, W[::2], rtol=1e-6, atol=1e-8)
-    assert main(["solve", str(session.folder)]) in (0, 1)
-    assert "acc bias x" in capsys.readouterr().out
-
-
-def test_rows_of_several_imus_in_turn_are_told_apart(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    rows = ["imu,t,ax,ay,az,gx,gy,gz"]
-    for row in ROWS.tolist():
-        for i in (0, 1):
-            own = [i, *row[:3], row[3] + i, *row[4:]]
-            rows.append(",".join(f"{x:.8g}" for x in own))
-    path.write_text("\n".join(rows) + "\n")
-    folder = imported(path)
-    assert_same(folder / "0")
-    other = Session.open(folder / "1").block
-    np.testing.assert_allclose(other.acc[:, 2], A[:, 2] + 1, atol=1e-5)
-
-
-def test_bytes_that_are_no_text_spoil_a_row_and_not_the_log(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "log.csv"
-    rows = lines(ROWS, head=f"t,{SIX}").split("\n")
-    rows[20] = "\0\0\7" + rows[20]
-    path.write_text("\n".join(rows) + "\n" + "\0" * 700)
-    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
-    assert "line 21" in capsys.readouterr().err
-    block = Session.open(imported(path, "--repair")).block
-    np.testing.assert_allclose(block.acc, np.delete(A, 19, axis=0))
-
-
-@pytest.mark.parametrize(
-    ("text", "question"),
-    [
-        (lines(np.arange(float(len(T))), A / G, DEG,
-               head="Timestamp,Accel_X_g,Accel_Y_g,Accel_Z_g,Gyro_X_deg_per_s,"
-               "Gyro_Y_deg_per_s,Gyro_Z_deg_per_s"), "may count rows"),
-        (lines(T * 1e3, np.round(A * 16384 / G), np.round(DEG * 131.072),
-               np.full(len(T), -3900.0), head=f"time_ms,{SIX},temp"), "--temp-lsb 340"),
-        (lines(T, W, UP), "say what its columns are"),
-        (lines(["1.70E+12"] * len(T), A, W, head=f"time,{SIX}"),
-         "its time is 1.7e+12 in all rows, no time: give the rate, e.g. --rate 50"),
-        (lines(["12"] * len(T), A, W), "give the rate, e.g. --rate 50"),
-        (lines(np.arange(float(len(T))), A, W, head=f"t,{SIX}"),
-         "or --time-unit s if a row is taken each second"),
-        (lines(1e12 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
-         "log.csv: column t: its numbers, 0 to 1.149e+15, make 1e-12 Hz in s"),
-        (lines(1e-13 * np.arange(len(T)), A, W, head=f"t,{SIX}"),
-         "or skip this one with _ and give --rate"),
-        (lines(1e12 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
-         "column t: its samples are 1e+12 s apart"),
-        (lines(T * 1e3, A, W, head=f"time (s),{SIX}"),
-         "makes 0.05 Hz, and in ms it is 50 Hz: add --time-unit ms or --time-unit s"),
-        (lines(1e-13 * np.arange(len(T)), A, W, head=f"t (s),{SIX}"),
-         "column t: its samples come 1e+13 times a second"),
-        (lines(np.round(np.arange(len(T)) * 1.5) + 115, DEG, A / G,
-               head="Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),"
-               "Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),"
-               "Accelerometer Z (g)"), "no column is t"),
-        (lines(np.floor(T / 2.56), np.round(T % 2.56 * 50), W, A,
-               head="series_id,measurement_number,angular_velocity_X,"
-               "angular_velocity_Y,angular_velocity_Z,linear_acceleration_X,"
-               "linear_acceleration_Y,linear_acceleration_Z"), "no column is t"),
-    ],
-    ids=["rows that are counted", "a thermometer's counts", "a direction",
-         "a time that a spreadsheet shortened", "a time that stays, without a name",
-         "seconds or rows", "too slow in any unit", "too fast in any unit",
-         "too slow as it says",
-         "ms that are called s", "too fast as it says", "messages that are counted",
-         "rows of pieces that are counted"],
-)  # fmt: skip
-def test_what_would_be_wrong_in_silence_is_asked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, question: str
-) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text(text + "\n")
-    assert main(["import", str(path), "-o", str(tmp_path / "out")]) == 2
-    assert question in capsys.readouterr().err
-
-
-def test_a_time_that_stays_is_refused_as_such_where_the_user_names_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text(lines(["12"] * len(T), A, W) + "\n")
-    assert main(["import", str(path), "--columns", f"t,{SIX}"]) == 2
-    assert "column t is 12 in all rows, so it is no time" in capsys.readouterr().err
-
-
-def test_one_row_a_second_by_a_clock_is_taken_so(tmp_path: Path) -> None:
-    """Seconds since 1970 count no rows, and a real clock shows a little less."""
-    path = tmp_path / "log.csv"
-    stamps = [f"{UNIX + 1.0002 * i:.4f}" for i in range(len(T))]
-    path.write_text(lines(stamps, A, 0 * W, head=f"t,{SIX}") + "\n")
-    t = Session.open(imported(path)).block.t
-    np.testing.assert_allclose(np.diff(t), 1.0002, atol=1e-6)
-    shutil.rmtree(tmp_path / "out")
-    whole = [f"{UNIX + i}" for i in range(len(T))]
-    path.write_text(lines(whole, A, 0 * W, head=f"t,{SIX}") + "\n")
-    assert np.ptp(Session.open(imported(path)).block.t) == len(T) - 1
-
-
-@pytest.mark.parametrize("head", ["", "t,acc_x,acc_y,acc_z,q_w,q_x,q_y,q_z"])
-def test_an_attitude_is_no_rate(
-    tmp_path: Path, head: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path, angle = tmp_path / "log.csv", np.cumsum(W, axis=0) / 50 / 2
-    attitude = np.column_stack([np.ones(len(T)), np.tan(angle / 2)])
-    attitude /= np.linalg.norm(attitude, axis=1)[:, None]
-    path.write_text(lines(T, A, np.round(attitude, 2), head=head) + "\n")
-    block = Session.open(imported(path)).block
-    np.testing.assert_allclose(block.acc, A, atol=1e-6)
-    assert np.isnan(block.gyr).all()
-    assert "nothing says what they are" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("name", ["T", "t", "T1"])
-def test_a_letter_behind_the_axes_is_a_thermometer_by_its_numbers(
-    tmp_path: Path, name: str
-) -> None:
-    path, warm = tmp_path / "log.csv", 24 + 0.1 * np.floor(T / 4)
-    path.write_text(
-        lines(A, DEG, warm, head=f"# Sample rate: 50 Hz\n{SIX},{name}") + "\n"
-    )
-    folder = imported(path)
-    assert_same(folder)
-    np.testing.assert_allclose(Session.open(folder).block.temperature, warm)
-
-
-def test_letters_behind_the_axes_are_no_times_and_which_is_near_nobody_knows(
-    tmp_path: Path,
-) -> None:
-    path, warm = tmp_path / "log.csv", 24 + 0.1 * np.floor(T / 4)
-    text = lines(T * 1e3, A, DEG, warm, warm + 5, head=f",{SIX},T1,T2")
-    path.write_text(text + "\n")
-    folder = imported(path)
-    assert_same(folder)
-    assert np.isnan(Session.open(folder).block.temperature).all()
-
-
-@pytest.mark.parametrize(
-    ("names", "told"),
-    [
-        ("{0}X {0}Y {0}Z", ("1", "2")),
-        ("{0}X ({1}) {0}Y ({1}) {0}Z ({1})", ("bmi", "mpu")),
-    ],
-)
-def test_names_that_come_again_are_of_several_imus(
-    tmp_path: Path, names: str, told: tuple[str, str]
-) -> None:
-    path, second = tmp_path / "log.csv", A + [0, 0, 1]
-    head = " ".join(
-        names.format(sensor, chip) for chip in ("BMI", "MPU") for sensor in ("Acc", "G")
-    )
-    text = lines(T, A, W, second, W, head=",".join(["t", *re.split(" (?!\\()", head)]))
-    path.write_text(text + "\n")
-    folder = imported(path)
-    assert_same(folder / told[0])
-    other = Session.open(folder / told[1]).block
-    np.testing.assert_allclose(other.acc, second, atol=1e-6)
-
-
-def test_a_dump_of_bytes_in_one_line_is_refused_soon() -> None:
-    dump = "AA FF F2 18 " * 20000
-    assert labelled_values(dump) == [] and heading_meaning(dump) is None
-
-
-def test_a_direction_is_one_though_a_row_is_not_whole() -> None:
-    bad = UP.copy()
-    bad[7, 1] = np.nan
-    with warnings.catch_warnings(action="error"):
-        assert is_direction(UP) and is_direction(bad)
-        assert not is_direction(A) and not is_direction(np.full((9, 3), np.nan))
-
-
-def test_a_workbook_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "log.xlsx"
-    names = [
-        "Time (s)",
-        *(f"Accel {x} (g)" for x in "XYZ"),
-        *(f"Gyro {x} (dps)" for x in "XYZ"),
-    ]
-    write_workbook(path, [names, *np.column_stack([T, A / G, DEG]).tolist()])
-    assert_same(imported(path))
-
-
-@pytest.mark.parametrize(
-    "version", ["v7", pytest.param("v7.3", marks=pytest.mark.thorough)]
-)
-def test_a_timetable_is_read(tmp_path: Path, version: str) -> None:
-    pandas, matio = pytest.importorskip("pandas"), pytest.importorskip("matio")
-    frame = pandas.DataFrame({"Acceleration": list(A), "AngularVelocity": list(W)},
-                             index=pandas.to_timedelta(T, unit="s"))  # fmt: skip
-    frame.index.name = "Time"
-    path = tmp_path / "log.mat"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        matio.save_to_mat(str(path), {"imu": frame}, version=version)
-    assert_same(imported(path))
-
-
-def test_a_folder_of_oxts_samples_is_read(tmp_path: Path) -> None:
-    folder = tmp_path / "oxts"
-    (folder / "data").mkdir(parents=True)
-    stamps = clock("%Y-%m-%d %H:%M:%S.%f000")
-    (folder / "timestamps.txt").write_text("\n".join(stamps) + "\n")
-    for i, (a, w) in enumerate(zip(A.tolist(), W.tolist(), strict=True)):
-        row = [49.0, 8.4, 112.8, *[0.0] * 8, *a, *a, *w, *w, 0.5, 0.1, 4, 10, 4, 4, 0]
-        (folder / "data" / f"{i:010}.txt").write_text(" ".join(map(str, row)))
-    assert_same(imported(folder))
-    (folder / "data" / "0000000000.txt").unlink()
-    out = tmp_path / "again"
-    assert main(["import", str(folder), "-o", str(out)]) == 2
-
-
-@given(st.lists(st.integers(-(2**15), 2**15 - 1), min_size=3, max_size=3))
-def test_hexadecimal_counts_keep_their_sign(counts: list[int]) -> None:
-    text = [" ".join(f"{x & 0xFFFF:04X}" for x in counts), *["ABCD 0ABC FFFF"] * 3]
-    form = HexCells.of(text, None)
-    assert form is not None
-    read = [[int(c) for c in line.split()] for line in form.reader()(text)]
-    assert read == [counts, *[[0xABCD - 2**16, 0x0ABC, -1]] * 3]
-    assert (
-        to_signed_16_bit(np.mod(np.array(counts, dtype=float), 2**16)).tolist()
-        == counts
-    )
-
-
-@given(
-    st.lists(st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3), min_size=2),
-    st.sampled_from(["[]", "()", "{}"]), st.sampled_from([", ", " ", ","]),
-)  # fmt: skip
-def test_numbers_of_a_list_in_a_cell_are_cells(
-    rows: list[list[float]], brackets: str, between: str
-) -> None:
-    text = [f"{i},{brackets[0]}{between.join(map(repr, r))}{brackets[1]}"
-            for i, r in enumerate(rows)]  # fmt: skip
-    form = ListCells.of(["n,acc", *text], None)
-    assert form is not None and form.names == ("n", "acc_x", "acc_y", "acc_z")
-    read = [[float(c) for c in line.split(",")] for line in form.reader()(text)]
-    assert read == [[i, *row] for i, row in enumerate(rows)]
-
-
-@given(st.lists(st.dictionaries(st.sampled_from("abcdef"), st.integers(), min_size=3),
-                min_size=3), st.data())  # fmt: skip
-def test_messages_are_put_together_however_the_lines_come(
-    messages: list[dict[str, int]], data: st.DataObject
-) -> None:
-    text = []
-    for m in messages:
-        text += ["one:", *(f"  {name}: {x}" for name, x in m.items()), "---"]
-    form = EchoedMessages.of(text, None)
-    if form is None:
-        usual = [
-            k for k in "abcdef" if sum(k in m for m in messages) > len(messages) / 2
-        ]
-        assert len(usual) < 3
-        return
-    cut, read = data.draw(st.integers(0, len(text))), form.reader()
-    expected = [",".join(str(m.get(n[-1], "")) for n in form.names) for m in messages]
-    assert read(text[:cut]) + read(text[cut:]) == expected
-
-
-@given(st.sampled_from([16, 24, 32]), st.integers(1, 9), st.lists(st.integers(0, 400)))
-def test_a_counter_that_begins_again_goes_on(
-    bits: int, step: int, cuts: list[int]
-) -> None:
-    true = 2**bits - 200 * step + step * np.arange(400)
-    counts, times = np.mod(true, 2**bits).astype(float), RowTimes(ReadOptions())
-    edges = [0, *sorted(cuts), 400]
-    parts = [times.of({"t": counts[a:b]}, b - a)
-             for a, b in zip(edges, edges[1:], strict=False) if b > a]  # fmt: skip
-    np.testing.assert_array_equal(np.concatenate(parts), true)
-    assert len(times.says) == 1

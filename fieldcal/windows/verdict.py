@@ -201,7 +201,7 @@ def _stuck_runs(cells: CellTable) -> list[Departure]:
             "stuck",
             channel,
             float(cells.times[first]),
-            float(cells.times[end - 1] + CELL - cells.times[first]),
+            float(cells.times[end - 1] + cells.period - cells.times[first]),
             0.0,
             float(sampled[channel]),
         )
@@ -219,7 +219,7 @@ def _worst_departure(
         test.kind,
         channel,
         float(cells.times[cell]),
-        CELL * test.cells,
+        cells.period * test.cells,
         float(test.size[first, channel]),
         float(test.noise[channel]),
     )
@@ -237,7 +237,7 @@ def _drift_departure(
         "drift",
         channel,
         float(cells.times[0]),
-        CELL * len(cells),
+        cells.seconds,
         float(change[channel]),
         float(noise.allan[-1][channel]),
     )
@@ -254,7 +254,7 @@ def _noise_departure(
         "noise",
         channel,
         float(cells.times[int(np.argmax(means))]) if len(means) else np.nan,
-        CELL,
+        cells.period,
         float(scatter[channel]),
         float(limits.noise[channel]),
     )

@@ -83,6 +83,21 @@ def test_a_counter_is_unwrapped() -> None:
     np.testing.assert_allclose(np.diff(t), 1e-5, atol=1e-12)
 
 
+@pytest.mark.parametrize("gap", [3.9, 6.5])
+def test_a_counter_that_wrapped_during_an_outage_is_unwrapped_by_the_host(
+    gap: float,
+) -> None:
+    """16 bits of 50 us: the span of 3.3 s is more than arrivals are ever late by."""
+    span = 2**16 * 50e-6
+    truth = np.arange(500) / 100
+    truth = np.append(truth, truth + truth[-1] + gap) + 3 * span - truth[-1] + 0.01
+    host = 1e9 + truth
+    health = LinkHealth()
+    t = placed(StampTimebase(health, span=span), truth % span, host)
+    np.testing.assert_allclose(t - t[0], truth - truth[0], atol=1e-9)
+    assert (health.restarts, health.gaps) == (0, 1)
+
+
 @pytest.mark.parametrize("span", [float("inf"), 2**32 * 1e-6])
 @pytest.mark.parametrize("up", [100.0, 3000.0])
 def test_time_goes_on_over_a_reboot_by_what_the_host_saw(

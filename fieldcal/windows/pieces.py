@@ -18,11 +18,8 @@ from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
+from fieldcal.windows.verdict import FEWEST_JUDGED_CELLS
 from fieldcal.windows.window import LearnedNoise, Window
-
-MIN_PIECE_CELLS = 30
-"""Fewest cells of a piece that can be tested for rest: 3 s, or as many samples where
-they come less often than cells."""
 
 DISCARDED_BEFORE_S = 0.5
 """Least time before a disturbance that is discarded with it, s."""
@@ -182,7 +179,7 @@ class PiecedWindow:
 
 def _can_be_tested(piece: Window) -> bool:
     """Whether a piece is long enough to be tested for rest."""
-    return piece.cells.complete_count >= MIN_PIECE_CELLS
+    return piece.cells.complete_count >= FEWEST_JUDGED_CELLS
 
 
 def _gap_between(before: Window, after: Window) -> tuple[float, float]:

@@ -28,6 +28,10 @@ THRESHOLD, LONG = 5.8, 600
 """Ratio of departure to spread that noise alone does not reach, in a window of `LONG`
 cells, a minute."""
 
+FEWEST_JUDGED_CELLS = 30
+"""Cells from which the usual noise of a window is known: 3 s, or as many samples where
+they come less often than cells."""
+
 EARLY_WINDOW_S = 8.0
 """The threshold is twice as high in a window this long, s, for lack of data."""
 
@@ -112,7 +116,7 @@ def judge_window(
     rounding.
     """
     m = cells.complete_count
-    if m < limits.unjudged_s / CELL:
+    if m < FEWEST_JUDGED_CELLS or m * cells.period < limits.unjudged_s:
         scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
         return WindowVerdict(_noise_departure(cells, scatter, limits), 0.0, before)
     means = cells.steady_means[:m]

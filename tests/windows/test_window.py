@@ -527,6 +527,22 @@ def test_a_disturbance_of_a_slow_device_lasts_as_long_as_it_did() -> None:
     assert "a 3.2 s push" in str(moved)
 
 
+@pytest.mark.parametrize("rate", [2.0, 50.0])
+def test_on_a_base_that_sways_a_window_is_judged_from_the_longest_period_on(
+    rate: float,
+) -> None:
+    """By its time, not by its number of samples: a lean of 2 degrees is no window."""
+    x = white(np.random.default_rng(1), round(60 * rate)) / 5
+    leans = block_of(x, rate)
+    leans.acc[leans.t >= 40, 0] += 0.3
+    window = Window(StillnessLimits.swaying())
+    window.add(leans.between(0, 15.5))
+    assert window.noise is None, "not judged yet"
+    window.add(leans.between(15.5, 60))
+    moved = window.disturbance
+    assert moved is not None and moved.at == pytest.approx(40.0, abs=0.6)
+
+
 def test_the_error_of_a_mean_does_not_depend_on_a_pause_in_its_window() -> None:
     """Nor does the corner of a low-passed sensor, 0.3 Hz, that shows in it."""
     block = block_of(low_passed(0.3)(np.random.default_rng(5), 6000))

@@ -9,7 +9,8 @@ the last update,
 is within q of the truth, and as even as the stamps allow; for q = 0 it is the stamp. A
 counter is unwrapped first: a span is added where it falls by more than half of it. If
 that contradicts the time that passed on the host, at the device's rate so far, as many
-spans are added as that time tells. A clock that falls by more than `RESTART_BACKWARD`
+spans are added as that time tells. A clock of the time of day falls by a day at
+midnight, which is added likewise. A clock that falls by more than `RESTART_BACKWARD`
 without such a wrap, or leaps by more than `RESTART_FORWARD` and by more than passed on
 the host, was restarted: time goes on from the last sample by the time that passed on
 the host.
@@ -42,6 +43,9 @@ LATEST_ARRIVAL = 2.0
 
 RATE_ERROR = 0.1
 """Usual error of the rate of a device's time against the host's."""
+
+DAY = 86400.0
+"""Time after which a clock of the time of day begins again, s."""
 
 FIRST_INTERVALS = 16
 """Intervals from which the period is first estimated."""
@@ -154,6 +158,8 @@ class StampTimebase:
             return self._t
         if wraps := self._wraps(stamp, host):
             self._offset += wraps * self._span
+        elif self._passed_midnight(stamp, host):
+            self._offset += DAY
         s = stamp + self._offset
         if self._restarted(s, host):
             return self._restart(stamp, host)
@@ -197,6 +203,14 @@ class StampTimebase:
         if moved < 0:  # samples that waited in a buffer come after less time
             return wraps if told <= passed + error else 0
         return wraps if abs(told - passed) <= error else 0
+
+    def _passed_midnight(self, stamp: float, host: float) -> bool:
+        """Whether the stamps fell by a day, less the time that passed on the host."""
+        passed, error = self._passed(host)
+        if passed != passed:
+            passed, error = host - self._host, LATEST_ARRIVAL
+        told = stamp + DAY - self._stamp
+        return told > 0 and abs(told - passed) <= error
 
     def _place(self, s: float) -> float:
         """Time of a sample stamped `s`, (1)."""

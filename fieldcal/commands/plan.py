@@ -10,16 +10,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldcal.commands.plan_file import position_table, select_positions, write_plan
+from fieldcal.commands.plan_file import (
+    plan_tables,
+    position_table,
+    select_positions,
+    write_plan,
+)
+from fieldcal.commands.plan_noise import read_device_noise
 from fieldcal.commands.plan_speed import RESTS, SPINS, add_speed_options, show_spins
-from fieldcal.commands.site import add_site_options, site_tables
+from fieldcal.commands.site import add_site_options
 from fieldcal.core.errors import PlanError
 from fieldcal.core.factory import FACTORY_KEYS
 
 if TYPE_CHECKING:
     from fieldcal.core.positions import Position
     from fieldcal.planning.aliasing import Aliases
-    from fieldcal.planning.device_noise import DeviceNoise
     from fieldcal.planning.planner import GradeNoise
 
 RARE = (
@@ -101,12 +106,11 @@ def run(args: argparse.Namespace) -> int:
     from fieldcal.core.positions import FIVE_POSITIONS
     from fieldcal.planning import planner
     from fieldcal.planning.aliasing import find_aliases
-    from fieldcal.session import description
+    from fieldcal.session.description import parse_description
 
-    tables = {"format": description.FORMAT_VERSION, **site_tables(args, "device")}
-    if args.sways is not None:
-        tables["site"] = {**tables.get("site", {}), "sways": True}
-    gravity = description.parse_description(tables).gravity
+    tables = plan_tables(args)
+    about = parse_description(tables)
+    gravity, mounting = about.gravity, about.mounting
     if args.speed is not None:
         return _plan_spins(args)
     if not 0 <= args.beta <= 90 or not 0 < args.alpha <= 180:
@@ -114,19 +118,19 @@ def run(args: argparse.Namespace) -> int:
     ladder = planner.Ladder(*np.deg2rad([args.alpha, args.beta]).tolist())
     places = select_positions(args, ladder, gravity)
     seconds = _seconds_per_position(args.minutes, len(places))
-    device = _read_device_noise(args.noise_of) if args.noise_of else None
+    device = read_device_noise(args.noise_of, "acc") if args.noise_of else None
     grade = device.grade(seconds) if device else planner.GRADES[args.noise]
     noise = "this device" if device else args.noise
     needed = None if args.sways is None else _seconds_needed(args.sways, grade)
-    found = planner.expected(places, grade, seconds, gravity)
-    paper = planner.expected(FIVE_POSITIONS, grade, seconds, gravity)
+    found = planner.expected(places, grade, seconds, gravity, mounting)
+    paper = planner.expected(FIVE_POSITIONS, grade, seconds, gravity, mounting)
     further = planner.extra_position(places, ladder, gravity)
     with_it = (
-        planner.expected((*places, further), grade, seconds, gravity)
+        planner.expected((*places, further), grade, seconds, gravity, mounting)
         if further
         else None
     )
-    confused = find_aliases(places, gravity)
+    confused = find_aliases(places, gravity, mounting)
     if args.output:
         write_plan(args.output, tables, places, seconds)
     if args.json:
@@ -176,31 +180,10 @@ def _plan_spins(args: argparse.Namespace) -> int:
         raise PlanError(f"--positions {spins}: the table must turn once at least")
     windows = spins + RESTS
     seconds = _seconds_per_position(args.minutes, windows)
-    device = _read_device_noise(args.noise_of) if args.noise_of else None
+    device = read_device_noise(args.noise_of, "gyr") if args.noise_of else None
     grade = device.grade(seconds) if device else GRADES[args.noise]
     noise = "this device" if device else args.noise
     return show_spins(args, grade.gyr(seconds), seconds, noise)
-
-
-def _read_device_noise(path: Path) -> DeviceNoise:
-    """Noise of a device, from its noise.json.
-
-    Raises
-    ------
-    SessionError
-        If there is no noise.json, or it is invalid.
-
-    """
-    from fieldcal.core.errors import SessionError
-    from fieldcal.planning.device_noise import device_noise_from
-    from fieldcal.session.noise_file import read_noise
-
-    content = read_noise(path)
-    if content is None:
-        raise SessionError(
-            f"{path}: has no noise.json; run fieldcal noise on a recording at rest"
-        )
-    return device_noise_from(content)
 
 
 def _seconds_per_position(minutes: float, n: int) -> float:

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldcal.commands.site import merge_tables, site_tables, tables_of_options
 from fieldcal.core.errors import InputError, PlanError
 
 if TYPE_CHECKING:
     from fieldcal.core.positions import Position
     from fieldcal.planning.planner import Ladder
+    from fieldcal.session.description import Description
 
 DEFAULT_COUNT = 5
 """Number of positions unless another is given."""
@@ -30,8 +32,6 @@ def select_positions(
     """
     from fieldcal.core.positions import POSITION_SETS
     from fieldcal.planning.planner import best_positions
-    from fieldcal.session import description
-    from fieldcal.session.folder import DESCRIPTION
 
     if args.of is None:
         many = DEFAULT_COUNT if args.positions is None else args.positions
@@ -42,14 +42,35 @@ def select_positions(
         )
     if args.set:
         raise PlanError("--of and --set both name positions: leave one of them out")
-    path = args.of / DESCRIPTION if args.of.is_dir() else args.of
-    found = description.read_description(path).positions
+    found = _described(args.of).positions
     if not found or not all(p.oriented and not p.on_turning_table for p in found):
         raise PlanError(
-            f"{path}: give each [[position]] alpha_deg and beta_deg,"
+            f"{args.of}: give each [[position]] alpha_deg and beta_deg,"
             " rotation_vector_deg or quaternion, and no rate: --speed plans a table"
         )
     return found
+
+
+def plan_tables(args: argparse.Namespace) -> dict[str, Any]:
+    """Tables of device, site and frame: of the file with positions, and of options."""
+    from fieldcal.session.description import FORMAT_VERSION
+
+    tables = site_tables(args, "device")
+    if args.of is not None:
+        raw = _described(args.of).raw
+        given = {name: raw[name] for name in tables if name in raw}
+        tables = merge_tables(merge_tables(tables, given), tables_of_options(args))
+    if args.sways is not None:
+        tables = merge_tables(tables, {"site": {"sways": True}})
+    return {"format": FORMAT_VERSION, **tables}
+
+
+def _described(path: Path) -> Description:
+    """What a session, or a file, says of device, site and positions."""
+    from fieldcal.session.description import read_description
+    from fieldcal.session.folder import DESCRIPTION
+
+    return read_description(path / DESCRIPTION if path.is_dir() else path)
 
 
 def write_plan(

@@ -43,17 +43,18 @@ def show_spins(
     Raises
     ------
     PlanError
-        If the table does not turn, its speed has no ±, or a file is asked for.
+        If the table does not turn, its speed has no ±, or an option is for positions.
 
     """
     import numpy as np
 
     from fieldcal.planning.table_speed import NAMES, expected_by_speed, spin_axes
 
-    if args.output or args.set:
+    if args.output or args.set or args.of or args.sways is not None:
         raise PlanError(
             "fieldcal run holds positions at rest: record the table, import it, and"
-            " write speed_deg_s into session.toml; leave out -o and --set"
+            " write speed_deg_s into session.toml; leave out -o, --set, --of and"
+            " --sways"
         )
     axes = spin_axes(SPINS if args.positions is None else args.positions)
     speed, speed_sigma = np.deg2rad([args.speed, args.speed_sd]).tolist()

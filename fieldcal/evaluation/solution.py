@@ -49,6 +49,7 @@ from fieldcal.solve import Observations, solve
 from fieldcal.solve.estimation import RecordedRows
 from fieldcal.solve.explanations import WeightedExplanation
 from fieldcal.solve.rows import mean_variances, with_window_variances
+from fieldcal.solve.words import RECORD_TURNS
 from fieldcal.windows.dead_band import dead_band_messages
 
 UseTurns = Literal["auto", "yes", "no"]
@@ -308,8 +309,8 @@ def _require_turns(
         )
     if "turns" not in calibration.info:
         raise NotObservable(
-            "no turn between two positions was recorded whole, so the gyroscopes have "
-            "no scale factor: record on while the device is turned"
+            "no turn between two positions could be followed, so the gyroscopes have "
+            f"no scale factor: {RECORD_TURNS}"
         )
 
 

@@ -44,17 +44,23 @@ class Aliases:
     pairs: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def find_aliases(positions: Sequence[Position], gravity: float) -> Aliases:
+def find_aliases(
+    positions: Sequence[Position], gravity: float, mounting: Array | None = None
+) -> Aliases:
     """Effects at rest that the positions hide or confuse.
 
     Parameters
     ----------
     positions : with known angles
     gravity : m/s^2
+    mounting : (3, 3), procedure = mounting @ device
 
     """
-    gamma = gamma_angles(positions)
-    x = Experience.at_rest(*alpha_beta_angles(positions), gravity, gamma=gamma)
+    x = Experience.at_rest(
+        *alpha_beta_angles(positions), gravity,
+        gamma=gamma_angles(positions),
+        mounting=np.eye(3) if mounting is None else mounting,
+    )  # fmt: skip
     perfect = State(np.zeros(6), np.ones(6), np.zeros((0, 2)), np.zeros(3))
     view = RowView.of(x, np.full((1, len(x)), np.inf), perfect)
     base = _calibration(view)

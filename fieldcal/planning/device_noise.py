@@ -56,11 +56,15 @@ class DeviceNoise:
     gyr: TriadNoise | None
 
     def grade(self, seconds: float) -> GradeNoise:
-        """The noise in the terms of the planner, for windows of `seconds`, (1)."""
+        """The noise in the terms of the planner, for windows of `seconds`, (1).
+
+        The white noise of a triad that was not measured is nan: 0 would be a triad
+        without any.
+        """
         parts: list[float] = []
         for triad in (self.acc, self.gyr):
             if triad is None:
-                parts += [0.0, np.inf]
+                parts += [np.nan, np.inf]
                 continue
             rest = triad.error(seconds) ** 2 - triad.white**2 / seconds
             parts += [triad.white, float(np.sqrt(max(rest, 0.0)))]

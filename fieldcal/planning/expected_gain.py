@@ -293,10 +293,8 @@ class ExpectedGain:
     def _turns_to(self, alpha: Array, beta: Array) -> Array:
         """Turn from the last position to each of some, (n, 3) rad in device axes."""
         x = self.rows.x
-        phi: Array = (
-            shortest_rotation(direction_cosines(x.alpha[-1], x.beta[-1]), alpha, beta)
-            @ x.mounting
-        )
+        last = direction_cosines(x.alpha[-1], x.beta[-1], x.gamma[-1])
+        phi: Array = shortest_rotation(last, alpha, beta) @ x.mounting
         return phi
 
     def _noise_covariance(

@@ -106,7 +106,11 @@ def required_parameters(n: int) -> tuple[str, ...]:
 
 
 def expected(
-    positions: Sequence[Position], grade: GradeNoise, seconds: float, gravity: float
+    positions: Sequence[Position],
+    grade: GradeNoise,
+    seconds: float,
+    gravity: float,
+    mounting: Array | None = None,
 ) -> dict[str, float]:
     """Standard uncertainty of every parameter that the positions determine.
 
@@ -116,6 +120,7 @@ def expected(
     grade : noise of the device
     seconds : averaging time of each
     gravity : m/s^2
+    mounting : (3, 3), procedure = mounting @ device; parameters are of device axes
 
     Returns
     -------
@@ -123,7 +128,8 @@ def expected(
 
     """
     names = required_parameters(len(positions))
-    jacobian = design_matrix(names, positions, gravity).reshape(-1, len(names))
+    design = design_matrix(names, positions, gravity, mounting)
+    jacobian = design.reshape(-1, len(names))
     sigma = grade.acc(seconds) * parameter_sigma(jacobian)
     found = {n: float(s) for n, s in zip(names, sigma, strict=True)}
     gyr = grade.gyr(seconds) / np.sqrt(len(positions))

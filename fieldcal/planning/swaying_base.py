@@ -20,7 +20,7 @@ def window_seconds_needed(hz: float, grade: GradeNoise) -> float:
     Parameters
     ----------
     hz : frequency of the swaying, one wave of `SWAYS_BY`
-    grade : noise of the device
+    grade : noise of the device; a triad whose white noise is nan does not count
 
     """
     amplitude = np.repeat([G0, 2 * np.pi * hz], 3) * SWAYS_BY

@@ -1,7 +1,9 @@
 """Rows of windows of which only the means are known: one row for each window.
 
 A recording has several rows for each window (`model.reduce`). A table of means, and a
-procedure that is still running, have only the means and their covariances.
+procedure that is still running, have only the means and their covariances. If the time
+of any mean is not known, all count as taken at the same time, and no effect that
+depends on time can be found.
 """
 
 from __future__ import annotations
@@ -26,6 +28,9 @@ def rows_of_means(observations: Observations) -> RecordedRows:
     """One row for each window; correlations between outputs are not kept."""
     n, nominal = len(observations), observations.nominal
     index = np.arange(n)
+    time = observations.time
+    if not np.isfinite(time).all():
+        time = np.zeros(n)
     y = observations.mean.copy()
     told = mean_variances(observations)
     sd = np.sqrt(np.where(told > 0, told, np.nan))
@@ -39,7 +44,8 @@ def rows_of_means(observations: Observations) -> RecordedRows:
         *observations.angles,
         observations.gravity,
         f=_measured_force(observations),
-        t=np.where(np.isfinite(observations.time), observations.time, index),
+        t=time,
+        since_start=time - time.min(),
         position=index,
         gamma=gamma_angles(observations.positions),
         attitude_sigma=attitude_sigmas(observations.positions),

@@ -107,7 +107,7 @@ def _gyroscope_warning(
         return (
             f"{join_words(missing)} {'are' if missing[1:] else 'is'} not estimated:"
             " the Earth's rate gives it only roughly in these windows; average longer,"
-            " or record the turns between the positions"
+            f" or {words.RECORD_TURNS}"
         )
     turned = {ParameterName.of(n).entry[1] for n in cross}
     turned |= {ParameterName.of(n).axis for n in gyr}

@@ -11,12 +11,19 @@ from fieldcal.core.probability import chi2_tail
 from fieldcal.core.samples import Array
 from fieldcal.core.sentences import join_words
 from fieldcal.model import thresholds
+from fieldcal.model.turns.motion import MAX_TURN_S
 
 NO_DOF = "no degree of freedom is left to check the fit: add a verification position"
 
+RECORD_TURNS = (
+    f"record the turns between the positions, each within {MAX_TURN_S:g} s and without"
+    " a gap"
+)
+"""Remedy where no turn could be followed, which may have been recorded."""
+
 NO_SCALE = (
     "gyr_scale is not determined: the Earth's rate is too weak for it in such windows; "
-    "record the turns between the positions, which determine it"
+    f"{RECORD_TURNS}, which determine it"
 )
 
 SPELLED_DOF = {1: "one degree of freedom", 2: "two degrees of freedom"}

@@ -18,6 +18,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError
 from fieldcal.core.samples import CHANNELS, Array, Block
+from fieldcal.core.sampling import PAUSE_PERIODS
 from fieldcal.windows.cells import resolution
 from fieldcal.windows.noise import STEP_SAMPLES, short_lag_noise, smallest_steps
 from fieldcal.windows.rounding import variance_of_mean
@@ -26,7 +27,7 @@ MIN_RECORDING_S = 60.0
 """Shortest recording that is evaluated, s."""
 
 MAX_GAP_S = 1.0
-"""Longest gap that is tolerated, s."""
+"""Longest gap that is tolerated, s; of slow samples the longest that is no pause."""
 
 AVERAGES = 4
 """Fewest means a deviation is taken from: the longest tau is a fourth of the record."""
@@ -145,7 +146,7 @@ def _check_recording(block: Block) -> None:
         )
     steps = np.diff(block.t)
     worst = int(np.argmax(steps))
-    if steps[worst] > MAX_GAP_S:
+    if steps[worst] > max(MAX_GAP_S, PAUSE_PERIODS * float(np.median(steps))):
         raise InputError(
             f"no samples for {steps[worst]:.1f} s from {block.t[worst]:.2f} s on: take "
             "the part of the recording before or after"

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fieldcal.core.samples import Array, Block
+from fieldcal.core.sampling import PAUSE_PERIODS
 from fieldcal.windows.rounding import visible_steps
 from fieldcal.windows.sums import channel_sums, smallest_changes, temperature_sums
 from fieldcal.windows.trend import robust_lines
@@ -123,9 +124,21 @@ class CellTable:
         return self.sums[:, 18:24]
 
     @property
-    def spacing(self) -> float:
-        """Device time from one cell to the next on average, s."""
-        return float((self.times[-1] - self.times[0] + CELL) / len(self))
+    def period(self) -> float:
+        """Device time from one cell to the next, s, without pauses.
+
+        Cells are as far apart as samples that come less often than cells.
+        """
+        if len(self) < 2 or np.median(self.counts.max(axis=1)) > 1:
+            return CELL
+        steps = np.diff(self.times)
+        usual = steps[steps <= PAUSE_PERIODS * np.median(steps)]
+        return max(CELL, float(usual.mean()))
+
+    @property
+    def seconds(self) -> float:
+        """Device time of which there are samples, s."""
+        return self.period * len(self)
 
     @property
     def noise(self) -> Array:

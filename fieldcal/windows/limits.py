@@ -22,8 +22,8 @@ class StillnessLimits:
         less on a running vehicle and in a hand
     acc_drift, gyr_drift : m/s^2, rad/s: largest steady change over a window; it is less
         while a device warms up
-    unjudged_s : length of a window from which it is judged; its usual noise is not
-        known earlier
+    unjudged_s : least length of a window that is judged, s: what sways slowly looks
+        like a drift in a shorter one
 
     """
 
@@ -31,7 +31,7 @@ class StillnessLimits:
     gyr: float = 0.1
     acc_drift: float = 0.1
     gyr_drift: float = 0.01
-    unjudged_s: float = 3.0
+    unjudged_s: float = 0.0
 
     @classmethod
     def swaying(cls) -> StillnessLimits:

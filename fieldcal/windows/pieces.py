@@ -18,10 +18,8 @@ from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
+from fieldcal.windows.verdict import FEWEST_JUDGED_CELLS
 from fieldcal.windows.window import LearnedNoise, Window
-
-MIN_PIECE_S = 3.0
-"""Shortest piece that can be tested for rest, s."""
 
 DISCARDED_BEFORE_S = 0.5
 """Least time before a disturbance that is discarded with it, s."""
@@ -111,21 +109,22 @@ class PiecedWindow:
         """
         piece, end = self._now, _undisturbed_until(moved)
         self.dropped = 0.0
-        while piece.seconds > 0:
+        while piece.n:
             piece.truncate(end)
-            again = piece.disturbance if piece.seconds >= MIN_PIECE_S else None
+            again = piece.disturbance if _can_be_tested(piece) else None
             if again is None:
                 break
             end = min(_undisturbed_until(again), end - DISCARDED_BEFORE_S)
-        learned = piece.noise if piece.seconds >= MIN_PIECE_S else self._noise
-        if piece.seconds >= MIN_PIECE_S:
+        learned = self._noise
+        if _can_be_tested(piece):
+            learned = piece.noise
             self._join(piece)
         self._now = Window(self._limits, learned, self._grain)
         return self._kept.seconds if self._kept else 0.0
 
     def is_full(self, seconds: float) -> bool:
         """Whether there are `seconds` s, and the last piece is long enough to test."""
-        short = self._kept is not None and self._now.elapsed < MIN_PIECE_S
+        short = self._kept is not None and not _can_be_tested(self._now)
         return self.elapsed >= seconds and not short
 
     def average(self) -> Average | None:
@@ -176,6 +175,11 @@ class PiecedWindow:
         off = np.abs(before.mean - after.mean)
         known = np.isfinite(off) & np.isfinite(spread)
         return bool((off[known] <= AGREES * spread[known]).all())  # (1)
+
+
+def _can_be_tested(piece: Window) -> bool:
+    """Whether a piece is long enough to be tested for rest."""
+    return piece.cells.complete_count >= FEWEST_JUDGED_CELLS
 
 
 def _gap_between(before: Window, after: Window) -> tuple[float, float]:

@@ -70,7 +70,8 @@ LEAST_PROBABILITY = 0.99
 begins, and the rotation is determined by the turn between both."""
 
 LARGEST_ANGLE = 0.1
-"""Largest angle within the gap, rad; beyond it the device was carried elsewhere."""
+"""Largest angle within the gap, and of the force from before to after it, rad; beyond
+it the device was carried elsewhere, whatever the gyroscopes show."""
 
 LONGEST_S = 60.0
 """Longest gap that is judged, s: the longest turn that is integrated."""
@@ -213,7 +214,9 @@ def probability_unmoved(
     turned, unsure, most = _turn_in_gap(inside, level[3:], change[3:], spread[3:])
     if np.isnan(most):  # gravity leans as far as the device
         most = _largest_angle(inside, level[:3])
-    if not most < LARGEST_ANGLE:
+    # a turn that is not recorded shows in the force alone
+    leans = float(np.linalg.norm(change[:3]) / np.linalg.norm(level[:3]))
+    if not np.fmax(most, leans) < LARGEST_ANGLE:
         return 0.0
     seen = np.concatenate([change[:3], turned])
     noise = np.concatenate([spread[:3], unsure])

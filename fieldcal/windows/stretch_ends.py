@@ -57,7 +57,7 @@ def stretch_end_reasons(
 def _end_reason(beyond: Array, inside: CellTable, origin: Array, side: int) -> str:
     """Reason of one end of a stretch; `beyond` are the cells outside, nearest first."""
     edge = inside.times[-1 if side > 0 else 0]
-    steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - CELL
+    steps = np.abs(np.diff(beyond[:, 0], prepend=edge)) - inside.period
     paused = np.flatnonzero(steps > MIN_PAUSE_S)
     near = beyond[: paused[0]] if len(paused) else beyond
     if said := _motion_phrase(near, inside, origin):

@@ -28,6 +28,10 @@ THRESHOLD, LONG = 5.8, 600
 """Ratio of departure to spread that noise alone does not reach, in a window of `LONG`
 cells, a minute."""
 
+FEWEST_JUDGED_CELLS = 30
+"""Cells from which the usual noise of a window is known: 3 s, or as many samples where
+they come less often than cells."""
+
 EARLY_WINDOW_S = 8.0
 """The threshold is twice as high in a window this long, s, for lack of data."""
 
@@ -112,7 +116,7 @@ def judge_window(
     rounding.
     """
     m = cells.complete_count
-    if m < limits.unjudged_s / CELL:
+    if m < FEWEST_JUDGED_CELLS or m * cells.period < limits.unjudged_s:
         scatter = np.nan_to_num(cells.means[:m]).std(axis=0) if m else np.zeros(6)
         return WindowVerdict(_noise_departure(cells, scatter, limits), 0.0, before)
     means = cells.steady_means[:m]
@@ -201,7 +205,7 @@ def _stuck_runs(cells: CellTable) -> list[Departure]:
             "stuck",
             channel,
             float(cells.times[first]),
-            float(cells.times[end - 1] + CELL - cells.times[first]),
+            float(cells.times[end - 1] + cells.period - cells.times[first]),
             0.0,
             float(sampled[channel]),
         )
@@ -219,7 +223,7 @@ def _worst_departure(
         test.kind,
         channel,
         float(cells.times[cell]),
-        CELL * test.cells,
+        cells.period * test.cells,
         float(test.size[first, channel]),
         float(test.noise[channel]),
     )
@@ -237,7 +241,7 @@ def _drift_departure(
         "drift",
         channel,
         float(cells.times[0]),
-        CELL * len(cells),
+        cells.seconds,
         float(change[channel]),
         float(noise.allan[-1][channel]),
     )
@@ -254,7 +258,7 @@ def _noise_departure(
         "noise",
         channel,
         float(cells.times[int(np.argmax(means))]) if len(means) else np.nan,
-        CELL,
+        cells.period,
         float(scatter[channel]),
         float(limits.noise[channel]),
     )

@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldcal.core.errors import InputError, Moved
 from fieldcal.core.samples import Array, Block, Grain
-from fieldcal.windows.cells import CELL, CellAccumulator, CellTable, join_cells
+from fieldcal.windows.cells import CellAccumulator, CellTable, join_cells
 from fieldcal.windows.grain import rounding_variance, visible_step
 from fieldcal.windows.limits import StillnessLimits
 from fieldcal.windows.mean import Average
@@ -29,7 +29,8 @@ from fieldcal.windows.quiet import QuietNoise
 from fieldcal.windows.verdict import WindowVerdict, judge_window
 
 FEWEST_CELLS = 10
-"""Cells a window must have for its mean to have an error: 1 s of samples."""
+"""Cells a window must have for its mean to have an error: 1 s of samples, or as many
+samples where they come less often than cells."""
 
 SETTLED_S = 15.0
 """Device time from which the gain of further averaging is judged, s."""
@@ -128,7 +129,7 @@ class Window:
     @property
     def seconds(self) -> float:
         """Device time of which there are samples, s."""
-        return CELL * len(self._cells)
+        return self._cells.seconds
 
     @property
     def n(self) -> int:
@@ -240,7 +241,7 @@ class Window:
             If it is too short for its mean to have an error.
 
         """
-        least = FEWEST_CELLS * CELL
+        least = FEWEST_CELLS * self._cells.period
         if len(self._cells) < FEWEST_CELLS:
             what = f"a window of {self.n} samples over {self.elapsed:.2g} s"
             if self.elapsed < least:
@@ -270,7 +271,7 @@ class Window:
             before = self._before.shape_likelihood if self._before else None
             means = self._cells.steady_means
             seven = np.column_stack([means, means @ self._force_direction])
-            self._error = error_of_mean(seven, self._cells.spacing, before)
+            self._error = error_of_mean(seven, self._cells.period, before)
         return self._error
 
     @property

@@ -83,6 +83,44 @@ def test_a_counter_is_unwrapped() -> None:
     np.testing.assert_allclose(np.diff(t), 1e-5, atol=1e-12)
 
 
+@pytest.mark.parametrize("gap", [3.9, 6.5])
+def test_a_counter_that_wrapped_during_an_outage_is_unwrapped_by_the_host(
+    gap: float,
+) -> None:
+    """16 bits of 50 us: the span of 3.3 s is more than arrivals are ever late by."""
+    span = 2**16 * 50e-6
+    truth = np.arange(500) / 100
+    truth = np.append(truth, truth + truth[-1] + gap) + 3 * span - truth[-1] + 0.01
+    host = 1e9 + truth
+    health = LinkHealth()
+    t = placed(StampTimebase(health, span=span), truth % span, host)
+    np.testing.assert_allclose(t - t[0], truth - truth[0], atol=1e-9)
+    assert (health.restarts, health.gaps) == (0, 1)
+
+
+@pytest.mark.parametrize("lead", [1.0, 100.0])
+@pytest.mark.parametrize("span", [float("inf"), 2**32 * 1e-3])
+def test_a_time_of_day_goes_on_over_midnight(span: float, lead: float) -> None:
+    """Also in an outage, and just after the first sample; it is no restart."""
+    health = LinkHealth()
+    truth = 86400 - lead + np.delete(np.arange(20_000) / 100, range(9_950, 10_550))
+    host = 1e9 + truth - truth[0]
+    t = placed(StampTimebase(health, span=span), truth % 86400, host)
+    np.testing.assert_allclose(t, truth, atol=1e-6)
+    assert (health.restarts, health.gaps, health.missing) == (0, 1, 600)
+
+
+@pytest.mark.parametrize("up", [86000.0, 86399.0, 90000.0])
+def test_a_device_that_ran_about_a_day_may_be_restarted(up: float) -> None:
+    """It was off for an hour, and begins at 0: no midnight makes that an hour."""
+    health = LinkHealth()
+    stamps = np.concatenate([up + np.arange(1000) / 100, np.arange(1000) / 100])
+    host = np.concatenate([np.arange(1000) / 100, 3600 + np.arange(1000) / 100])
+    t = placed(StampTimebase(health), stamps, host)
+    assert health.restarts == 1
+    assert t[1000] - t[999] == pytest.approx(3600 - 9.99)
+
+
 @pytest.mark.parametrize("span", [float("inf"), 2**32 * 1e-6])
 @pytest.mark.parametrize("up", [100.0, 3000.0])
 def test_time_goes_on_over_a_reboot_by_what_the_host_saw(

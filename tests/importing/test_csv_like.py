@@ -145,10 +145,11 @@ def test_what_cannot_be_used_is_refused_in_words(
 
 
 @pytest.mark.parametrize("repair", [False, True])
+@pytest.mark.parametrize("rows", [12, 300])
 def test_a_file_written_newest_first_is_to_be_sorted(
-    tmp_path: Path, repair: bool
+    tmp_path: Path, rows: int, repair: bool
 ) -> None:
-    lines = [f"{t},1,2,3\n" for t in range(300, 0, -1)]
+    lines = [f"{t},1,2,3\n" for t in range(rows, 0, -1)]
     path = file(tmp_path, "".join(lines))
     with pytest.raises(InputError, match="newest first; sort its rows"):
         read(path, Layout(("t", *ACC)), repair)

@@ -333,6 +333,41 @@ def test_a_plan_says_how_long_this_device_is_worth_averaging(
     assert "noise.json" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("triad", "says", "words"),
+    [("a", "accelerometers", []), ("g", "gyroscopes", ["--speed", "20"])],
+)
+def test_a_plan_needs_the_noise_of_what_it_calibrates(
+    triad: str,
+    says: str,
+    words: list[str],
+    told: Told,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A device of one triad: what nobody measured is neither quiet nor infinite."""
+    known = {n: c for n, c in told.content["channels"].items() if n[0] != triad}
+    text = json.dumps({**told.content, "channels": known})
+    (tmp_path / "noise.json").write_text(text)
+    words = ["plan", "--noise-of", str(tmp_path), *words]
+    assert main(words) == 2
+    assert f"says nothing of the {says}" in capsys.readouterr().err
+
+
+def test_a_swaying_base_is_planned_for_without_gyroscopes(
+    told: Told, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = {n: c for n, c in told.content["channels"].items() if n[0] == "a"}
+    text = json.dumps({**told.content, "channels": known})
+    (tmp_path / "noise.json").write_text(text)
+    needed = []
+    for folder in (told.folder, tmp_path):
+        words = ["plan", "--json", "--sways", "0.2", "--noise-of", str(folder)]
+        assert main(words) == 0
+        needed.append(json.loads(capsys.readouterr().out)["needed_s"])
+    assert needed[1] <= needed[0] < 60.0
+
+
 def test_the_report_of_the_session_says_how_long_to_average(told: Told) -> None:
     page = told.folder / "report.html"
     assert main(["report", str(told.folder)]) == 0

@@ -97,6 +97,42 @@ def test_the_value_of_a_parameter_is_no_uncertainty(three: ExpectedGain) -> None
     )
 
 
+@pytest.fixture(scope="module")
+def of_scales() -> ExpectedGain:
+    """The gain where the scale factors of the gyroscopes are wanted."""
+    found = explained(START)
+    likely = found.posterior.weights_on_grid
+    allowed = {f"gyr_scale.{axis}": 1e-4 for axis in "xyz"}
+    return ExpectedGain(found.rows, found.inferred, likely, allowed, ANGLE)
+
+
+def test_the_turn_to_a_position_tells_scale_factors(of_scales: ExpectedGain) -> None:
+    """A quarter of a turn by another way tells that of z, and no turn tells none."""
+    told = of_scales.of([Position.deg(45, -5), Position.deg(-45, 5)])
+    z = told.quantities.index("gyr_scale.z")
+    there, here = told.expected_variance[:, z] / told.variance[z]
+    assert there < 0.2 and here > 0.9
+    assert told.gain[0] > 1.0 + told.gain[1]
+
+
+def test_the_turn_to_a_position_begins_at_the_attitude_of_the_last(
+    of_scales: ExpectedGain,
+) -> None:
+    """At a right angle of beta, gamma and alpha turn about one axis."""
+    gain, gains = of_scales, []
+    for alpha, gamma in ((70.0, 0.0), (40.0, 30.0), (90.0, -20.0), (70.0, 30.0)):
+        x = gain.rows.x
+        angles = {"alpha": alpha, "beta": 90.0, "gamma": gamma}
+        last = {name: getattr(x, name).copy() for name in angles}
+        for name, degrees in angles.items():
+            last[name][-1] = np.deg2rad(degrees)
+        one = copy(gain)
+        one.rows = replace(gain.rows, x=replace(x, **last))
+        gains.append(one.of([Position.deg(0, 5), Position.deg(45, -5)]).gain)
+    np.testing.assert_allclose(gains[1:3], [gains[0], gains[0]], rtol=1e-9)
+    assert (np.abs(gains[3] / gains[0] - 1) > 1e-3).any()
+
+
 @pytest.mark.parametrize(
     "place",
     [

@@ -6,6 +6,7 @@ import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fieldcal.cli import main
@@ -27,6 +28,11 @@ rotation_vector_deg = [90.0, 0.0, 0.0]
 [[position]]
 rotation_vector_deg = [-90.0, 0.0, 0.0]
 """
+
+POSITIONS = "".join(
+    f"[[position]]\nalpha_deg = {a}.0\nbeta_deg = {b}.0\n"
+    for a, b in ((-45, -5), (-45, 5), (0, 0), (45, -5), (45, 5))
+)
 
 
 def planned(
@@ -64,6 +70,32 @@ def test_three_angles_are_planned_and_written(
     assert written["site"]["sways"] is True
 
 
+def test_uncertainties_are_those_of_the_device_s_axes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A device with z up: its y and z measure what the procedure's -z and y do."""
+    file, plan = tmp_path / "session.toml", tmp_path / "plan.toml"
+    words = ("--set", "wide")
+    level = planned(capsys, *words)["sigma"]
+    file.write_text(
+        'format = 1\n[frame]\nmounting = ["+x", "-z", "+y"]\n'
+        "[site]\ngravity = 9.79\n" + POSITIONS
+    )
+    for upright in (
+        planned(capsys, *words, "--mounting", "+x,-z,+y"),
+        planned(capsys, "--of", str(file), "-o", str(plan)),
+    ):
+        for group in ("acc_bias", "acc_scale"):
+            for ours, of_level in ("xx", "yz", "zy"):
+                want = pytest.approx(level[f"{group}.{of_level}"], rel=0.01)
+                assert upright["sigma"][f"{group}.{ours}"] == want
+    assert level["acc_scale.y"] < 0.7 * level["acc_scale.z"]
+    written = tomllib.loads(plan.read_text())
+    assert written["frame"]["mounting"] == ["+x", "-z", "+y"]
+    assert written["site"]["gravity"] == 9.79
+    assert written["device"]["grade"] == "tactical"
+
+
 def test_what_cannot_be_planned_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -80,5 +112,7 @@ def test_slow_swaying_and_little_noise_need_longer_windows() -> None:
     seconds = [window_seconds_needed(hz, tactical) for hz in (0.5, 0.1, 0.06)]
     assert seconds[0] < seconds[1] < seconds[2]
     assert seconds[1] >= 12.0  # 1.2 periods
+    untold = GradeNoise(tactical.acc_white, tactical.acc_floor, np.nan, np.inf)
+    assert window_seconds_needed(0.1, untold) <= seconds[1], "of no gyroscopes"
     quiet = GradeNoise(1e-7, 0.0, 1e-9, 0.0)
     assert window_seconds_needed(0.1, quiet) >= seconds[1]

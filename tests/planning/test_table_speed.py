@@ -118,7 +118,12 @@ def test_the_command_says_how_to_set_the_device(
     found = json.loads(capsys.readouterr().out)
     assert found["not_determined"] == ["gyr_scale.z"]
     assert found["sigma"]["gyr_scale.x"] > 0.001
-    for wrong in (["-o", str(tmp_path / "plan.toml")], ["--set", "two"]):
+    file = tmp_path / "session.toml"
+    file.write_text("format = 1\n")
+    for wrong in (
+        ["-o", str(tmp_path / "plan.toml")], ["--set", "two"], ["--sways", "0.2"],
+        ["--of", str(file)],
+    ):  # fmt: skip
         assert main([*words, *wrong]) == 2
     assert "speed_deg_s" in capsys.readouterr().err
 

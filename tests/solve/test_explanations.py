@@ -52,9 +52,7 @@ def seen(drift: float = DRIFT, noise: int | None = None) -> Observations:
 
 def recording(drift: float = DRIFT, noise: int | None = None) -> RecordedRows:
     """Its rows, with the time since the start."""
-    rows = rows_of_means(seen(drift, noise))
-    x = replace(rows.rows.x, since_start=TIMES)
-    return replace(rows, rows=replace(rows.rows, x=x))
+    return rows_of_means(seen(drift, noise))
 
 
 def given(shown: Sequence[WeightedExplanation] = ()) -> ParameterSet:

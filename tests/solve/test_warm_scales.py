@@ -40,10 +40,7 @@ def recording(change: Array, noise: Array, drift: Array = DRIFT) -> RecordedRows
     """Windows of a device that changes with time: biases, and scale factors."""
     force = (outputs(PLACES, bias=np.zeros(3)) / SCALE) * TIMES[:, None]
     acc = outputs(PLACES) + drift * TIMES[:, None] + change * force + noise
-    rows = rows_of_means(replace(observe(PLACES, acc), time=TIMES))
-    return replace(
-        rows, rows=replace(rows.rows, x=replace(rows.rows.x, since_start=TIMES))
-    )
+    return rows_of_means(replace(observe(PLACES, acc), time=TIMES))
 
 
 CALM = recording(np.zeros(3), np.zeros((COUNT, 3)))

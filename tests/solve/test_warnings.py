@@ -17,11 +17,12 @@ from fieldcal.solve.options import SolveOptions
     [
         (False, False, ["gyr_scale.x"], [],
          "gyr_scale.x is not estimated: the Earth's rate gives it only roughly in these"
-         " windows; average longer, or record the turns between the positions"),
+         " windows; average longer, or record the turns between the positions, each"
+         " within 60 s and without a gap"),
         (False, False, ["gyr_scale.x", "gyr_scale.y"], [],
          "gyr_scale.x and gyr_scale.y are not estimated: the Earth's rate gives it only"
          " roughly in these windows; average longer, or record the turns between the"
-         " positions"),
+         " positions, each within 60 s and without a gap"),
         (True, False, ["gyr_scale.y"], ["gyro_cross_coupling.s13"],
          "gyr_scale.y and 1 of 6 gyro_cross_coupling are not determined by these turns:"
          " add turns about device axis y and z while that axis is level"),

@@ -85,6 +85,21 @@ def test_what_cannot_be_told_is_refused() -> None:
         allan_deviation(block).sigma_of_mean(100.0)
 
 
+@pytest.mark.parametrize("rate", [0.5, 1.0])
+def test_slow_samples_are_no_gaps(rate: float) -> None:
+    """Of a logger, at its own uneven times."""
+    rng = np.random.default_rng(3)
+    t = (np.arange(1200) + rng.uniform(-0.05, 0.05, 1200)) / rate
+    acc = 0.02 * rng.standard_normal((1200, 3))
+    found = allan_deviation(Block.of(t, acc))
+    at = int(np.argmin(np.abs(found.tau - 10 / rate)))
+    white = 0.02 / np.sqrt(found.tau[at] * rate)
+    np.testing.assert_allclose(found.deviation[at, :3], white, rtol=0.2)
+    late = np.where(t > 600, 8.0 / rate, 0.0)
+    with pytest.raises(InputError, match="no samples for"):
+        allan_deviation(Block.of(t + late, acc))
+
+
 def deviation_of(x: Array, m: int) -> float:
     """Root of half the mean square difference of neighbouring means of m, each one."""
     means = [x[k : k + m].mean() for k in range(len(x) - m + 1)]

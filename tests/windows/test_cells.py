@@ -93,8 +93,8 @@ def test_the_whole_of_a_table_is_that_of_its_samples() -> None:
     assert table.temperature == pytest.approx(np.nanmean(samples.temperature))
     np.testing.assert_array_equal(table.resolution, np.full(6, 0.125))
     assert table.span == (samples.t[0], samples.t[-1])
-    spacing = (table.times[-1] - table.times[0] + 0.1) / len(table)
-    assert table.spacing == pytest.approx(spacing)
+    assert table.period == 0.1
+    assert table.seconds == pytest.approx(0.1 * len(table))
     # the noise hides steps this fine
     assert not table.rounding.any()
 
@@ -238,3 +238,17 @@ def test_a_missing_mean_is_the_one_before() -> None:
     before = np.array([[7.0, 8.0]])
     expected = [[7, 1], [2, 1], [2, 1], [3, 4]]
     np.testing.assert_array_equal(fill_with_previous(means, before), expected)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+@pytest.mark.parametrize("rate", [2.0, 5.0, 7.0, 10.0, 14.0, 100.0])
+def test_cells_last_as_long_as_the_samples_in_them(rate: float, jitter: float) -> None:
+    """Below 10 Hz a cell holds one sample, or none; a pause is no time of a sample."""
+    rng = np.random.default_rng(4)
+    t = np.arange(round(40 * rate)) / rate
+    t += jitter / rate * rng.uniform(-1, 1, len(t))
+    t[len(t) // 2 :] += 60.0
+    cells = CellAccumulator()
+    cells.add(Block.of(t, rng.standard_normal((len(t), 3))))
+    assert cells.table.seconds == pytest.approx(40.0, rel=0.02)
+    assert cells.table.period == pytest.approx(max(0.1, 1 / rate), rel=0.15)

@@ -63,6 +63,8 @@ def test_what_is_zero_for_another_reason_is_no_dead_band() -> None:
     lost[100:120] = 0.0
     coarse = np.round(smooth / BAND) * BAND
     told = np.round(coarse, 3)  # a grid as a text of few digits has it
+    # cut, and not rounded, to those digits: a step is 0.017 forth and 0.018 back
+    cut = np.floor(np.round(smooth / 0.0175) * 17.5) / 1e3
     sparse = np.where(np.arange(len(smooth))[:, None] % 7, coarse, np.nan)
-    for some in (smooth, lost, coarse, told, sparse, np.zeros_like(smooth)):
+    for some in (smooth, lost, coarse, told, cut, sparse, np.zeros_like(smooth)):
         assert not of_triads(some, some).any()

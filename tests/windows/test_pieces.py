@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fieldcal.core.errors import Moved
 from fieldcal.core.samples import Array, Block, Grain
 from fieldcal.windows import PiecedWindow
 
@@ -12,9 +13,11 @@ NOISE = np.array([0.02] * 3 + [2e-3] * 3)
 AT_REST = np.array([0.1, -9.8, 0.2, 1e-3, -2e-3, 3e-3])
 
 
-def rest(rng: np.random.Generator, start: float, seconds: float, off: Array) -> Block:
-    """White noise about where the device lies, 100 Hz."""
-    t = start + np.arange(round(100 * seconds)) / 100
+def rest(
+    rng: np.random.Generator, start: float, seconds: float, off: Array, hz: float = 100
+) -> Block:
+    """White noise about where the device lies."""
+    t = start + np.arange(round(hz * seconds)) / hz
     six = AT_REST + off + NOISE * rng.standard_normal((len(t), 6))
     return Block.of(t, six[:, :3], six[:, 3:])
 
@@ -113,3 +116,36 @@ def test_what_is_no_window_together_is_given_up_and_ends() -> None:
     assert not pieces.is_full(30.0) and pieces.is_full(11.0)
     found = pieces.average()
     assert found is not None and found.n == pytest.approx(1200, abs=2)
+
+
+@pytest.mark.parametrize("hz", [2.0, 5.0, 7.0, 20.0])
+def test_pieces_of_a_slow_device_last_as_long_as_was_asked_for(hz: float) -> None:
+    """What is kept of 40 s is what was undisturbed, and the rest of 60 s follows."""
+    rng = np.random.default_rng(8)
+    pieces, first = PiecedWindow(None, Grain()), rest(rng, 0.0, 40.0, np.zeros(6), hz)
+    first.acc[first.t > 36.0, 2] += 0.5
+    pieces.add(first)
+    moved = pieces.disturbance
+    assert moved is not None and 34.0 < moved.at < 38.0
+    end = moved.at - max(0.5, moved.seconds)
+    kept = pieces.keep_undisturbed(moved)
+    assert kept == pytest.approx(end, abs=0.3 + 1 / hz)
+    later = rest(rng, 60.0, 60.0 - kept + 2 / hz, np.zeros(6), hz)
+    for i in range(len(later) - 4):
+        pieces.add(later[i : i + 1])
+    assert not pieces.is_full(60.0)
+    pieces.add(later[len(later) - 4 :])
+    assert pieces.is_full(60.0)
+    found = pieces.average()
+    assert found is not None and found.n == pytest.approx(60 * hz, abs=2 + hz / 5)
+
+
+def test_a_piece_of_too_few_samples_to_be_tested_is_not_kept() -> None:
+    """Ten seconds of 2 Hz are twenty samples, and show no disturbance."""
+    rng = np.random.default_rng(9)
+    for seconds, kept in ((10.0, False), (30.0, True)):
+        pieces = PiecedWindow(None, Grain())
+        pieces.add(rest(rng, 0.0, seconds, np.zeros(6), 2.0))
+        assert (pieces.keep_undisturbed(Moved("", seconds, "ax", 1.0)) > 0) is kept
+        pieces.add(rest(rng, 60.0, 12.0, np.zeros(6), 2.0))
+        assert pieces.is_full(11.0) is not kept

@@ -137,6 +137,17 @@ def test_of_a_bias_that_jumps_untouched_nothing_is_left_out(touched: bool) -> No
     assert rest.start < 2 and rest.end > 118
 
 
+def test_positions_without_the_turns_between_them_are_not_one() -> None:
+    """Rows that are taken at rest only: the gyroscopes show no turn."""
+    t = np.arange(4000) / RATE
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        force = np.array([[0, 0, G], [0, G, 0], [G, 0, 0], [0, 0, -G]])
+        acc = force[np.arange(4000) // 1000] + 0.01 * rng.standard_normal((4000, 3))
+        block = Block.of(t, acc, 1e-3 * rng.standard_normal((4000, 3)))
+        assert len(rests(block)) == 4, seed
+
+
 def test_what_went_on_in_a_pause_nobody_knows() -> None:
     block = recorded(1)
     some = [block.between(0, 40.2), block.between(43.2, 200)]

@@ -76,3 +76,21 @@ def test_a_coarse_output_that_flips_rests() -> None:
         block.t, np.round(block.acc / 0.1) * 0.1, np.round(block.gyr / 0.02) * 0.02
     )
     assert len(still_stretches(coarse)) == 2
+
+
+def test_samples_that_come_slowly_are_no_pauses() -> None:
+    """Of half a hertz: two seconds to the next are what is usual there."""
+    rng = np.random.default_rng(2)
+    t = 2.0 * np.arange(200)
+    acc = [0.0, 0.0, 9.8] + rng.normal(0, 0.01, (200, 3))
+    gyr = rng.normal(0, 1e-3, (200, 3))
+    gyr[90:100, 1] += 0.6
+    acc[90:100, 0] += np.linspace(0, 5, 10)
+    acc[100:, 0] += 5.0
+    cells = CellAccumulator()
+    cells.add(Block.of(t, acc, gyr))
+    rows, origin = cell_rows(cells.table), cells.table.origin
+    for span in ((20.0, 120.0), (40.0, 178.0)):
+        ((_, ended),) = stretch_end_reasons(rows, origin, [span])
+        assert "pause" not in ended
+    assert ended == "it is turned: gy reaches 0.6 rad/s"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -314,8 +315,8 @@ def parts_of(block: Block) -> tuple[Array, Array, Array]:
     n = np.nan_to_num(cells.table.mean) * [1, 1, 1, 0, 0, 0]
     n /= np.linalg.norm(n)
     steady = cells.table.steady_means
-    plain = error_of_mean(steady, cells.table.spacing).covariance
-    along = error_of_mean((steady @ n)[:, None], cells.table.spacing).covariance
+    plain = error_of_mean(steady, cells.table.period).covariance
+    along = error_of_mean((steady @ n)[:, None], cells.table.period).covariance
     return plain, along, n
 
 
@@ -339,7 +340,7 @@ def test_a_device_without_a_force_has_the_covariance_of_its_axes() -> None:
     gyr = Block.of(block.t, np.full_like(block.acc, np.nan), block.gyr)
     cells = CellAccumulator()
     cells.add(gyr)
-    plain = error_of_mean(cells.table.steady_means, cells.table.spacing).covariance
+    plain = error_of_mean(cells.table.steady_means, cells.table.period).covariance
     window = filled(gyr)
     np.testing.assert_allclose(window.covariance[3:, 3:], plain[3:, 3:], rtol=1e-6)
     assert np.isnan(window.sigma[:3]).all() and window.disturbance is None
@@ -505,6 +506,49 @@ def test_a_window_one_cell_short_is_told_what_it_needs() -> None:
     )
     short = filled(block_of(white(np.random.default_rng(0), 90)))
     assert short.covariance.shape == (6, 6) and np.isnan(short.covariance).all()
+
+
+def test_a_slow_device_needs_as_many_samples() -> None:
+    """At 1 Hz nothing is missing of 8 s: they are too short."""
+    block = block_of(white(np.random.default_rng(0), 8), rate=1.0)
+    with pytest.raises(InputError, match="too short for its mean .* take 10 s or more"):
+        average(block)
+    longer = average(block_of(white(np.random.default_rng(0), 12), rate=1.0))
+    assert np.isfinite(longer.sigma).all()
+
+
+def test_a_disturbance_of_a_slow_device_lasts_as_long_as_it_did() -> None:
+    """Of 3.2 s at 5 Hz, which are 16 cells with a sample."""
+    x = white(np.random.default_rng(3), 200)
+    x[100:116] += 12.0
+    moved = rejection(block_of(x, 5.0))
+    assert moved is not None and moved.at == pytest.approx(20.0, abs=0.21)
+    assert moved.seconds == pytest.approx(3.2)
+    assert "a 3.2 s push" in str(moved)
+
+
+@pytest.mark.parametrize("rate", [2.0, 50.0])
+def test_on_a_base_that_sways_a_window_is_judged_from_the_longest_period_on(
+    rate: float,
+) -> None:
+    """By its time, not by its number of samples: a lean of 2 degrees is no window."""
+    x = white(np.random.default_rng(1), round(60 * rate)) / 5
+    leans = block_of(x, rate)
+    leans.acc[leans.t >= 40, 0] += 0.3
+    window = Window(StillnessLimits.swaying())
+    window.add(leans.between(0, 15.5))
+    assert window.noise is None, "not judged yet"
+    window.add(leans.between(15.5, 60))
+    moved = window.disturbance
+    assert moved is not None and moved.at == pytest.approx(40.0, abs=0.6)
+
+
+def test_the_error_of_a_mean_does_not_depend_on_a_pause_in_its_window() -> None:
+    """Nor does the corner of a low-passed sensor, 0.3 Hz, that shows in it."""
+    block = block_of(low_passed(0.3)(np.random.default_rng(5), 6000))
+    late = replace(block, t=block.t + 300.0 * (block.t >= 30.0))
+    (plain, paused) = (filled(one).covariance for one in (block, late))
+    np.testing.assert_allclose(paused, plain, rtol=1e-9)
 
 
 def test_a_window_of_which_most_is_missing_is_not_called_short() -> None:

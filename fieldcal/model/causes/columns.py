@@ -55,8 +55,11 @@ class RowView:
     x: Experience
     since: Array
     state: State
-    _by_origin: dict[int, Experience] = field(default_factory=dict, repr=False)
-    rotations: list[Array] = field(default_factory=list, repr=False)
+    # a copy with other inputs has none of what was calculated from these
+    _by_origin: dict[int, Experience] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    rotations: list[Array] = field(default_factory=list, init=False, repr=False)
 
     @classmethod
     def of(cls, plain: Experience, since: Array, state: State) -> RowView:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldcal.core.derivative import derivative
 from fieldcal.core.samples import ACC, GYR, Array
 from fieldcal.model import priors
 from fieldcal.model.causes.cause import Group
@@ -45,12 +46,12 @@ def _bent(view: RowView) -> Array:
     x, out = view.x, np.zeros((len(view.x), 6, 6))
     if not x.w_dot.any() or np.any(x.position >= 0):
         return out
-    change = np.hstack([np.gradient(x.f, x.t, axis=0), x.w_dot]) * view.state.scale
+    change = np.hstack([derivative(x.t, x.f), x.w_dot]) * view.state.scale
     change[[0, -1]] = 0.0  # it rests there, so that all of (2) is seen
-    bent = np.gradient(change, x.t, axis=0) / 2
+    bent = derivative(x.t, change) / 2
     for k in range(3):
         for i, triad in enumerate((ACC, GYR)):
             out[:, triad, 2 * k + i] = bent[:, triad]
         at_rest = np.pad(bent[1:-1], ((1, 1), (0, 0)))
-        bent = -np.gradient(at_rest, x.t, axis=0) / (k + 3)
+        bent = -derivative(x.t, at_rest) / (k + 3)
     return out

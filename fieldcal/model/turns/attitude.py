@@ -11,6 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.derivative import derivative
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.turns.rotation import attitudes_from_rotations, small_turns
 from fieldcal.physics.experience import Experience
@@ -78,13 +79,14 @@ def antisymmetric_vector(matrix: Array) -> Array:
 
 def accelerations(t: Array, w: Array) -> Array:
     """Angular acceleration at the edges (m + 1, 3), from short means of the rate."""
-    step = float(t[1] - t[0])
+    step = float(np.ptp(t)) / (len(t) - 1)
     m = max(1, round(ACCELERATION_MEAN_S / step)) | 1
     kernel = np.ones(m) / m
     padded = np.pad(w, ((m // 2, m // 2), (0, 0)), mode="edge")
     smooth = np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T])
-    out: Array = np.gradient(smooth, t, axis=0)
-    return out
+    # times are averaged likewise: those of one batch may be the same but for a little
+    times = np.pad(t, m // 2, mode="reflect", reflect_type="odd")
+    return derivative(np.convolve(times, kernel, "valid"), smooth)
 
 
 def vertical_lost(x: Experience, pair: tuple[int, int], attitude: Array) -> bool:

@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.derivative import derivative
 from fieldcal.core.rotation import rotation_matrices
 from fieldcal.core.samples import Array
 
@@ -39,7 +40,7 @@ def mean_rates(t: Array, w: Array) -> Array:
     """Mean of the rate (n, 3) from each sample to the next, (n - 1, 3), (2)."""
     mean: Array = (w[:-1] + w[1:]) / 2
     if len(t) > 2:
-        slope = np.gradient(w, t, axis=0)
+        slope = derivative(t, w)
         mean -= np.diff(t)[:, None] * np.diff(slope, axis=0) / 12
     return mean
 

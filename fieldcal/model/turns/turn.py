@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fieldcal.core.derivative import derivative
 from fieldcal.core.samples import Array, Index
 from fieldcal.model.rows.reduce import Rows, RowSource
 from fieldcal.model.rows.window_bounds import window_bounds
@@ -117,8 +118,8 @@ class Turn:
         """
         t = self.x.t
         mean = trapezoid_means(t, values, self.cut)
-        step = float(t[1] - t[0])
-        slope = np.gradient(values, t, axis=0)[self.cut]
+        step = float(np.ptp(t)) / (len(t) - 1)
+        slope = derivative(t, values)[self.cut]
         length = np.diff(t[self.cut]).reshape(-1, *[1] * (values.ndim - 1))
         bend: Array = np.diff(slope, axis=0) / length
         return mean - (step**2 - self.interval**2) / 12 * bend

@@ -17,6 +17,12 @@ from fieldcal.service import api, openapi
 from fieldcal.service.jobs import JobStore
 from fieldcal.service.queue import JobQueue
 
+REMEDY = (
+    "open the address that the console of fieldcal serve shows; a program sends a token"
+    " of the --tokens file, as Authorization: Bearer TOKEN"
+)
+"""What one is told to do who has no token."""
+
 SHORTEST_TOKEN = 16
 """Least length of a token, characters."""
 
@@ -66,6 +72,7 @@ class Service:
             (*hosts, *names),
             bearers=tuple(tokens),
             uploads={openapi.SESSIONS_PATH: jobs.bounds.upload},
+            remedy=REMEDY,
         )
         config = uvicorn.Config(
             Gate(api.create_app(jobs, queue), access), log_config=None,

@@ -17,6 +17,7 @@ from fieldcal.model.rows.motion import (
 )
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.response import Response
+from fieldcal.physics.experience import Experience
 
 LENGTH, COUNT = 6, 4
 STILL = Alignment(0.0, 0.0, 0.0)
@@ -121,6 +122,32 @@ def test_the_bend_of_force_is_its_second_derivative_in_the_axes_of_the_device() 
     expected = -((0.7 + 0.1 * np.arange(3)) ** 2) * course(there.middles - 0.3)[:, :3]
     found = there.experience(there.acc).f_bend
     np.testing.assert_allclose(found, expected @ turn.T, atol=1e-3)
+
+
+def test_the_temperature_is_known_between_the_readings_of_a_thermometer() -> None:
+    """One that is read once a second leaves a gap in nearly every row."""
+    t = np.arange(0.0, 40.0, 0.02)
+    degrees = 20 + 0.3 * t
+    read = np.where(np.arange(len(t)) % 50 == 7, degrees, np.nan)
+    for temperature in (degrees, read, np.where(t < 3, np.nan, degrees)):
+        x = warmed(t, temperature)
+        assert x.warms
+        within = (x.t > 4) & (x.t < 39)
+        np.testing.assert_allclose(x.warming[within], 0.3 * x.t[within], atol=1e-2)
+        np.testing.assert_allclose(x.heating[within], 0.3, atol=1e-2)
+
+
+def test_the_noise_of_a_thermometer_is_no_change_of_temperature() -> None:
+    t = np.arange(0.0, 40.0, 0.02)
+    assert not warmed(t, np.full(len(t), np.nan)).warms
+    noise = np.random.default_rng(3).normal(0, 0.01, len(t))
+    assert not warmed(t, 20 + noise).warms
+
+
+def warmed(t: Array, temperature: Array) -> Experience:
+    block = replace(Block.of(t, course(t)[:, :3]), temperature=temperature)
+    there = rows_in_motion(block, reference(), STILL, 2, 2.0, 1.0)
+    return there.experience(there.acc)
 
 
 def test_rows_end_at_gaps_of_recording_and_reference() -> None:

@@ -103,12 +103,18 @@ def _compare_by_motion(
     """Compare with a simulator output that follows the recorded motion."""
     from fieldcal.against.motion import compare_in_motion
     from fieldcal.against.opening import read_output
+    from fieldcal.against.sensor_model import CALIBRATION
 
     read = read_output(path)
     found = compare_in_motion(
         (session.block, session.about), read.block, (str(args.session), args.against)
     )
     said = list(read.says)
+    if args.patch and any(d.id in CALIBRATION for d in found.differences):
+        said.append(
+            "a motion does not show the simulator's own biases and scale factors: the"
+            " patch has those of a simulator that had none before"
+        )
     if args.patch and any(d.id == "misalignment" for d in found.differences):
         said.append(
             f"{args.patch} has nothing for misalignment: the patch is in the axes of"

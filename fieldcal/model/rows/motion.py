@@ -22,7 +22,7 @@ DCT-II, N. Ahmed et al. 1974; P. Whittle 1953 for the independence.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,6 +211,30 @@ def frequencies(count: int, length: int, step: float) -> Array:
     return out
 
 
+def common_samples(block: Block, reference: Reference) -> Block:
+    """Samples in which all channels have a value, if most have not.
+
+    Where one triad is read more often than the other, every row would have a gap.
+    """
+    six = block.six[:, _compared_channels(block, reference)]
+    whole = np.flatnonzero(np.isfinite(six).all(axis=1))
+    if len(whole) < 2 or np.median(np.diff(whole)) == 1:
+        return block
+    kept, read = block[whole], np.isfinite(block.temperature)
+    if read.any():  # perhaps in the other samples
+        degrees = np.interp(kept.t, block.t[read], block.temperature[read])
+        kept = replace(kept, temperature=degrees)
+    return kept
+
+
+def _compared_channels(block: Block, reference: Reference) -> NDArray[np.bool_]:
+    """Measured channels of the triads of which the reference has any, (6,)."""
+    told = np.repeat(reference.observed.reshape(2, 3).any(axis=1), 3)
+    measured = np.isfinite(block.six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
+    compared: NDArray[np.bool_] = told & measured
+    return compared
+
+
 def rows_in_motion(
     block: Block,
     reference: Reference,
@@ -232,8 +256,7 @@ def rows_in_motion(
     """
     six = block.six
     six[:, np.repeat(~reference.observed.reshape(2, 3).any(axis=1), 3)] = np.nan
-    measured = np.isfinite(six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
-    good = np.isfinite(six[:, measured]).all(axis=1)
+    good = np.isfinite(six[:, _compared_channels(block, reference)]).all(axis=1)
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))

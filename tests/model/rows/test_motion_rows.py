@@ -12,6 +12,7 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.motion import (
     Alignment,
     MotionRows,
+    common_samples,
     frequencies,
     rows_in_motion,
 )
@@ -142,6 +143,26 @@ def test_the_noise_of_a_thermometer_is_no_change_of_temperature() -> None:
     assert not warmed(t, np.full(len(t), np.nan)).warms
     noise = np.random.default_rng(3).normal(0, 0.01, len(t))
     assert not warmed(t, 20 + noise).warms
+
+
+def test_gyroscopes_that_are_read_half_as_often_leave_rows_without_gaps() -> None:
+    t = np.arange(5.0, 30.0, 0.02)
+    acc, gyr, odd = course(t)[:, :3], course(t)[:, 3:].copy(), np.arange(len(t)) % 2
+    gyr[odd == 0] = np.nan
+    read = np.where(odd == 0, 20 + 0.3 * t, np.nan)
+    both = replace(Block.of(t, acc, gyr), temperature=read)
+    thinned = common_samples(both, reference())
+    np.testing.assert_array_equal(thinned.t, t[1::2])
+    there = rows_in_motion(thinned, reference(), STILL, 2, 2.0, 1.0)
+    assert len(there) * there.step > 22 and there.step == pytest.approx(0.08)
+    np.testing.assert_allclose(there.y, there.motion(there.acc), atol=1e-6)
+    assert there.experience(there.acc).warms
+    whole = Block.of(t, acc)
+    assert common_samples(whole, reference()) is whole, "there is no other triad"
+    gyr[odd == 0] = 0.0
+    gyr[300] = np.nan
+    lost = Block.of(t, acc, gyr)
+    assert common_samples(lost, reference()) is lost, "a lost sample is a gap"
 
 
 def warmed(t: Array, temperature: Array) -> Experience:

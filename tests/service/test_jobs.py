@@ -330,6 +330,26 @@ def test_a_job_whose_result_cannot_be_stored_is_repeated_until_it_can(
     assert stored.serial == "A1"
 
 
+def test_nothing_is_stored_of_a_job_that_was_deleted_meanwhile(tmp_path: Path) -> None:
+    jobs, pool = (
+        JobStore(tmp_path / "jobs", ServiceBounds()),
+        WorkerPool(lambda: ThreadPoolExecutor(1), 1),
+    )
+    first = added(jobs).id
+
+    def task(folder: str) -> StoredSession:
+        if folder.endswith(first):
+            assert jobs.remove(first)
+        return quick(folder)
+
+    with JobQueue(jobs, Database(tmp_path / "h"), pool, task) as made:
+        second = added(jobs).id
+        made.notify()
+        assert over(jobs, second).state == "done"
+    (stored,) = Database(tmp_path / "h").run(sessions.find_sessions)
+    assert stored.folder == str(jobs.folder(second))
+
+
 def test_a_result_that_can_never_be_stored_holds_up_no_other(tmp_path: Path) -> None:
     jobs, pool = (
         JobStore(tmp_path, ServiceBounds()),

@@ -104,9 +104,9 @@ def check_match(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
     shown = [name for name in every if _is_compared(name, found)]
     names = [*shown, *found.alike, *(d.id for d in found.differences)]
     out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
-    lacking = "it has a limit and was not compared: one of the two does not show it"
+    lacking = "was not compared, since one of the two does not show it"
     out += [
-        MatchCheck(name, False, lacking)
+        MatchCheck(name, False, f"{name.replace('_', ' ')} {lacking}")
         for name in every
         if name in allowed and name not in names
     ]

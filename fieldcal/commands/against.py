@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         (sys.stderr if args.json else sys.stdout).write(f"written: {path}\n")
     beyond = [one for one in gate if not one.ok]
     for one in beyond if allowed else ():
-        sys.stderr.write(f"fieldcal diagnose: beyond its limit: {one.says}\n")
+        sys.stderr.write(f"fieldcal diagnose: not within its limit: {one.says}\n")
     return 1 if beyond else 0
 
 

@@ -76,9 +76,8 @@ def test_whatever_differs_fails_unless_it_is_within_its_limit() -> None:
 def test_what_one_of_the_two_does_not_show_has_not_passed() -> None:
     """As a simulator without gyroscopes, or a recording without turns."""
     less = {k: v for k, v in CALIBRATED.items() if k.startswith("acc")}
-    for side in ("real", "simulator"):
-        facts = replace(FACTS, calibration=less)
-        found = replace(match(), **{side: facts})
+    facts = replace(FACTS, calibration=less)
+    for found in (replace(match(), real=facts), replace(match(), simulator=facts)):
         names = [one.name for one in check_match(found, {})]
         assert names == ["acc_bias", "acc_scale", "noise", "quadratic"]
         assert failed(found, "gyr_bias=0.01", "acc_bias=0.01") == ["gyr_bias"]

@@ -32,6 +32,7 @@ from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
 from fieldcal.history.store import History
 from fieldcal.run.page.access import cookie_name
+from fieldcal.run.page.server import local_address
 from fieldcal.service import openapi
 from fieldcal.service.bounds import ServiceBounds
 from fieldcal.service.jobs import RESULTS_FOLDER, JobStore
@@ -221,6 +222,22 @@ def test_two_pages_on_one_computer_do_not_log_each_other_out(tmp_path: Path) -> 
         for each in (one, two):
             browser = Client(each.client.base, "")
             assert browser.ask("/", headers={"Cookie": header}).status == 200
+
+
+def test_the_address_that_is_shown_can_be_opened(tmp_path: Path) -> None:
+    """No browser elsewhere reaches 0.0.0.0, which is every address of a computer."""
+    jobs, pool = (
+        JobStore(tmp_path, BOUNDS),
+        WorkerPool(lambda: ThreadPoolExecutor(1), 1),
+    )
+    queue = JobQueue(jobs, Database(tmp_path / "h"), pool)
+    for names in ((), ("lab.example:8750",)):
+        service = Service.listen("0.0.0.0", 0, jobs, queue, names=names)  # noqa: S104
+        with service.socket:
+            port = service.socket.getsockname()[1]
+            first = names[0] if names else f"{local_address()}:{port}"
+            assert service.address.startswith(f"http://{first}/?token=")
+            assert f"localhost:{port}" in service.access.hosts
 
 
 @pytest.mark.parametrize(

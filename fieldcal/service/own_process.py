@@ -16,7 +16,6 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from fieldcal.fleet.workers import DIED
 from fieldcal.history.sessions import StoredSession
 
 
@@ -35,6 +34,8 @@ def run_in_own_process(
         made = process.stdout.read()
         process.wait()  # before its input is closed, which would end it
     if process.returncode:
+        from fieldcal.fleet.workers import DIED
+
         return StoredSession(folder, error=DIED)
     found: StoredSession = pickle.loads(made)
     return found

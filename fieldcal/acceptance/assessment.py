@@ -40,6 +40,7 @@ from fieldcal.history.store import History, HistoryRun, earlier_runs, family_run
 from fieldcal.session.folder import Session
 from fieldcal.session.installed_calibration import subtracts_gyro_offset
 from fieldcal.session.marks import taken_windows
+from fieldcal.session.recorded_part import recorded_part
 from fieldcal.windows import Average, average
 from fieldcal.windows.dead_axis import broken_axis_messages
 
@@ -76,7 +77,8 @@ def assess(
     if history is not None and serial:
         try:
             runs = history.runs(serial)
-            usual = family_runs(earlier_runs(runs, session.folder, taken_at))
+            part = recorded_part(session.folder) if runs else None
+            usual = family_runs(earlier_runs(runs, session.folder, taken_at, part))
             if runs and taken_at is None:
                 warnings.append(TIME_UNKNOWN)
             earlier = family_at_temperature(calibration, usual, limits)
@@ -187,7 +189,8 @@ def store_in_history(
     if not session.about.device.get("serial"):
         return ""
     try:
-        history.add(calibration.info.get("taken_at"), session.folder, calibration)
+        taken_at, part = calibration.info.get("taken_at"), recorded_part(session.folder)
+        history.add(taken_at, session.folder, calibration, part)
     except FieldcalError as error:
         return f"the calibration is not stored in the history: {error}"
     return ""

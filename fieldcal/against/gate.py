@@ -2,7 +2,9 @@
 
 Every difference fails, unless it has a limit and all its parameters differ by less. A
 limit is a number in the parameter's unit, or a part of the recording's value in per
-cent. The limit `chi2_per_dof` is for the simulator's prediction of the recording.
+cent. The limit `chi2_per_dof` is for the simulator's prediction of the recording. What
+one of the two does not show has not been compared: it is no check that was passed, and
+fails if it has a limit.
 """
 
 from __future__ import annotations
@@ -99,13 +101,34 @@ def _parse_limit(name: str, text: str) -> Limit:
 def check_match(found: Match, allowed: Mapping[str, Limit]) -> list[MatchCheck]:
     """Check every id that was compared, the ids of every recording first."""
     every = ALWAYS if found.aligned is None else IN_MOTION
-    names = [*every, *found.alike, *(d.id for d in found.differences)]
+    shown = [name for name in every if _is_compared(name, found)]
+    names = [*shown, *found.alike, *(d.id for d in found.differences)]
     out = [_check(name, found, allowed) for name in dict.fromkeys(names)]
+    lacking = "was not compared, since one of the two does not show it"
+    out += [
+        MatchCheck(name, False, f"{name.replace('_', ' ')} {lacking}")
+        for name in every
+        if name in allowed and name not in names
+    ]
     if (limit := allowed.get(PREDICTION)) is not None:
         value = found.before.chi2_per_dof
         says = f"it is predicted with χ²/dof {value:.3g}, at most {limit.size:g}"
         out.append(MatchCheck(PREDICTION, value <= limit.size, says))
     return out
+
+
+def _is_compared(name: str, found: Match) -> bool:
+    """Whether both recordings show a quantity that every recording is checked for.
+
+    A reference of the motion has it by definition.
+    """
+    if name == "misalignment":
+        return True
+    here, there = (
+        one.noise if name == "noise" else one.calibration.get(name, {})
+        for one in (found.real, found.simulator)
+    )
+    return bool(here) if found.aligned is not None else bool({*here} & {*there})
 
 
 def _check(name: str, found: Match, allowed: Mapping[str, Limit]) -> MatchCheck:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         (sys.stderr if args.json else sys.stdout).write(f"written: {path}\n")
     beyond = [one for one in gate if not one.ok]
     for one in beyond if allowed else ():
-        sys.stderr.write(f"fieldcal diagnose: beyond its limit: {one.says}\n")
+        sys.stderr.write(f"fieldcal diagnose: not within its limit: {one.says}\n")
     return 1 if beyond else 0
 
 
@@ -103,12 +103,18 @@ def _compare_by_motion(
     """Compare with a simulator output that follows the recorded motion."""
     from fieldcal.against.motion import compare_in_motion
     from fieldcal.against.opening import read_output
+    from fieldcal.against.sensor_model import CALIBRATION
 
     read = read_output(path)
     found = compare_in_motion(
         (session.block, session.about), read.block, (str(args.session), args.against)
     )
     said = list(read.says)
+    if args.patch and any(d.id in CALIBRATION for d in found.differences):
+        said.append(
+            "a motion does not show the simulator's own biases and scale factors: the"
+            " patch has those of a simulator that had none before"
+        )
     if args.patch and any(d.id == "misalignment" for d in found.differences):
         said.append(
             f"{args.patch} has nothing for misalignment: the patch is in the axes of"

@@ -102,8 +102,9 @@ def _list_devices(args: argparse.Namespace, history: History) -> int:
             " --serial keeps them\n"
         )
     for serial, count, last in devices:
+        many = "1 calibration" if count == 1 else f"{count} calibrations"
         sys.stdout.write(
-            f"{escape_line(serial)}: {count} calibrations,"
+            f"{escape_line(serial)}: {many},"
             f" the last {escape_line(last) or UNKNOWN_TIME}\n"
         )
     return 0
@@ -199,11 +200,14 @@ def _print_trends(
     trends: dict[str, list[TrendPoint]],
     bounds: GradeLimits,
 ) -> None:
+    from fieldcal.calibration.wording import format_unit
+
     say = sys.stdout.write
-    say(f"{escape_line(serial)}: {len(runs)} calibrations\n")
+    many = "1 calibration" if len(runs) == 1 else f"{len(runs)} calibrations"
+    say(f"{escape_line(serial)}: {many}\n")
     for name, points in trends.items():
-        unit = points[-1].unit if points else ""
-        say(f"\n{name}, {unit}\n")
+        unit = format_unit(points[-1].unit)
+        say(f"\n{name}{f', {unit}' if unit else ''}\n")
         for line in trend_lines(points):
             say(line + "\n")
         say(f"  {_family_text(points)}\n")
@@ -211,10 +215,13 @@ def _print_trends(
 
 def _family_text(points: Sequence[TrendPoint]) -> str:
     """Spread of a parameter from run to run, and which runs are out of family."""
+    from fieldcal.calibration.wording import format_unit
+
     last = points[-1]
     if not math.isfinite(last.spread):
         return "not judged: the limits of the grade have no spread for it"
-    text = f"spread from run to run ± {last.spread:.2g} {last.unit}"
+    text = f"spread from run to run ± {last.spread:.2g} {format_unit(last.unit)}"
+    text = text.rstrip()
     if not any(math.isfinite(p.chance) for p in points):
         return f"{text}, by the limits of the grade; nothing to compare with"
     odd = [str(p.run.number) for p in points if p.out_of_family]

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--fdr {args.fdr:g}: give a share between 0 and 1")
     wanted = sessions.parse_filters(args.query)
     database = Database(args.history or default_location())
-    some = database.run(lambda db: sessions.find_sessions(db, wanted))
+    some = database.run(lambda db: sessions.find_sessions(db, wanted, once=True))
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal lot: {lost}\n")
     found = analyse_lot(some, limits.read(args.grade, args.limits), args.fdr)

@@ -105,11 +105,13 @@ def _earlier_calibrations(
     from fieldcal.history.store import History, earlier_runs
     from fieldcal.report import EarlierCalibration
     from fieldcal.session.folder import Session
+    from fieldcal.session.recorded_part import recorded_part
 
     session = Session.open(folder)
     serial = session.about.device.get("serial")
     if not serial:
         return []
     runs = History(history or default_location()).runs(str(serial))
-    before = earlier_runs(runs, folder, start_time(list(session.marks())))
+    taken_at, part = start_time(list(session.marks())), recorded_part(folder)
+    before = earlier_runs(runs, folder, taken_at, part)
     return [EarlierCalibration(run.taken_at[:10], run.calibration) for run in before]

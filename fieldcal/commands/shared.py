@@ -67,6 +67,7 @@ def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
     from fieldcal.fleet.tree import sessions_in
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.history.sessions import without_repeats
 
     folders = sessions_in(args.sessions)
     database = Database(args.history or default_location())
@@ -82,6 +83,12 @@ def _sessions_with_rows(args: argparse.Namespace) -> list[StoredSession]:
     for one in rows:
         if one.error:
             raise InputError(f"{one.error}; or leave {Path(one.folder).name} out")
+    rows, repeats = without_repeats(rows)
+    for one in repeats:
+        sys.stderr.write(
+            f"fieldcal diagnose: {escape_line(one.folder)}: has the samples of another"
+            " session, and is left out\n"
+        )
     return rows
 
 

@@ -175,15 +175,19 @@ def _lot_prior(args: argparse.Namespace, session: Session) -> LotPrior:
     from fieldcal.history import sessions
     from fieldcal.history.database import Database
     from fieldcal.history.location import default_location
+    from fieldcal.session.recorded_part import recorded_part
 
     wanted = sessions.parse_filters(args.lot)
     database = Database(args.history or default_location())
-    some = database.run(lambda db: sessions.find_sessions(db, wanted, documents=True))
+    some = database.run(
+        lambda db: sessions.find_sessions(db, wanted, documents=True, once=True)
+    )
     if lost := database.run(lambda db: sessions.untimed_sentence(db, wanted)):
         sys.stderr.write(f"fieldcal solve: {lost}\n")
     serial = str(session.about.device.get("serial", ""))
     folder = str(session.folder.resolve())
-    return estimate_lot_prior(" ".join(args.lot), some, serial, folder)
+    part = recorded_part(session.folder)
+    return estimate_lot_prior(" ".join(args.lot), some, serial, folder, part)
 
 
 def _decide(

@@ -30,6 +30,10 @@ MIN_UNITS = 5
 """Smallest number of units for which a spread is estimated."""
 
 
+NOT_STATED = "not stated"
+"""Label of the units whose session.toml does not state a level that others state."""
+
+
 @dataclass(frozen=True, slots=True)
 class OddUnit:
     """A unit that is odd: the parameter and its deviation from the mean of the lot."""
@@ -185,7 +189,7 @@ def analyse_lot(
     }
     levels = [
         g
-        for g in groupings([one.levels for one in useful], LEVELS)
+        for g in groupings(_stated_levels(useful), LEVELS)
         if 1 < len(g.labels) < len(useful)
     ]
     judged = [one.go if one.go is not None else bool(one.good) for one in units]
@@ -235,6 +239,12 @@ def yield_interval(good: int, count: int) -> tuple[float, float, float]:
 
 def _time_order(one: StoredSession) -> tuple[str, str]:
     return (one.taken_at or "", one.folder)
+
+
+def _stated_levels(useful: Sequence[StoredSession]) -> list[dict[str, str]]:
+    """Levels of each unit; a group of their own if some units do not state one."""
+    stated = [name for name in LEVELS if any(name in one.levels for one in useful)]
+    return [{**dict.fromkeys(stated, NOT_STATED), **one.levels} for one in useful]
 
 
 def _find_odd_units(

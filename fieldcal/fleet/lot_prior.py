@@ -32,6 +32,7 @@ from fieldcal.calibration.gauge import GROUPS
 from fieldcal.calibration.lot_prior import LotPrior
 from fieldcal.calibration.names import group_of
 from fieldcal.core.errors import InputError
+from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
 from fieldcal.fleet.lot import MIN_UNITS, latest_session_per_unit
 from fieldcal.fleet.spread import WIDER, UnitDistribution, estimate_distribution
@@ -54,7 +55,11 @@ BY_GRAVITY = "acc_scale"
 
 
 def estimate_lot_prior(
-    label: str, sessions: Sequence[StoredSession], serial: str = "", folder: str = ""
+    label: str,
+    sessions: Sequence[StoredSession],
+    serial: str = "",
+    folder: str = "",
+    part: RecordedPart | None = None,
 ) -> LotPrior:
     """Estimate the prior of a unit from the other units of its lot.
 
@@ -62,7 +67,8 @@ def estimate_lot_prior(
     ----------
     label : name of the lot in messages and results
     sessions : sessions of the lot, with their documents
-    serial, folder : of the unit and of its session, which are left out
+    serial, folder, part : of the unit, its session and the samples that it uses, which
+        are left out
 
     Raises
     ------
@@ -73,6 +79,7 @@ def estimate_lot_prior(
     others = [
         one for one in sessions
         if one.folder != folder and not (serial and one.serial == serial)
+        and not (part and one.part and one.part.overlaps(part))
     ]  # fmt: skip
     units = [one for one in latest_session_per_unit(others) if one.good]
     found: dict[str, UnitDistribution] = {}

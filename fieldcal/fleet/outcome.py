@@ -19,6 +19,7 @@ from fieldcal.fleet.reduced import reduce_session
 from fieldcal.fleet.tree import fingerprint
 from fieldcal.history.sessions import StoredSession, session_of_calibration
 from fieldcal.session.folder import Session
+from fieldcal.session.recorded_part import recorded_part
 
 OUT_OF_MEMORY = "it needs more memory than there is"
 
@@ -48,7 +49,8 @@ class SessionTask:
         mark, name = None, storable_text(folder)
         try:
             mark = fingerprint(Path(folder), self.options)
-            return replace(self._process(Path(folder)), fingerprint=mark)
+            made = self._process(Path(folder))
+            return replace(made, folder=folder, fingerprint=mark)
         except FieldcalError as error:
             said = str(error)
             said = said if name in said else f"{name}: {said}"
@@ -78,8 +80,9 @@ class SessionTask:
         diagnosis = None
         if explanation is not None and self.diagnose:
             diagnosis = make_diagnosis(session.block, explanation).to_json()
+        taken_at, part = start_time(list(session.marks())), recorded_part(folder)
         return replace(
-            session_of_calibration(folder, found, start_time(list(session.marks()))),
+            session_of_calibration(folder, found, taken_at, part),
             serial=str(session.about.device.get("serial", "")),
             levels=levels_of(session),
             diagnosis=diagnosis,

@@ -20,11 +20,11 @@ from sqlalchemy.pool import NullPool
 from fieldcal.core.errors import InputError
 from fieldcal.history.location import StoreLocation, is_address
 
-LAST_MIGRATION = "sessions"
+LAST_MIGRATION = "recordings"
 """The last migration."""
 
-OLDEST_VERSION, NEWEST_VERSION = 1, 2
-"""user_version of a SQLite file before the first migration, and since."""
+OLDER_VERSIONS, NEWEST_VERSION = (1, 2), 3
+"""user_version of a SQLite file before the first migration, after it, and now."""
 
 LOCK_TIMEOUT = 60.0
 """Longest wait for a file that another program has locked, s."""
@@ -158,7 +158,7 @@ class Database:
             if version == NEWEST_VERSION:
                 return
             foreign = version == 0 and inspect(db).get_table_names()
-            if foreign or version not in (0, OLDEST_VERSION):
+            if foreign or version not in (0, *OLDER_VERSIONS):
                 self._refuse(f"version {version}")
             if not may_make and db.engine.url.database:
                 raise _Outdated if version else _Empty

@@ -11,11 +11,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, update
+from sqlalchemy import (
+    Connection,
+    Row,
+    and_,
+    delete,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
 from fieldcal.core.file_names import storable_text
+from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
 from fieldcal.history.tables import PARAMETER, REDUCED_ROWS, SESSION
 
@@ -50,6 +61,7 @@ class StoredSession:
     fingerprint : fingerprint of the session's files
     error : why there is no result, or none for the present files
     reduced : reduced rows for effects that it may share with other sessions
+    part : samples that it uses; None if unknown
 
     """
 
@@ -65,10 +77,14 @@ class StoredSession:
     fingerprint: str | None = None
     error: str | None = None
     reduced: bytes | None = None
+    part: RecordedPart | None = None
 
 
 def session_of_calibration(
-    folder: Path, found: Calibration, taken_at: str | None
+    folder: Path,
+    found: Calibration,
+    taken_at: str | None,
+    part: RecordedPart | None = None,
 ) -> StoredSession:
     """Record of a session with its calibration only.
 
@@ -87,6 +103,7 @@ def session_of_calibration(
         found.good,
         document,
         parameters=_parameters_without_lot(found),
+        part=part,
     )
 
 
@@ -109,7 +126,8 @@ def store_session(db: Connection, one: StoredSession) -> None:
     """Store a session; an earlier one of the same folder is replaced.
 
     A folder is one session, also if its serial number was corrected. An error replaces
-    no result: it is stored in addition.
+    no result: it is stored in addition. Of several folders with the same samples, the
+    last one stored counts (`_supersede`).
     """
     error = None if one.error is None else storable_text(one.error)
     one = replace(one, folder=storable_text(one.folder), error=error)
@@ -119,6 +137,7 @@ def store_session(db: Connection, one: StoredSession) -> None:
         if db.execute(update(SESSION).where(here).values(row)).rowcount:
             return
     number = _replaced_row(db, here, _row(one))
+    _supersede(db, number, one)
     rows = [
         {"session": number, "name": n, "value": v, "sigma": s, "unit": u}
         for n, (v, s, u) in one.parameters.items()
@@ -130,22 +149,43 @@ def store_session(db: Connection, one: StoredSession) -> None:
 
 
 def _replaced_row(db: Connection, here: Any, row: Mapping[str, Any]) -> int:
-    """Number of the one row of a folder, made or replaced; it has no parameters yet."""
-    found = db.execute(
-        select(SESSION.c.id, SESSION.c.accepted).where(here).order_by(SESSION.c.id)
-    ).all()
-    if not found:
-        made: Any = db.execute(insert(SESSION).values(**row, accepted=False))
+    """Number of the row of a folder, made or replaced; it has no parameters yet."""
+    number: int | None = db.execute(select(SESSION.c.id).where(here)).scalar()
+    if number is None:
+        new = {**row, "accepted": False, "superseded": False}
+        made: Any = db.execute(insert(SESSION).values(**new))
         return int(made.inserted_primary_key[0])
-    kept: int = found[-1].id
-    accepted = any(r.accepted for r in found)
-    db.execute(delete(SESSION).where(here, SESSION.c.id != kept))
-    db.execute(delete(PARAMETER).where(PARAMETER.c.session == kept))
-    db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == kept))
-    db.execute(
-        update(SESSION).where(SESSION.c.id == kept).values(**row, accepted=accepted)
+    db.execute(delete(PARAMETER).where(PARAMETER.c.session == number))
+    db.execute(delete(REDUCED_ROWS).where(REDUCED_ROWS.c.session == number))
+    db.execute(update(SESSION).where(SESSION.c.id == number).values(**row))
+    return number
+
+
+def _supersede(db: Connection, number: int, one: StoredSession) -> None:
+    """Let one row count of all that have a result of the same samples.
+
+    It is the new one, unless it does not name its device and another one does. Its
+    calibration is accepted if one of the others was.
+    """
+    if one.part is None or one.result is None:
+        return
+    same = and_(
+        SESSION.c.id != number,
+        SESSION.c.recording == one.part.digest,
+        SESSION.c.part_start < one.part.end,
+        SESSION.c.part_end > one.part.start,
+        SESSION.c.result.is_not(None),
     )
-    return kept
+    others = db.execute(select(SESSION.c.serial, SESSION.c.accepted).where(same)).all()
+    lesser = not one.serial and any(other.serial for other in others)
+    here = update(SESSION).where(SESSION.c.id == number)
+    db.execute(here.values(superseded=lesser))
+    if lesser:
+        return
+    if any(other.accepted for other in others):
+        db.execute(here.values(accepted=True))
+    there = update(SESSION).where(same)
+    db.execute(there.values(accepted=False, superseded=True))
 
 
 def _row(one: StoredSession) -> dict[str, Any]:
@@ -163,6 +203,9 @@ def _row(one: StoredSession) -> dict[str, Any]:
         "height_m": site.get("height_m"),
         "software": str(result.get("software", "")),
         "fingerprint": one.fingerprint,
+        "recording": None if one.part is None else one.part.digest,
+        "part_start": None if one.part is None else one.part.start,
+        "part_end": None if one.part is None else one.part.end,
         "error": one.error,
         "result": json.dumps(one.result) if one.result is not None else None,
         "diagnosis": json.dumps(one.diagnosis) if one.diagnosis is not None else None,
@@ -219,6 +262,7 @@ def find_sessions(
     folders: Iterable[str] | None = None,
     documents: bool = False,
     reduced: bool = False,
+    once: bool = False,
 ) -> list[StoredSession]:
     """Stored sessions that meet all conditions, the oldest first.
 
@@ -229,11 +273,14 @@ def find_sessions(
     folders : only sessions in these folders, if given
     documents : whether to load result and diagnosis
     reduced : whether to load reduced rows
+    once : whether to leave out sessions that another one with the same samples replaces
 
     """
     some = [_condition(name, value) for name, value in (wanted or {}).items()]
     if folders is not None:
         some.append(SESSION.c.folder.in_([*map(storable_text, folders)]))
+    if once:
+        some.append(~SESSION.c.superseded)
     columns = [c for c in SESSION.c if c.name not in ("result", "diagnosis")]
     columns += [SESSION.c.result, SESSION.c.diagnosis] if documents else []
     query = select(*columns).where(and_(True, *some))
@@ -252,6 +299,7 @@ def untimed_sentence(db: Connection, wanted: Mapping[str, str]) -> str:
     others = [_condition(n, value) for n, value in wanted.items() if n not in TIMES]
     if len(others) == len(wanted):
         return ""
+    others.append(~SESSION.c.superseded)
     query = select(func.count()).where(SESSION.c.taken_at.is_(None), *others)
     count = db.execute(query).scalar_one()
     return f"sessions of unknown time that are left out: {count}" if count else ""
@@ -298,7 +346,28 @@ def _session_of_row(
         row.fingerprint,
         row.error,
         reduced,
+        part_of_row(row),
     )
+
+
+def part_of_row(row: Row[Any]) -> RecordedPart | None:
+    """Samples that a stored session uses; None if unknown."""
+    if row.recording is None:
+        return None
+    return RecordedPart(row.recording, row.part_start, row.part_end)
+
+
+def without_repeats(
+    some: Iterable[StoredSession],
+) -> tuple[list[StoredSession], list[StoredSession]]:
+    """Sessions of which no two use the same samples, and those that are left out."""
+    kept, left_out = list[StoredSession](), list[StoredSession]()
+    for one in some:
+        again = one.part is not None and any(
+            other.part is not None and other.part.overlaps(one.part) for other in kept
+        )
+        (left_out if again else kept).append(one)
+    return kept, left_out
 
 
 def parameter_values(

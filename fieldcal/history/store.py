@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from fieldcal.calibration import Calibration
 from fieldcal.core.documents import load_json
 from fieldcal.core.errors import InputError
+from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.history.location import StoreLocation
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ class HistoryRun:
     latitude_deg, height_m : the site; None if unknown
     software : version of fieldcal
     calibration : with its covariance
+    part : samples that its session uses; None if unknown
 
     """
 
@@ -54,6 +56,7 @@ class HistoryRun:
     height_m: float | None
     software: str
     calibration: Calibration
+    part: RecordedPart | None = None
 
 
 def family_runs(runs: Sequence[HistoryRun]) -> tuple[HistoryRun, ...]:
@@ -76,7 +79,10 @@ def recording_time(taken_at: str | None) -> datetime | None:
 
 
 def earlier_runs(
-    runs: Sequence[HistoryRun], folder: Path, taken_at: str | None
+    runs: Sequence[HistoryRun],
+    folder: Path,
+    taken_at: str | None,
+    part: RecordedPart | None = None,
 ) -> list[HistoryRun]:
     """Runs of other sessions that are known to be earlier than a session, in order.
 
@@ -87,10 +93,15 @@ def earlier_runs(
     ----------
     runs : calibrations of the device
     folder, taken_at : of the session; None if its time is unknown
+    part : samples that it uses: a copy of it is no other session; None if unknown
 
     """
     here, now = str(folder.resolve()), recording_time(taken_at)
-    others = [run for run in runs if run.session != here]
+    others = [
+        run for run in runs
+        if run.session != here
+        and not (part and run.part and run.part.overlaps(part))
+    ]  # fmt: skip
     if now is None:
         return others
     known = [(recording_time(run.taken_at), run) for run in others]
@@ -116,7 +127,13 @@ class History:
 
         return Database(self.place)
 
-    def add(self, taken_at: str | None, session: Path, found: Calibration) -> None:
+    def add(
+        self,
+        taken_at: str | None,
+        session: Path,
+        found: Calibration,
+        part: RecordedPart | None = None,
+    ) -> None:
         """Store a calibration; one of the same session is replaced.
 
         Parameters
@@ -124,6 +141,7 @@ class History:
         taken_at : time of the recording, ISO 8601; None if unknown
         session : its folder
         found : its calibration
+        part : samples that it uses; None if unknown
 
         Raises
         ------
@@ -137,7 +155,7 @@ class History:
         serial = str(document.get("device", {}).get("serial", ""))
         if not serial:
             raise InputError("no history without a serial number: give --serial")
-        one = sessions.session_of_calibration(session, found, taken_at)
+        one = sessions.session_of_calibration(session, found, taken_at, part)
         self.database.run(lambda db: sessions.store_session(db, one), write=True)
 
     def serials(self) -> list[tuple[str, int, str]]:
@@ -148,7 +166,11 @@ class History:
 
         query = (
             select(SESSION.c.serial, func.count(), func.max(SESSION.c.taken_at))
-            .where(SESSION.c.serial != "", SESSION.c.result.is_not(None))
+            .where(
+                SESSION.c.serial != "",
+                SESSION.c.result.is_not(None),
+                ~SESSION.c.superseded,
+            )
             .group_by(SESSION.c.serial)
             .order_by(SESSION.c.serial)
         )
@@ -156,7 +178,7 @@ class History:
         return [(str(s), int(n), str(last or "")) for s, n, last in rows]
 
     def runs(self, serial: str) -> tuple[HistoryRun, ...]:
-        """All calibrations of a device, oldest first.
+        """All calibrations of a device, oldest first, each recording once.
 
         Raises
         ------
@@ -170,7 +192,11 @@ class History:
 
         query = (
             select(SESSION)
-            .where(SESSION.c.serial == serial, SESSION.c.result.is_not(None))
+            .where(
+                SESSION.c.serial == serial,
+                SESSION.c.result.is_not(None),
+                ~SESSION.c.superseded,
+            )
             .order_by(SESSION.c.taken_at.nulls_first(), SESSION.c.id)
         )
         rows = self.database.run(lambda db: db.execute(query).all())
@@ -201,6 +227,8 @@ class History:
             )
 
     def _run(self, row: Any) -> HistoryRun:
+        from fieldcal.history.sessions import part_of_row
+
         try:
             found = Calibration.from_json(load_json(row.result))
         except (ValueError, InputError) as error:
@@ -220,4 +248,5 @@ class History:
             row.height_m,
             row.software,
             found,
+            part_of_row(row),
         )

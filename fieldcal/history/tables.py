@@ -41,17 +41,24 @@ SESSION = Table(
     Column("height_m", Float),
     Column("software", String, nullable=False),
     Column("fingerprint", String),
+    Column("recording", String),
+    Column("part_start", Float),
+    Column("part_end", Float),
+    Column("superseded", Boolean, nullable=False),
     Column("error", Text),
     Column("result", Text),
     Column("diagnosis", Text),
     UniqueConstraint("serial", "folder", name="session_once"),
-    Index("session_folder", "folder"),
+    Index("session_of_folder", "folder", unique=True),
+    Index("session_recording", "recording"),
 )
-"""One row for each recorded session.
+"""One row for each session folder.
 
 `serial` is empty if unknown. `go` is null without a decision. `fingerprint` shows
-whether the files in the folder have changed. `error` states why there is no newer
-result. `result` and `diagnosis` are the JSON documents.
+whether the files in the folder have changed. `recording`, `part_start` and `part_end`
+are the samples that the session uses; null if unknown. `superseded` is true if another
+row has a result of the same samples that counts instead. `error` states why there is no
+newer result. `result` and `diagnosis` are the JSON documents.
 """
 
 PARAMETER = Table(

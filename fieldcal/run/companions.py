@@ -32,7 +32,7 @@ from fieldcal.session.folder import DESCRIPTION, Session
 from fieldcal.session.marks import POSITION_ADDED
 from fieldcal.session.recorder import Recorder
 
-SHARED_KEYS = ("grade", *FACTORY_KEYS)
+SHARED_KEYS = ("grade", "lot", *FACTORY_KEYS)
 """Keys of the first device's table that are copied to the further ones."""
 
 MOST_BATCHES = 1 << 17

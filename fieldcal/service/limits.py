@@ -9,7 +9,6 @@ from __future__ import annotations
 import resource
 import signal
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,21 +33,17 @@ class TimeUsedUp(BaseException):
 
 @contextmanager
 def resource_limits(bounds: ServiceBounds) -> Iterator[None]:
-    """Limit this process until the end of the block.
+    """Limit this process until the end of the block, in its main thread.
 
     Raises
     ------
     TimeUsedUp
-        When the processor time is used up, in the main thread of a process only.
+        When the processor time is used up.
+    ValueError
+        In another thread, where the signal of the limit cannot be handled.
 
     """
     used = resource.getrusage(resource.RUSAGE_SELF)
-    before = {what: resource.getrlimit(what) for what in LIMITED}
-    _set_limit(resource.RLIMIT_FSIZE, 2 * bounds.unpacked)
-    _set_limit(resource.RLIMIT_CORE, 0)
-    if sys.platform == "linux":
-        # of what is written to; address space is also reserved for each thread
-        _set_limit(resource.RLIMIT_DATA, _data_size() + bounds.memory)
     end = int(used.ru_utime + used.ru_stime) + bounds.seconds
 
     def end_job(*_: object) -> None:
@@ -56,17 +51,20 @@ def resource_limits(bounds: ServiceBounds) -> Iterator[None]:
         _set_limit(resource.RLIMIT_CPU, end + GRACE_S)
         raise TimeUsedUp
 
-    # a worker of Dask works in threads, where no handler can be set
-    handled = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGXCPU, end_job) if handled else None
+    handler = signal.signal(signal.SIGXCPU, end_job)
+    before = {what: resource.getrlimit(what) for what in LIMITED}
+    _set_limit(resource.RLIMIT_FSIZE, 2 * bounds.unpacked)
+    _set_limit(resource.RLIMIT_CORE, 0)
+    if sys.platform == "linux":
+        # of what is written to; address space is also reserved for each thread
+        _set_limit(resource.RLIMIT_DATA, _data_size() + bounds.memory)
     _set_limit(resource.RLIMIT_CPU, end)
     try:
         yield
     finally:
         for what, limit in before.items():
             resource.setrlimit(what, limit)
-        if handled:
-            signal.signal(signal.SIGXCPU, handler)
+        signal.signal(signal.SIGXCPU, handler)
 
 
 def _set_limit(what: int, most: int) -> None:

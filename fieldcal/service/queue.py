@@ -73,6 +73,8 @@ class JobQueue:
         folder = self.jobs.folder(job.id)
         for made in run_tasks([str(folder)], self.task, self.pool):
             one = made.value or StoredSession(made.item, error=made.error)
+            if self.jobs.get(job.id) is None:
+                continue  # deleted meanwhile: nothing of it is kept
             said = one.error if one.error is not None else self._store(job, one)
             log = Path(folder / "import.log")
             with suppress(OSError):

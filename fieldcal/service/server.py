@@ -12,10 +12,16 @@ import uvicorn
 
 from fieldcal.core.errors import InputError
 from fieldcal.run.page.access import Access, Gate
-from fieldcal.run.page.server import listening_socket
+from fieldcal.run.page.server import ALL_ADDRESSES, listening_socket, names_of
 from fieldcal.service import api, openapi
 from fieldcal.service.jobs import JobStore
 from fieldcal.service.queue import JobQueue
+
+REMEDY = (
+    "open the address that the console of fieldcal serve shows; a program sends a token"
+    " of the --tokens file, as Authorization: Bearer TOKEN"
+)
+"""What one is told to do who has no token."""
 
 SHORTEST_TOKEN = 16
 """Least length of a token, characters."""
@@ -59,13 +65,14 @@ class Service:
         """
         there = listening_socket(host, port)
         port = there.getsockname()[1]
-        name = f"[{host}]" if ":" in host else host
-        local = ("localhost", "127.0.0.1") if host in ("127.0.0.1", "localhost") else ()
-        hosts = dict.fromkeys(f"{n}:{port}" for n in (name, *local))
+        own = [f"{name}:{port}" for name in names_of(host)]
+        # behind a proxy or in a container, its own address may not be reached
+        shown = [*names, *own] if host in ALL_ADDRESSES else [*own, *names]
         access = Access(
-            (*hosts, *names),
+            tuple(dict.fromkeys(shown)),
             bearers=tuple(tokens),
             uploads={openapi.SESSIONS_PATH: jobs.bounds.upload},
+            remedy=REMEDY,
         )
         config = uvicorn.Config(
             Gate(api.create_app(jobs, queue), access), log_config=None,

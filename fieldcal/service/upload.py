@@ -30,6 +30,9 @@ DAMAGED = (
 )
 """Errors of an archive whose files cannot be unpacked."""
 
+OF_MACOS = "__MACOSX/"
+"""Folder at the top in which macOS packs properties of the files."""
+
 LONGEST_NAME = 100
 """Largest length of the name of a file in an archive, characters."""
 
@@ -78,7 +81,7 @@ def session_members(
 ) -> Mapping[str, zipfile.ZipInfo] | None:
     """Files of a session by name; None if the archive has no session.
 
-    All files must be in one folder, at the top or below.
+    All files must be in one folder, at the top or below, but for those that macOS adds.
 
     Raises
     ------
@@ -86,6 +89,7 @@ def session_members(
         If a file is in another folder, or a name is too long.
 
     """
+    found = [one for one in found if not one.filename.startswith(OF_MACOS)]
     named = [one for one in found if PurePosixPath(one.filename).name == DESCRIPTION]
     if not named:
         return None

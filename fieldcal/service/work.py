@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from fieldcal.service.jobs import (
     UPLOAD_FOLDER,
 )
 from fieldcal.service.limits import TimeUsedUp, resource_limits
+from fieldcal.service.own_process import run_in_own_process
 from fieldcal.service.records import station_record
 from fieldcal.service.upload import archive_members, session_members, unpack
 from fieldcal.session.folder import RESULT, Session, write_atomically
@@ -60,6 +62,8 @@ class JobTask:
 
     def __call__(self, folder: str) -> StoredSession:
         """Process a job; a failure is stated in ``error`` of the result."""
+        if threading.current_thread() is not threading.main_thread():
+            return run_in_own_process(self, folder)
         place = Path(folder)
         try:
             with resource_limits(self.bounds):

@@ -108,7 +108,8 @@ class ReplayResult:
             f" it is {old.rms[self.triad]:.2g} {unit} (χ² {old.chi2_per_dof:.3g})."
         ]
         for before, after in zip(old.lines, new.lines, strict=True):
-            i = int(before[1] / after[1] > before[0] / after[0])
+            less = before / np.where(after > 0, after, np.nan)
+            i = int(np.argmax(np.nan_to_num(less, nan=-1.0)))
             out.append(
                 f"Of the line it leaves {after[i]:.2g} of {before[i]:.2g} {UNITS[i]}."
             )

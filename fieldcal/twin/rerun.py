@@ -244,7 +244,9 @@ def _line_remainder(
         same = slice(*np.searchsorted(replayed.t, [low, np.nextafter(high, np.inf)]))
         apart = checked.block[cut].six - replayed[same].six
         apart = np.where(checked.usable[cut], apart, np.nan)
-        apart = np.nan_to_num(apart - np.nanmean(apart, axis=0))
+        there = np.isfinite(apart)
+        mean = np.nansum(apart, axis=0) / np.maximum(there.sum(axis=0), 1)
+        apart = np.where(there, apart - mean, 0.0)
         wave = np.exp(-2j * np.pi * hz * checked.block.t[cut])
         squares += np.abs(2 * (wave @ apart) / len(wave)) ** 2 / 2
         count += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -25,7 +26,9 @@ from fieldcal.core.errors import InputError
 from fieldcal.core.samples import Block
 from fieldcal.diagnosis.result import Quantity
 
-FACTS = Facts(100.0, np.nan, np.nan, 0.0, np.nan, {})
+ONE = {"x": Quantity(1.0, 1e-3, "1")}
+CALIBRATED = dict.fromkeys(("acc_bias", "acc_scale", "gyr_bias", "gyr_scale"), ONE)
+FACTS = Facts(100.0, np.nan, np.nan, 0.0, np.nan, {"ax": ONE["x"]}, CALIBRATED)
 
 
 def differing(
@@ -68,6 +71,18 @@ def test_whatever_differs_fails_unless_it_is_within_its_limit() -> None:
     ]
     assert not failed(found, "acc_bias=0.03", "noise=10%", "chi2_per_dof=4")
     assert not failed(match())
+
+
+def test_what_one_of_the_two_does_not_show_has_not_passed() -> None:
+    """As a simulator without gyroscopes, or a recording without turns."""
+    less = {k: v for k, v in CALIBRATED.items() if k.startswith("acc")}
+    facts = replace(FACTS, calibration=less)
+    for found in (replace(match(), real=facts), replace(match(), simulator=facts)):
+        names = [one.name for one in check_match(found, {})]
+        assert names == ["acc_bias", "acc_scale", "noise", "quadratic"]
+        assert failed(found, "gyr_bias=0.01", "acc_bias=0.01") == ["gyr_bias"]
+    quiet = replace(match(), simulator=replace(FACTS, noise={"gx": ONE["x"]}))
+    assert failed(quiet, "noise=10%") == ["noise"] and not failed(quiet)
 
 
 def test_when_something_happened_is_no_size() -> None:

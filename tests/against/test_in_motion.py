@@ -350,6 +350,7 @@ def test_files_are_compared_by_their_motion(
     told = capsys.readouterr()
     assert "lever arm" in told.out and "of common motion" in told.out
     assert "json has nothing for misalignment" in told.err
+    assert "does not show the simulator's own biases and scale factors" in told.err
     content = json.loads((folder / "against.json").read_text())
     assert content["alignment"]["delay"]["value"] == pytest.approx(-5.0, abs=1e-3)
     patch = json.loads((folder / "patch.json").read_text())

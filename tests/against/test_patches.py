@@ -97,6 +97,19 @@ def test_gazebo_has_the_bias_where_it_keeps_its_sign(tmp_path: Path) -> None:
     assert "100" in says
 
 
+def test_noise_that_no_comparison_has_shown_is_not_written_as_none(
+    tmp_path: Path,
+) -> None:
+    """A motion shows no noise of the simulator: a <stddev> of 0 would take it away."""
+    model = SensorModel({"acc_bias": BIAS}, shown=SensorModel())
+    text, says = written("gazebo", tmp_path, model)
+    assert "<mean>0.05</mean>" in text and "stddev" not in text
+    assert "write its own <stddev> of linear_acceleration" in says
+    known = SensorModel({"acc_bias": BIAS}, shown=SensorModel(noise={"ax": 0.02}))
+    text, says = written("gazebo", tmp_path, known)
+    assert "<stddev>0.02</stddev>" in text and "stddev" not in says
+
+
 def test_px4_takes_the_opposite_out_of_its_perfect_sensors(tmp_path: Path) -> None:
     text, says = written("px4", tmp_path)
     found = parameters(text, 2, 3)

@@ -97,6 +97,14 @@ def test_a_tree_is_solved_and_what_is_broken_has_a_row(
     )
 
 
+def test_a_row_has_the_folder_that_was_asked_for(tree: Path, tmp_path: Path) -> None:
+    """Where a worker reaches it by another path, its row would not be found again."""
+    link = tmp_path / "link"
+    link.symlink_to(tree / "station 1", target_is_directory=True)
+    one = SessionTask()(str(link / "session"))
+    assert one.folder == str(link / "session") and one.result is not None
+
+
 def quick(folder: str) -> sessions.StoredSession:
     """Stands for work that takes long."""
     return sessions.StoredSession(folder, fingerprint=fingerprint(Path(folder)))

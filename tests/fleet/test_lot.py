@@ -228,6 +228,17 @@ def test_a_lot_that_drifts_says_since_when() -> None:
     assert 70 <= int(since[1:]) <= 95
 
 
+def test_a_unit_without_a_station_hides_no_shift_of_the_others() -> None:
+    some = units(station=2.0)
+    some[7] = replace(some[7], levels={"lot": "7"})
+    (shift,) = of(some).shifts
+    assert (shift.parameter, shift.level) == ("gyr_bias.y", "station")
+    assert set(shift.labels) == {"P", "Q", "R", "not stated"}
+    at = {label: i for i, label in enumerate(shift.labels)}
+    off = shift.values[at["Q"]] - shift.values[[at["P"], at["R"]]].mean()
+    assert off == pytest.approx(2e-3, abs=4 * shift.sigmas[at["Q"]])
+
+
 @pytest.mark.statistical
 def test_a_lot_in_control_is_said_to_be() -> None:
     calm = []

@@ -13,6 +13,7 @@ from session_folders import places, recorded, write_session
 from fieldcal.calibration import Calibration
 from fieldcal.cli import main
 from fieldcal.core.errors import InputError
+from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.core.samples import Array
 from fieldcal.fleet.lot_prior import estimate_lot_prior
 from fieldcal.history import sessions
@@ -99,6 +100,10 @@ def test_odd_units_and_the_unit_itself_have_no_say() -> None:
     plain = estimate_lot_prior("7", some[1:])
     itself = estimate_lot_prior("7", some, serial="A0", folder="/none")
     again = estimate_lot_prior("7", some, folder=some[0].folder)
+    part = RecordedPart("5a", 0.0, 9.0)
+    copied = [replace(some[0], folder="/copy", serial="", part=part), *some[1:]]
+    copy = estimate_lot_prior("7", copied, folder=some[0].folder, part=part)
+    np.testing.assert_array_equal(copy.mean, plain.mean)
     for found in (itself, again):
         np.testing.assert_array_equal(found.covariance, plain.covariance)
     odd = calibration(MIDDLE + 30 * WIDE, ERROR)

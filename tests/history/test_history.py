@@ -292,7 +292,7 @@ def test_the_command_lists_plots_compares_and_accepts(
     picture = tmp_path / "bias.png"
     pytest.importorskip("matplotlib")
     assert main(["history", "A1", *own, "--png", str(picture)]) == 0
-    assert "acc_bias.x, m/s^2" in capsys.readouterr().out
+    assert "acc_bias.x, m/s²" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main(["history", "A1", *own, "--compare", "1", "3", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["changed"] == ["acc_bias.x"]

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from multiprocessing.context import ForkServerProcess
@@ -20,17 +20,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from alembic import command
 from alembic.script import ScriptDirectory
-from sqlalchemy import inspect
+from sqlalchemy import inspect, text, update
 
 from fieldcal.calibration import Calibration
 from fieldcal.core.errors import InputError
+from fieldcal.core.recorded_part import RecordedPart
 from fieldcal.history import database, sessions
 from fieldcal.history.database import Database
 from fieldcal.history.location import StoreLocation
 from fieldcal.history.sessions import StoredSession
-from fieldcal.history.store import History
-from fieldcal.history.tables import METADATA
+from fieldcal.history.store import History, earlier_runs
+from fieldcal.history.tables import METADATA, SESSION
 
 FORMER = """
 CREATE TABLE run (
@@ -111,17 +113,107 @@ def test_a_session_whose_serial_number_was_corrected_is_one_unit(
     assert {r.session: r.accepted for r in runs} == {"/s/1": True, "/s/2": False}
 
 
-def test_a_session_that_is_stored_twice_already_is_one_again(tmp_path: Path) -> None:
+def former_store(place: StoreLocation, rows: Sequence[tuple[object, ...]]) -> None:
+    """A store before `recordings`; of each row serial, folder, accepted and result."""
+    config = database._alembic_config()
+    engine = Database(place)._engine(True)
+    with engine.connect() as db, db.begin():
+        config.attributes["connection"] = db  # type: ignore[attr-defined]
+        command.upgrade(config, "sessions")  # type: ignore[arg-type]
+        if db.dialect.name == "sqlite":
+            db.exec_driver_sql("PRAGMA user_version = 2")
+        table = SESSION.name
+        columns = "serial, folder, accepted, result, software"
+        names = ("serial", "folder", "accepted", "result")
+        for row in rows:
+            db.execute(
+                text(
+                    f"INSERT INTO {table} ({columns})"
+                    " VALUES (:serial, :folder, :accepted, :result, '9')"
+                ),
+                dict(zip(names, row, strict=True)),
+            )
+        db.execute(text("INSERT INTO parameter (session, name, value, sigma, unit)"
+                        f" SELECT id, 'x', 1, 1, '1' FROM {table}"))  # fmt: skip
+    engine.dispose()
+
+
+def check_migration(place: StoreLocation) -> None:
+    results = [json.dumps(calibration(b).to_json()) for b in (0.1, 0.2, 0.3)]
+    rows = [
+        ("A-1", "/s/1", True, results[0]),
+        ("A1", "/s/1", False, results[1]),
+        ("", "/s/1", False, None),
+        ("A1", "/s/2", False, results[2]),
+    ]
+    former_store(place, rows)
+    runs = History(place).runs("A1")
+    assert [(r.session, r.accepted) for r in runs] == [("/s/1", True), ("/s/2", False)]
+    assert [r.calibration.value("acc_bias.x") for r in runs] == [0.2, 0.3]
+    assert History(place).serials() == [("A1", 2, "")]
+    data = Database(place)
+    count = text("SELECT count(*) FROM parameter")
+    assert data.run(lambda db: db.execute(count).scalar_one()) == 2
+    again = update(SESSION).values(folder="/s/1")
+    with pytest.raises(InputError, match=r"(?i)unique"):
+        data.run(lambda db: db.execute(again), write=True)
+
+
+def test_a_folder_that_is_stored_twice_already_is_one_session_again(
+    tmp_path: Path,
+) -> None:
+    check_migration(tmp_path / "h")
+
+
+PART = RecordedPart("5a", 0.0, 90.0)
+
+
+def test_a_recording_in_two_folders_is_one_calibration(tmp_path: Path) -> None:
+    """The last one stored counts; a part of it that it does not share is another."""
     place = tmp_path / "h"
-    put(place, stored(1), replace(stored(2), serial="A-1"))
-    with closing(sqlite3.connect(place)) as db:
-        db.execute("UPDATE session SET folder = '/s/1'")
-        db.commit()
-    assert len(everything(place)) == 2
-    put(place, stored(1))
-    assert everything(place) == [stored(1)]
-    with closing(sqlite3.connect(place)) as db:
-        assert db.execute("SELECT count(*) FROM reduced").fetchone() == (1,)
+    put(place, stored(1, part=PART), stored(2, part=replace(PART, start=90.0, end=180)))
+    History(place).accept("A1", 1)
+    put(place, stored(3, part=replace(PART, start=3.0)), stored(4, part=None))
+    runs = History(place).runs("A1")
+    assert {(r.session, r.accepted) for r in runs} == {
+        ("/s/2", False), ("/s/3", True), ("/s/4", False)
+    }  # fmt: skip
+    assert History(place).serials() == [("A1", 3, "")]
+    once = Database(place).run(lambda db: sessions.find_sessions(db, once=True))
+    assert [one.folder for one in once] == ["/s/2", "/s/3", "/s/4"]
+    assert len(everything(place)) == 4, "each folder has its result"
+    put(place, stored(1, part=PART))
+    assert {r.session for r in History(place).runs("A1")} == {"/s/1", "/s/2", "/s/4"}
+
+
+def test_a_copy_without_a_serial_number_does_not_replace_its_device(
+    tmp_path: Path,
+) -> None:
+    place = tmp_path / "h"
+    put(place, stored(1, part=PART), stored(2, serial="", part=PART))
+    assert [r.session for r in History(place).runs("A1")] == ["/s/1"]
+    put(place, stored(3, serial="B1", part=PART))
+    assert History(place).serials() == [("B1", 1, "")], "its number was corrected"
+    put(place, StoredSession("/s/4", error="no", part=PART))
+    assert History(place).serials() == [("B1", 1, "")], "an error replaces no result"
+
+
+def test_of_sessions_with_the_same_samples_the_first_is_used() -> None:
+    """Added up, each of them would count as evidence of its own."""
+    other = stored(2, part=replace(PART, digest="b7"))
+    some = [stored(1, part=PART), other, stored(3, part=PART), stored(4), stored(5)]
+    kept, left_out = sessions.without_repeats(some)
+    assert [one.folder for one in kept] == ["/s/1", "/s/2", "/s/4", "/s/5"]
+    assert [one.folder for one in left_out] == ["/s/3"]
+
+
+def test_a_copy_of_a_session_is_not_what_it_is_compared_with(tmp_path: Path) -> None:
+    put(tmp_path / "h", stored(1, part=PART), stored(2))
+    runs = History(tmp_path / "h").runs("A1")
+    part = replace(PART, end=60.0)
+    assert len(earlier_runs(runs, Path("/s/9"), None)) == 2
+    (other,) = earlier_runs(runs, Path("/s/9"), None, part)
+    assert other.session == "/s/2"
 
 
 def test_a_history_of_before_the_store_is_taken_over(tmp_path: Path) -> None:
@@ -417,3 +509,10 @@ def test_postgresql_restarted_among_eight_writers_loses_nothing(tmp_path: Path) 
         assert all(len(f.parameters) == 2 and f.reduced for f in found)
         assert len({f.folder for f in found}) == len(found)
         assert History(server.place).runs("A1")[0].calibration.names
+
+
+@pytest.mark.thorough
+def test_a_store_on_a_server_is_migrated_as_well(tmp_path: Path) -> None:
+    pytest.importorskip("psycopg")
+    with running(tmp_path / "pg") as server:
+        check_migration(server.place)

@@ -17,6 +17,7 @@ from fieldcal.commands.virtual_address import driver_address
 from fieldcal.core.errors import FieldcalError, SessionError
 from fieldcal.core.samples import Block
 from fieldcal.drivers.driver import host_clock
+from fieldcal.fleet.outcome import levels_of
 from fieldcal.history.store import History
 from fieldcal.run import companions
 from fieldcal.run.companions import (
@@ -306,12 +307,16 @@ def test_a_device_that_joins_a_session_later_has_each_position_once(
         pass
     with Recorder(tmp_path / "s", None) as recorder:
         tables = {"format": 1, "position": [*planned, besides]}
+        tables |= {"device": {"lot": "7", "serial": "A1"}, "site": {"station": "B"}}
         with record_companions({"new:": ""}, recorder, tables) as leads:
             leads.mark("added", position=2, name="besides", **besides)
     for folder in (tmp_path / "s", *companion_folders(tmp_path / "s", 1)):
         assert [p.degrees for p in Session.open(folder).positions] == [
             (0.0, 0.0), (45.0, 5.0), (-45.0, 5.0)
         ]  # fmt: skip
+    further = Session.open(companion_folders(tmp_path / "s", 1)[0])
+    assert levels_of(further) == {"lot": "7", "station": "B"}
+    assert "serial" not in further.about.device
 
 
 def test_an_unforeseen_error_of_a_further_device_is_told(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import shutil
 import signal
@@ -31,6 +32,7 @@ from fieldcal.history.sessions import StoredSession
 from fieldcal.service import limits, queue
 from fieldcal.service.bounds import MIB, ServiceBounds
 from fieldcal.service.jobs import Job, JobStore, held_folder
+from fieldcal.service.own_process import run_in_own_process
 from fieldcal.service.queue import JobQueue
 from fieldcal.service.work import JobTask, without_paths
 from fieldcal.session.sample_files import to_record_batch
@@ -172,7 +174,8 @@ class Endless:
         return JobTask(ServiceBounds(seconds=1))(folder)
 
 
-def test_limits_hold_for_the_job_only_also_in_a_thread() -> None:
+def test_limits_hold_for_the_job_only() -> None:
+    """In a thread, where a limit would kill the whole process, there are none."""
     before = [resource.getrlimit(what) for what in limits.LIMITED]
     handler = signal.getsignal(signal.SIGXCPU)
 
@@ -183,10 +186,40 @@ def test_limits_hold_for_the_job_only_also_in_a_thread() -> None:
 
     found, cores = inside()
     assert found is not handler and cores == 0
-    with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(inside).result() == (handler, 0)
+    with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="main thread"):
+        pool.submit(inside).result()
     assert [resource.getrlimit(what) for what in limits.LIMITED] == before
     assert signal.getsignal(signal.SIGXCPU) is handler
+
+
+def test_a_worker_in_a_thread_survives_a_job_beyond_its_processor_time(
+    tmp_path: Path, session: Path
+) -> None:
+    """As a worker of Dask is one: killed, it would lose others and be tried again."""
+    bounds = ServiceBounds(seconds=1)
+    jobs = JobStore(tmp_path, bounds)
+    folder = str(jobs.folder(added(jobs, zipped(session), "s.zip").id))
+    pool = WorkerPool(lambda: ThreadPoolExecutor(1), 1)
+    (made,) = run_tasks([folder], JobTask(bounds), pool)
+    assert made.value is not None and made.value.error is not None, made
+    assert made.value.error.startswith("took more than 0.0166667 min of processor time")
+
+
+def ends_itself(folder: str) -> StoredSession:
+    sys.stdout.write("no part of the result\n")
+    if folder == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return StoredSession(folder, str(os.getpid()))
+
+
+def test_a_process_of_its_own_costs_its_caller_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    found = run_in_own_process(ends_itself, "whole")
+    assert found.error is None and found.serial not in ("", str(os.getpid()))
+    found = run_in_own_process(ends_itself, "killed")
+    assert found.result is None and "its process was killed" in (found.error or "")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no such limit elsewhere")
@@ -295,6 +328,26 @@ def test_a_job_whose_result_cannot_be_stored_is_repeated_until_it_can(
     assert (job.state, job.error, job.go) == ("done", None, True)
     (stored,) = Database(place).run(sessions.find_sessions)
     assert stored.serial == "A1"
+
+
+def test_nothing_is_stored_of_a_job_that_was_deleted_meanwhile(tmp_path: Path) -> None:
+    jobs, pool = (
+        JobStore(tmp_path / "jobs", ServiceBounds()),
+        WorkerPool(lambda: ThreadPoolExecutor(1), 1),
+    )
+    first = added(jobs).id
+
+    def task(folder: str) -> StoredSession:
+        if folder.endswith(first):
+            assert jobs.remove(first)
+        return quick(folder)
+
+    with JobQueue(jobs, Database(tmp_path / "h"), pool, task) as made:
+        second = added(jobs).id
+        made.notify()
+        assert over(jobs, second).state == "done"
+    (stored,) = Database(tmp_path / "h").run(sessions.find_sessions)
+    assert stored.folder == str(jobs.folder(second))
 
 
 def test_a_result_that_can_never_be_stored_holds_up_no_other(tmp_path: Path) -> None:

@@ -30,6 +30,9 @@ from fieldcal.fleet.workers import WorkerPool, process_pool, run_tasks
 from fieldcal.history import sessions
 from fieldcal.history.database import Database
 from fieldcal.history.sessions import StoredSession
+from fieldcal.history.store import History
+from fieldcal.run.page.access import cookie_name
+from fieldcal.run.page.server import local_address
 from fieldcal.service import openapi
 from fieldcal.service.bounds import ServiceBounds
 from fieldcal.service.jobs import RESULTS_FOLDER, JobStore
@@ -181,13 +184,14 @@ def test_nobody_is_let_in_without_a_token(served: Served) -> None:
         paths = ("/api/sessions", "/api/openapi.json", "/", "/service.js")
         assert {stranger.ask(path).status for path in paths} == {403}
         assert stranger.send("x", b"x").status == 403
-        remedy = b"--tokens" if token else b"scan the code"
-        assert remedy in stranger.ask("/api/sessions").body
+        said = stranger.ask("/api/sessions").body
+        assert b"--tokens" in said and b"scan" not in said
+        assert token or b"Authorization: Bearer" in said
     assert (
         served.client.ask("/api/sessions", headers={"Host": "evil.example"}).status
         == 421
     )
-    cookie = {"Cookie": f"fieldcal_page={served.service.access.token}"}
+    cookie = {"Cookie": f"{cookie_name(host)}={served.service.access.token}"}
     browser = Client(served.client.base, "")
     assert browser.ask("/", headers=cookie).status == 200
     post = ("/api/sessions?filename=x", b"x")
@@ -201,6 +205,39 @@ def test_nobody_is_let_in_without_a_token(served: Served) -> None:
     )
     assert Client(served.client.base, "other" * 4).ask("/").status == 200
     assert list(served.jobs.root.glob(".*")) == []
+
+
+def test_two_pages_on_one_computer_do_not_log_each_other_out(tmp_path: Path) -> None:
+    """A browser sends the cookies of one port to all ports of a host."""
+    with serving(tmp_path / "a") as one, serving(tmp_path / "b") as two:
+        kept: dict[str, str] = {"other": '{"of": "another program"}'}
+        for each in (one, two):
+            link = HTTPConnection(each.service.access.hosts[0])
+            link.request("GET", f"/?token={each.service.access.token}")
+            told = link.getresponse().headers["Set-Cookie"]
+            name, _, value = told.split(";")[0].partition("=")
+            kept[name] = value
+            link.close()
+        header = "; ".join(f"{name}={value}" for name, value in kept.items())
+        for each in (one, two):
+            browser = Client(each.client.base, "")
+            assert browser.ask("/", headers={"Cookie": header}).status == 200
+
+
+def test_the_address_that_is_shown_can_be_opened(tmp_path: Path) -> None:
+    """No browser elsewhere reaches 0.0.0.0, which is every address of a computer."""
+    jobs, pool = (
+        JobStore(tmp_path, BOUNDS),
+        WorkerPool(lambda: ThreadPoolExecutor(1), 1),
+    )
+    queue = JobQueue(jobs, Database(tmp_path / "h"), pool)
+    for names in ((), ("lab.example:8750",)):
+        service = Service.listen("0.0.0.0", 0, jobs, queue, names=names)  # noqa: S104
+        with service.socket:
+            port = service.socket.getsockname()[1]
+            first = names[0] if names else f"{local_address()}:{port}"
+            assert service.address.startswith(f"http://{first}/?token=")
+            assert f"localhost:{port}" in service.access.hosts
 
 
 @pytest.mark.parametrize(
@@ -341,6 +378,7 @@ def test_a_process_of_its_own_serves_sessions_and_recordings(tmp_path: Path) -> 
                 ],
             ]
             good, bad = map(client.over, numbers)
+            client.over(client.send("again.zip", zipped(session)).json["id"])
         finally:
             process.send_signal(signal.SIGTERM)
             process.wait(HANGS)
@@ -358,8 +396,10 @@ def test_a_process_of_its_own_serves_sessions_and_recordings(tmp_path: Path) -> 
     suite = ElementTree.parse(made / "junit.xml").getroot()
     assert suite.get("errors") == "0"
     assert "acc bias" in (made / "report.html").read_text()
-    (stored,) = Database(tmp_path / "h").run(sessions.find_sessions)
-    assert stored.serial == "A7" and stored.good
+    for stored in Database(tmp_path / "h").run(sessions.find_sessions):
+        assert stored.serial == "A7" and stored.good
+    (run,) = History(tmp_path / "h").runs("A7")
+    assert numbers[0] not in run.session, "uploaded again, it counts once"
 
 
 @pytest.mark.thorough

@@ -71,3 +71,23 @@ def test_that_the_service_was_not_reached_is_said_until_it_is_again(
         screen.value("window.fetch = window.kept; look(); 1")
         screen.until(f"{said} === ''")
         assert not screen.text("said")
+
+
+def test_why_something_is_refused_is_said_as_a_sentence(address: str) -> None:
+    said = "document.getElementById('said').textContent"
+    answers = "window.fetch = () => Promise.resolve(new Response(%s, {status: %d})); 1"
+    with Screen() as screen:
+        screen.go(address)
+        screen.until("document.getElementById('go')?.disabled === false")
+        screen.value("window.kept = fetch; 1")
+        screen.value(answers % ("'refused: open the address'", 403))
+        screen.value("look(); 1")
+        screen.until(f"{said} === 'refused: open the address'")
+        screen.value("window.fetch = window.kept; look(); 1")
+        screen.until(f"{said} === ''")
+        no = """Promise.resolve(new Response('{"error": "too many"}', {status: 429}))"""
+        screen.value(
+            f"window.fetch = (u) => u === 'api/sessions' ? window.kept(u) : {no}; 1"
+        )
+        screen.value(SEND % "t,ax")
+        screen.until(f"{said} === 'too many'")

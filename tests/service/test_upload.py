@@ -40,7 +40,8 @@ def taken(path: Path, folder: Path, bounds: ServiceBounds = SMALL) -> Path:
 @pytest.mark.parametrize("top", ["", "unit 7/", "a/b/"])
 def test_a_session_comes_out_with_its_files_alone(tmp_path: Path, top: str) -> None:
     files = {f"{top}session.toml": ABOUT, f"{top}marks.jsonl": b"{}\n",
-             f"{top}.DS_Store": b"x"}  # fmt: skip
+             f"{top}.DS_Store": b"x",
+             f"__MACOSX/{top}._session.toml": b"x"}  # fmt: skip
     folder = taken(packed(tmp_path / "z", files), tmp_path / "out")
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == {
         "session.toml": ABOUT, "marks.jsonl": b"{}\n",

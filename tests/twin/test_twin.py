@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -222,6 +223,24 @@ def test_of_a_line_the_replay_leaves_little(
     assert 0.8 < said["twin"]["twin"]["chi2_per_dof"] < 1.2
     assert twin.every(concealed.partition(":")[0])
     assert "Of the line it leaves" in said["says"]
+
+
+@pytest.mark.parametrize(
+    ("missing", "hum", "unit"),
+    [("acc", "hum:hz=7.3,gx=0.02", "rad/s"), ("gyr", "hum:hz=7.3,ax=0.2", "m/s^2")],
+)
+def test_a_line_is_told_of_the_triad_that_there_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    missing: str, hum: str, unit: str,
+) -> None:  # fmt: skip
+    positions = places()[:4]
+    block = recorded(replace(DEVICE, effects=(parse(hum),)), positions, 1)
+    none = np.full_like(block.acc, np.nan)
+    write_session(tmp_path, replace(block, **{missing: none}), positions)
+    _, said, _ = diagnosed(tmp_path, capsys)
+    told = re.search(r"Of the line it leaves (\S+) of (\S+) (\S+)\.", said["says"])
+    assert told is not None and told[3] == unit, said["says"]
+    assert 0 <= float(told[1]) < 0.1 * float(told[2])
 
 
 @pytest.mark.thorough

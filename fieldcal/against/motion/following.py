@@ -20,7 +20,12 @@ from fieldcal.model.causes.motion_dictionary import MotionDictionary
 from fieldcal.model.evidence.sets import Set
 from fieldcal.model.posterior.probabilities import Posterior
 from fieldcal.model.rows.coloured_noise import Bands
-from fieldcal.model.rows.motion import Alignment, MotionRows, rows_in_motion
+from fieldcal.model.rows.motion import (
+    Alignment,
+    MotionRows,
+    common_samples,
+    rows_in_motion,
+)
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.search.inference import InferenceResult
 from fieldcal.model.state import State
@@ -175,6 +180,7 @@ def _without_idle_lags(
 
 def _motion_rows(block: Block, reference: Reference, start: Alignment) -> MotionRows:
     """Rows of the common motion, at the rate that the motion needs."""
+    block = common_samples(block, reference)
     step = float(np.median(np.diff(block.t)))
     length = float(np.ptp(block.t))
     per_row = max(int(1 / _row_rate(reference) / step), -(-len(block) // MAX_ROWS), 1)

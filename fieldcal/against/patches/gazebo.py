@@ -21,14 +21,19 @@ TRIADS = (("gyr", "angular_velocity"), ("acc", "linear_acceleration"))
 
 def text(model: SensorModel) -> tuple[str, list[str]]:
     """The element, and what the user must know."""
-    imu = Element("imu")
+    imu, says = Element("imu"), []
     for triad, name in TRIADS:
         if _says(model, triad):
             part = SubElement(imu, name)
+            if not model.knows_noise(triad):
+                says.append(
+                    f"the noise of the simulator is not known: write its own <stddev>"
+                    f" of {name} into each <noise>, or it is 0"
+                )
             for i, axis in enumerate("xyz"):
                 _noise(SubElement(part, axis), model, triad, i)
     indent(imu)
-    says = ["put it into <sensor type='imu'> in the place of the <imu> that is there"]
+    says.append("put it into <sensor type='imu'> in the place of the <imu> there")
     if model.rate_hz == model.rate_hz:
         says.append(f"<update_rate> of the recording: {model.rate_hz:.6g}")
     return tostring(imu, encoding="unicode") + "\n", says
@@ -46,10 +51,10 @@ def _noise(axis: Element, model: SensorModel, triad: str, i: int) -> None:
     step = model.number("quantisation", triad)
     noise = SubElement(axis, "noise")
     noise.set("type", "gaussian_quantized" if step else "gaussian")
-    values = {
-        "mean": model.group(f"{triad}_bias")[i],
-        "stddev": model.level(f"{triad[0]}{'xyz'[i]}"),
-        **({"precision": step} if step else {}),
-    }
+    values = {"mean": float(model.group(f"{triad}_bias")[i])}
+    if model.knows_noise(triad):
+        values["stddev"] = model.level(f"{triad[0]}{'xyz'[i]}")
+    if step:
+        values["precision"] = step
     for name, value in values.items():
         SubElement(noise, name).text = f"{value:.9g}"

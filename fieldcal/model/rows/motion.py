@@ -22,7 +22,7 @@ DCT-II, N. Ahmed et al. 1974; P. Whittle 1953 for the independence.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from fieldcal.core.gravity import G0
 from fieldcal.core.samples import ACC, GYR, Array, Block, Index
 from fieldcal.model.rows.reference import GAP_INTERVALS, MIN_CHANNEL_SAMPLES, Reference
 from fieldcal.model.rows.response import Response
+from fieldcal.model.rows.thermometer import Thermometer
 from fieldcal.physics.experience import Experience
 
 TRIADS = (ACC, GYR)
@@ -78,7 +79,8 @@ class MotionRows:
     t : (n, m) s, stamps of the samples of each row
     uneven : (n, m) s, by how much these are off the even times of their stretch
     y : (n, 6) their means, m/s^2 and rad/s; nan where a channel was not measured
-    temperature : (n,) deg C; nan where unknown
+    warming, heating : (n,) K and K/s, since the recording's start; nan if no
+        thermometer shows a change
     length : rows of each stretch
     step : s from row to row
     reference : of the motion
@@ -91,7 +93,8 @@ class MotionRows:
     t: Array
     uneven: Array
     y: Array
-    temperature: Array
+    warming: Array
+    heating: Array
     length: int
     step: float
     reference: Reference
@@ -161,7 +164,6 @@ class MotionRows:
         missed: Array = np.zeros((n, 6))
         if self.uneven.any():
             missed = self._means_of(response.sensed, response.late, 1, self.uneven)
-        warming = self.temperature - self.temperature[0]
         unknown = np.full(n, np.nan)
         return Experience(
             alpha=unknown, beta=unknown, gamma=np.zeros(n),
@@ -171,8 +173,8 @@ class MotionRows:
             missed=missed,
             f_bend=self.motion(response, 2)[:, ACC],
             t=t, lasts=np.full(n, self.step), since_start=t - t[0],
-            since_turn=np.full(n, np.inf), warming=warming,
-            heating=np.gradient(warming, t), variance=np.zeros((n, 3)),
+            since_turn=np.full(n, np.inf), warming=self.warming,
+            heating=self.heating, variance=np.zeros((n, 3)),
             position=self.part, rate=v[:, GYR], speed=np.zeros(n),
             speed_sigma=np.zeros(n), base_force=np.array([0.0, -G0, 0.0]),
             base_rate=np.zeros(3), mounting=np.eye(3), latitude=np.nan,
@@ -209,6 +211,30 @@ def frequencies(count: int, length: int, step: float) -> Array:
     return out
 
 
+def common_samples(block: Block, reference: Reference) -> Block:
+    """Samples in which all channels have a value, if most have not.
+
+    Where one triad is read more often than the other, every row would have a gap.
+    """
+    six = block.six[:, _compared_channels(block, reference)]
+    whole = np.flatnonzero(np.isfinite(six).all(axis=1))
+    if len(whole) < 2 or np.median(np.diff(whole)) == 1:
+        return block
+    kept, read = block[whole], np.isfinite(block.temperature)
+    if read.any():  # perhaps in the other samples
+        degrees = np.interp(kept.t, block.t[read], block.temperature[read])
+        kept = replace(kept, temperature=degrees)
+    return kept
+
+
+def _compared_channels(block: Block, reference: Reference) -> NDArray[np.bool_]:
+    """Measured channels of the triads of which the reference has any, (6,)."""
+    told = np.repeat(reference.observed.reshape(2, 3).any(axis=1), 3)
+    measured = np.isfinite(block.six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
+    compared: NDArray[np.bool_] = told & measured
+    return compared
+
+
 def rows_in_motion(
     block: Block,
     reference: Reference,
@@ -230,8 +256,7 @@ def rows_in_motion(
     """
     six = block.six
     six[:, np.repeat(~reference.observed.reshape(2, 3).any(axis=1), 3)] = np.nan
-    measured = np.isfinite(six).sum(axis=0) >= MIN_CHANNEL_SAMPLES
-    good = np.isfinite(six[:, measured]).all(axis=1)
+    good = np.isfinite(six[:, _compared_channels(block, reference)]).all(axis=1)
     good &= reference.covers(alignment.reference_time(block.t), margin)
     kept = np.flatnonzero(good)
     step = float(np.median(np.diff(block.t)))
@@ -242,11 +267,15 @@ def rows_in_motion(
         for run in np.split(kept, np.flatnonzero(broken) + 1)
     ]
     at = np.concatenate(stretches).reshape(-1, per_row)
-    temperature = block.temperature[at].mean(axis=1)
+    # a thermometer may be read less often than the other sensors
+    thermometer = Thermometer.of(block)
+    warming, heating = thermometer.at(block.t[at].mean(axis=1))
+    if not thermometer.changes:
+        warming = np.full(len(at), np.nan)  # its noise is no change
     ideal = Response.of(reference)
     return MotionRows(
         block.t[at], _stamp_errors(block.t, stretches).reshape(at.shape),
-        six[at].mean(axis=1), temperature, length,
+        six[at].mean(axis=1), warming, heating, length,
         step * per_row, reference, alignment, ideal, ideal,
     )  # fmt: skip
 

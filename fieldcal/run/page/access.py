@@ -1,23 +1,27 @@
 """Access control of the page, by a token and by the origin of a request.
 
-The address on the console contains the token, which is then kept in a cookie. Programs
-send their own token with each request. Requests under another host name (DNS rebinding)
-are refused, and so are requests that change something and do not come from the page.
+The address on the console contains the token, which is then kept in a cookie. A
+browser sends the cookies of a computer to all its ports, so the cookie's name contains
+the port. Programs send their own token with each request. Requests under another host
+name (DNS rebinding) are refused, and so are requests that change something and do not
+come from the page.
 """
 
 from __future__ import annotations
 
 import hmac
+import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
+from starlette.requests import cookie_parser
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-COOKIE = "fieldcal_page"
+SCAN = "scan the code that the console shows, or open the address beside it"
+"""What to do without a token, where the console shows the code of the address."""
 
 MAX_BODY_BYTES = 1000
 """Largest body of a request, bytes."""
@@ -41,6 +45,7 @@ class Access:
     token : contained in the address on the console
     bearers : tokens of programs
     uploads : largest body of a path that takes files, bytes
+    remedy : what one is told to do who has no token
 
     """
 
@@ -48,34 +53,36 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
     bearers: tuple[str, ...] = ()
     uploads: Mapping[str, int] = field(default_factory=dict)
+    remedy: str = SCAN
 
     def refusal(self, scope: Scope) -> Response | None:
         """The answer to a request that is refused; None for one that is allowed."""
         headers = {
             k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]
         }
-        if headers.get("host", "") not in self.hosts:
+        host = headers.get("host", "")
+        if host not in self.hosts:
             return _refusal_response(
                 421, "this page is served under the address on the console"
             )
         given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token")
         if given and scope["path"] == "/" and self._is_page_token(given[0]):
             answer = RedirectResponse("/", 303)
-            answer.set_cookie(COOKIE, self.token, httponly=True, samesite="lax")
+            answer.set_cookie(
+                cookie_name(host), self.token, httponly=True, samesite="lax"
+            )
             return answer
         scheme, _, sent = headers.get("authorization", "").partition(" ")
         program = scheme.lower() == "bearer" and self._is_program_token(sent.strip())
         if scheme.lower() == "bearer" and not program:
             why = "this token is none of a program: fieldcal serve takes"
             return _refusal_response(403, f"{why} those of its --tokens file")
-        if not program and not self._is_page_token(
-            _cookie_token(headers.get("cookie", ""))
-        ):
-            why = "scan the code that the console shows, or open the address beside it"
-            return _refusal_response(403, why)
+        kept = cookie_parser(headers.get("cookie", "")).get(cookie_name(host), "")
+        if not program and not self._is_page_token(kept):
+            return _refusal_response(403, self.remedy)
         if scope["method"] in ("GET", "HEAD"):
             return None
-        here = {f"{s}://{host}" for host in self.hosts for s in ("http", "https")}
+        here = {f"{s}://{name}" for name in self.hosts for s in ("http", "https")}
         if not program and headers.get("origin", "") not in here:
             return _refusal_response(
                 403, "what is wanted has to come from the page itself"
@@ -131,9 +138,10 @@ def _refusal_response(status: int, why: str) -> Response:
     return PlainTextResponse(f"refused: {why}\n", status)
 
 
-def _cookie_token(header: str) -> str:
-    try:
-        found = SimpleCookie(header).get(COOKIE)
-    except CookieError:
-        return ""
-    return found.value if found else ""
+def cookie_name(host: str) -> str:
+    """Name of the cookie of a host with its port.
+
+    >>> cookie_name("127.0.0.1:8750")
+    'fieldcal_127_0_0_1_8750'
+    """
+    return "fieldcal_" + re.sub(r"[^0-9A-Za-z]", "_", host)

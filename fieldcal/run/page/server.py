@@ -33,6 +33,9 @@ MESSAGE_EVERY_S = 2.0
 LINGER_S = 3.0
 """Time that the last state is offered to clients that have not seen it, s."""
 
+ALL_ADDRESSES = ("", "0.0.0.0")  # noqa: S104
+"""Hosts at which a server listens at every address of this computer."""
+
 LONGEST_NAME = 64
 """Longest name of a client."""
 
@@ -58,8 +61,7 @@ class PageServer:
         self._seen: dict[str, int] = {}
         self._socket = listening_socket(host, port)
         port = self._socket.getsockname()[1]
-        name = f"[{host}]" if ":" in host else host
-        self.access = Access((f"{name}:{port}",))
+        self.access = Access(tuple(f"{name}:{port}" for name in names_of(host)))
         config = uvicorn.Config(
             Gate(_make_app(self), self.access), log_config=None, access_log=False,
             lifespan="off", timeout_graceful_shutdown=1, server_header=False,
@@ -133,6 +135,22 @@ def listening_socket(host: str, port: int) -> socket.socket:
             f"the page cannot be served at {host}:{port}: {error}; give an address of"
             " this computer and a free port, as in 192.168.1.5:8080"
         ) from error
+
+
+def names_of(host: str) -> tuple[str, ...]:
+    """Names under which what listens at a host is reached; the first is to be shown.
+
+    What listens at all addresses of this computer is reached at none of that name.
+
+    >>> names_of("192.168.1.5"), names_of("::1"), names_of("localhost")
+    (('192.168.1.5',), ('[::1]',), ('localhost', '127.0.0.1'))
+    """
+    local = ("127.0.0.1", "localhost")
+    if host in ALL_ADDRESSES:
+        return tuple(dict.fromkeys((local_address(), *local)))
+    if host in local:
+        return tuple(dict.fromkeys((host, *sorted(local, reverse=True))))
+    return (f"[{host}]" if ":" in host else host,)
 
 
 def local_address() -> str:

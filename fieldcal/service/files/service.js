@@ -40,13 +40,22 @@ function show(jobs) {
   }
 }
 
+// What an answer other than the wanted one says: a sentence, or JSON with one.
+async function refusal(answer) {
+  const text = await answer.text();
+  try {
+    return JSON.parse(text).error;
+  } catch {
+    return text;
+  }
+}
+
 async function look() {
   try {
     const answer = await fetch("api/sessions");
-    if (!answer.ok) throw new Error(await answer.text());
-    show(await answer.json());
-    if (unreached) say("");
-    unreached = false;
+    if (answer.ok) show(await answer.json());
+    if (unreached || !answer.ok) say(answer.ok ? "" : await refusal(answer));
+    unreached = !answer.ok;
   } catch (error) {
     unreached = true;
     say(`not reached: ${error.message}`);
@@ -63,8 +72,7 @@ document.getElementById("send").addEventListener("submit", async (event) => {
     const answer = await fetch(`api/sessions?filename=${encodeURIComponent(name || "recording")}`, {
       method: "POST", body: file, headers: { "content-type": "application/octet-stream" },
     });
-    const text = await answer.text();
-    say(answer.ok ? "sent" : text);
+    say(answer.ok ? "sent" : await refusal(answer));
   } catch (error) {
     say(`not sent: ${error.message}`);
   }

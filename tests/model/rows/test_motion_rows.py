@@ -12,11 +12,13 @@ from fieldcal.core.samples import Array, Block
 from fieldcal.model.rows.motion import (
     Alignment,
     MotionRows,
+    common_samples,
     frequencies,
     rows_in_motion,
 )
 from fieldcal.model.rows.reference import Reference
 from fieldcal.model.rows.response import Response
+from fieldcal.physics.experience import Experience
 
 LENGTH, COUNT = 6, 4
 STILL = Alignment(0.0, 0.0, 0.0)
@@ -121,6 +123,52 @@ def test_the_bend_of_force_is_its_second_derivative_in_the_axes_of_the_device() 
     expected = -((0.7 + 0.1 * np.arange(3)) ** 2) * course(there.middles - 0.3)[:, :3]
     found = there.experience(there.acc).f_bend
     np.testing.assert_allclose(found, expected @ turn.T, atol=1e-3)
+
+
+def test_the_temperature_is_known_between_the_readings_of_a_thermometer() -> None:
+    """One that is read once a second leaves a gap in nearly every row."""
+    t = np.arange(0.0, 40.0, 0.02)
+    degrees = 20 + 0.3 * t
+    read = np.where(np.arange(len(t)) % 50 == 7, degrees, np.nan)
+    for temperature in (degrees, read, np.where(t < 3, np.nan, degrees)):
+        x = warmed(t, temperature)
+        assert x.warms
+        within = (x.t > 4) & (x.t < 39)
+        np.testing.assert_allclose(x.warming[within], 0.3 * x.t[within], atol=1e-2)
+        np.testing.assert_allclose(x.heating[within], 0.3, atol=1e-2)
+
+
+def test_the_noise_of_a_thermometer_is_no_change_of_temperature() -> None:
+    t = np.arange(0.0, 40.0, 0.02)
+    assert not warmed(t, np.full(len(t), np.nan)).warms
+    noise = np.random.default_rng(3).normal(0, 0.01, len(t))
+    assert not warmed(t, 20 + noise).warms
+
+
+def test_gyroscopes_that_are_read_half_as_often_leave_rows_without_gaps() -> None:
+    t = np.arange(5.0, 30.0, 0.02)
+    acc, gyr, odd = course(t)[:, :3], course(t)[:, 3:].copy(), np.arange(len(t)) % 2
+    gyr[odd == 0] = np.nan
+    read = np.where(odd == 0, 20 + 0.3 * t, np.nan)
+    both = replace(Block.of(t, acc, gyr), temperature=read)
+    thinned = common_samples(both, reference())
+    np.testing.assert_array_equal(thinned.t, t[1::2])
+    there = rows_in_motion(thinned, reference(), STILL, 2, 2.0, 1.0)
+    assert len(there) * there.step > 22 and there.step == pytest.approx(0.08)
+    np.testing.assert_allclose(there.y, there.motion(there.acc), atol=1e-6)
+    assert there.experience(there.acc).warms
+    whole = Block.of(t, acc)
+    assert common_samples(whole, reference()) is whole, "there is no other triad"
+    gyr[odd == 0] = 0.0
+    gyr[300] = np.nan
+    lost = Block.of(t, acc, gyr)
+    assert common_samples(lost, reference()) is lost, "a lost sample is a gap"
+
+
+def warmed(t: Array, temperature: Array) -> Experience:
+    block = replace(Block.of(t, course(t)[:, :3]), temperature=temperature)
+    there = rows_in_motion(block, reference(), STILL, 2, 2.0, 1.0)
+    return there.experience(there.acc)
 
 
 def test_rows_end_at_gaps_of_recording_and_reference() -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from http.client import HTTPResponse
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from hypothesis import given, settings
@@ -20,6 +21,7 @@ from fieldcal.commands.run_page import parse_address, wait_for_page
 from fieldcal.core.errors import InputError, Stopped
 from fieldcal.core.positions import FIVE_POSITIONS
 from fieldcal.planning.steps import Hold
+from fieldcal.run.page.access import cookie_name
 from fieldcal.run.page.board import Board
 from fieldcal.run.page.server import PageServer
 
@@ -50,7 +52,7 @@ def sent(
     server: PageServer, path: str, body: bytes | None = None, **headers: str
 ) -> HTTPResponse:
     """The answer to a request of somebody who has the token, as changed by headers."""
-    usual = {"Cookie": f"fieldcal_page={server.access.token}"}
+    usual = {"Cookie": f"{cookie_name(server.access.hosts[0])}={server.access.token}"}
     if body is not None:
         usual |= {"Origin": base(server), "Content-Type": "application/json"}
     changed = {k.replace("_", "-"): v for k, v in headers.items()}
@@ -93,10 +95,11 @@ def test_the_address_holds_the_token_once(server: PageServer) -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/page.js", "/events?client=a", "/nothing"])
-@pytest.mark.parametrize("cookie", ["", "fieldcal_page=", "fieldcal_page=wrong", 'é="'])
+@pytest.mark.parametrize("cookie", ["", "NAME=", "NAME=wrong", 'é="'])
 def test_nobody_gets_in_without_the_token(
     server: PageServer, path: str, cookie: str
 ) -> None:
+    cookie = cookie.replace("NAME", cookie_name(server.access.hosts[0]))
     assert status(server, path, Cookie=cookie) == 403
     assert status(server, f"{path}?token=wrong", Cookie=cookie) == 403
 
@@ -258,8 +261,9 @@ def test_a_run_is_watched_to_its_end(tmp_path: Path) -> None:
         first = json.loads(run.stderr.readline())
         assert first["event"] == "page"
         address, _, token = first["address"].partition("?token=")
+        name = cookie_name(urlsplit(address).netloc)
         request = urllib.request.Request(
-            f"{address}events?client=w", headers={"Cookie": f"fieldcal_page={token}"}
+            f"{address}events?client=w", headers={"Cookie": f"{name}={token}"}
         )
         with OPENER.open(request, timeout=HANGS) as stream:
             for line in stream:

@@ -245,7 +245,8 @@ def _print_plan(
     console.print(f"{len(chosen)} positions, {seconds:g} s each:")
     for i, position in enumerate(chosen, start=1):
         console.print(f"  {i}  {position.name}")
-    title = f"Expected ± 1σ ({noise}: {1e3 * grade.acc(seconds):.2f} mm/s² a mean)"
+    mean = f"{1e3 * grade.acc(seconds):.2f} mm/s² a mean"
+    title = f"Expected ± 1σ by noise alone ({noise}: {mean})"
     table = Table(title=title, title_justify="left")
     plans = {"this plan": found, PAPER_COLUMN: paper}
     if with_it is not None:
@@ -256,6 +257,9 @@ def _print_plan(
         cells = [_sigma_cell(sigmas.get(name)) for sigmas in plans.values()]
         table.add_row(name, *cells, _unit_of_parameter(name))
     console.print(table)
+    console.print(
+        "how well angles are set and how square the axes are comes in addition"
+    )
 
 
 def _sigma_cell(sigma: float | None) -> str:

@@ -94,10 +94,18 @@ class Ladder:
     beta: float = float(np.deg2rad(5.0))
 
     def candidates(self) -> list[Position]:
-        """A grid of positions within the limits, home among them."""
+        """A grid of positions within the limits, home among them.
+
+        Of a joint that turns all round, both ends are the same angle, and one is left.
+        """
         steps = np.linspace(-1, 1, ANGLES_PER_JOINT)
-        pairs = product(np.rad2deg(self.alpha) * steps, np.rad2deg(self.beta) * steps)
-        return [Position.deg(round(a, 3) + 0.0, round(b, 3) + 0.0) for a, b in pairs]
+        alphas, betas = (
+            np.round(np.rad2deg(most) * steps, 3) + 0.0
+            for most in (self.alpha, self.beta)
+        )
+        if alphas[-1] - alphas[0] >= 360:
+            alphas = alphas[1:]
+        return [Position.deg(a, b) for a, b in product(alphas, betas)]
 
 
 def required_parameters(n: int) -> tuple[str, ...]:

@@ -136,6 +136,15 @@ def test_numbers_that_are_none_are_refused(
     assert says in capsys.readouterr().err
 
 
+def test_a_joint_that_turns_all_round_has_each_angle_once() -> None:
+    around = planner.Ladder(np.pi, np.deg2rad(5.0)).candidates()
+    turned = {round(np.cos(p.alpha or 0), 9) + 1j * round(np.sin(p.alpha or 0), 9)
+              for p in around}  # fmt: skip
+    levels = {p.beta for p in around}
+    assert len(around) == len(turned) * len(levels)
+    assert len(planner.Ladder(np.deg2rad(170.0)).candidates()) > len(around)
+
+
 def test_aliases_that_follow_from_the_geometry() -> None:
     """Six faces load each axis with 0 and +-g alone: K2 looks like K+/K-."""
     six = find_aliases(SIX_FACES, G)

@@ -251,7 +251,7 @@ def _as_remedy(
         f"{word} more for {seconds:.0f} s, {where}: {_expectation(left)}"
         f" ({parameter_title(worst)} is {now})"
     )
-    angles = tuple(p.degrees or (0.0, 0.0) for p in chosen)
+    angles = tuple(angles for p in chosen if (angles := p.degrees))
     return Remedy(says, positions=angles, seconds=seconds)
 
 

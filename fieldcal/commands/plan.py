@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from fieldcal.commands.plan_file import (
     plan_tables,
-    position_table,
     select_positions,
     write_plan,
 )
@@ -217,6 +216,8 @@ def _plan_document(
     further: Position | None,
     with_it: Mapping[str, float] | None,
 ) -> dict[str, Any]:
+    from fieldcal.session.position_tables import position_table
+
     extra = further and {**position_table(further), "sigma": dict(with_it or {})}
     return {
         "positions": [position_table(p) for p in chosen],

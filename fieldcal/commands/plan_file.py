@@ -87,6 +87,7 @@ def write_plan(
     import tomlkit
 
     from fieldcal.session.folder import write_atomically
+    from fieldcal.session.position_tables import position_table
 
     if path.exists():
         raise InputError(f"{path}: is there already; name another file")
@@ -97,10 +98,3 @@ def write_plan(
         "position": [position_table(p) for p in positions],
     }
     write_atomically(path, tomlkit.dumps(whole))
-
-
-def position_table(position: Position) -> dict[str, Any]:
-    """Table of a position in a plan file."""
-    alpha, beta, gamma = position.all_degrees or (0.0, 0.0, 0.0)
-    third = {"gamma_deg": gamma} if gamma else {}
-    return {"name": position.name, "alpha_deg": alpha, "beta_deg": beta, **third}

@@ -329,11 +329,11 @@ def _mark_remedy_positions(
 ) -> None:
     """Mark the positions that a remedy adds and those that it repeats."""
     from fieldcal.session.marks import POSITION_ADDED
+    from fieldcal.session.position_tables import position_table
 
     for number in again:
         recorder.mark("repeated", position=number)
         taken.pop(number, None)
     for number, position in enumerate(task.about.positions[known:], known):
-        alpha, beta = position.degrees or (0.0, 0.0)
-        where = {"alpha_deg": alpha, "beta_deg": beta, "seconds": task.seconds}
-        recorder.mark(POSITION_ADDED, position=number, name=position.name, **where)
+        where = {**position_table(position), "seconds": task.seconds}
+        recorder.mark(POSITION_ADDED, position=number, **where)

@@ -104,18 +104,16 @@ def write_junit(
 ) -> None:
     """Write the outcome as JUnit XML; `result` is None if the run broke off."""
     from fieldcal.acceptance.verification import planned_verification
-    from fieldcal.core.positions import Position
     from fieldcal.run import junit
     from fieldcal.session.description import with_added_positions
     from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
+    from fieldcal.session.position_tables import parse_positions
 
     marks = list(read_marks(folder / MARKS))
     about = task.about
     more = [m for m in marks if m.get("event") == POSITION_ADDED]
-    about = with_added_positions(about, [
-        Position.deg(m["alpha_deg"], m["beta_deg"], m["name"])
-        for m in more if int(m["position"]) >= len(about.positions)
-    ])  # fmt: skip
+    more = [m for m in more if int(m["position"]) >= len(about.positions)]
+    about = with_added_positions(about, parse_positions(more)[0])
     positions = [*about.positions, *filter(None, [planned_verification(about)])]
     junit.write(path, task.procedure, positions, marks, result, said)
 

@@ -50,7 +50,7 @@ class Add:
 
     Attributes
     ----------
-    position : the position, with known angles
+    position : the position
     seconds : length of its window, s; None for that of the others
 
     """

@@ -40,6 +40,7 @@ from fieldcal.run.warm_up import WarmUpWatch
 from fieldcal.run.window_taking import WindowTaker
 from fieldcal.session.description import Description
 from fieldcal.session.marks import POSITION_ADDED
+from fieldcal.session.position_tables import position_table
 from fieldcal.windows import Average
 
 R = TypeVar("R")
@@ -172,16 +173,13 @@ class Engine:
         position = step.position
         number = len(self._about.positions) + len(self._added)
         self._left_out.discard(number)
-        alpha, beta = position.degrees or (0.0, 0.0)
-        where = {"alpha_deg": alpha, "beta_deg": beta}
+        where = position_table(position)
         if step.seconds is not None:
             where["seconds"] = step.seconds
         if self._taken.pop(number, None) is not None:
             # what was to verify was held behind fewer positions, at other angles
             self._recorder.mark("repeated", position=number)
-        self._recorder.mark(
-            POSITION_ADDED, position=number, name=position.name, **where
-        )
+        self._recorder.mark(POSITION_ADDED, position=number, **where)
         self._added.append(position)
         return number
 

@@ -23,6 +23,7 @@ from fieldcal.core.errors import InputError, PlanError
 from fieldcal.core.positions import Position, specific_forces
 from fieldcal.session import description, schemas
 from fieldcal.session.description import Description
+from fieldcal.session.position_tables import position_table
 from fieldcal.session.schemas import make_validator, schema_fault
 
 SECONDS, WARM_UP, TURN = 30.0, 300.0, 120.0
@@ -97,12 +98,7 @@ def plan_schema() -> dict[str, Any]:
 def default_positions(procedure: str) -> list[dict[str, Any]]:
     """Default tables ``[[position]]`` of a procedure."""
     taken = procedures.load_procedure(procedure).POSITIONS
-    return [_position_table(p.name, p.degrees or (0.0, 0.0)) for p in taken]
-
-
-def _position_table(name: str, degrees: tuple[float, float]) -> dict[str, Any]:
-    alpha, beta = degrees
-    return {"name": name, "alpha_deg": round(alpha, 9), "beta_deg": round(beta, 9)}
+    return [position_table(p) for p in taken]
 
 
 def read_plan(path: Path) -> dict[str, Any]:

@@ -29,7 +29,11 @@ from fieldcal.core.frames import (
 from fieldcal.core.grade import Grade
 from fieldcal.core.positions import Position
 from fieldcal.core.samples import Array
-from fieldcal.session.position_tables import excluded_spans, parse_positions
+from fieldcal.session.position_tables import (
+    excluded_spans,
+    parse_positions,
+    position_table,
+)
 from fieldcal.session.schemas import schema_fault, validator
 from fieldcal.session.site import Site, velocity
 from fieldcal.session.units import UNITS, full_scales, output_gauge, parse_nominal
@@ -300,11 +304,8 @@ def parse_description(raw: Mapping[str, Any]) -> Description:
 def with_added_positions(
     about: Description, positions: Iterable[Position]
 ) -> Description:
-    """The description with more positions of known angles appended."""
-    more = []
-    for position in positions:
-        alpha, beta = position.degrees or (0.0, 0.0)
-        more.append({"name": position.name, "alpha_deg": alpha, "beta_deg": beta})
+    """The description with more positions appended."""
+    more = [position_table(position) for position in positions]
     if not more:
         return about
     return parse_description(

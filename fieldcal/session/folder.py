@@ -43,6 +43,7 @@ from fieldcal.session.installed_calibration import (
     under_last_calibration,
 )
 from fieldcal.session.marks import MARKS, POSITION_ADDED, read_marks
+from fieldcal.session.position_tables import parse_positions
 from fieldcal.session.units import ACC_UNITS, GYR_UNITS
 
 DESCRIPTION = "session.toml"
@@ -257,10 +258,7 @@ def _with_added_positions(
 ) -> Description:
     """The description with the positions that were added during the run appended."""
     added = [mark for mark in marks if mark.get("event") == POSITION_ADDED]
-    return description.with_added_positions(
-        about,
-        [Position.deg(m["alpha_deg"], m["beta_deg"], m.get("name", "")) for m in added],
-    )
+    return description.with_added_positions(about, parse_positions(added)[0])
 
 
 def _with_windows(about: Description, marks: list[dict[str, Any]]) -> Description:

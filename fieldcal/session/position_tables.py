@@ -1,4 +1,4 @@
-"""Parses the [[position]] tables of session.toml: attitudes, rates and windows."""
+"""The [[position]] tables of session.toml: attitudes, rates and windows."""
 
 from __future__ import annotations
 
@@ -27,6 +27,28 @@ def parse_positions(
     """
     rows = [(_position(i, t), _window(i, t)) for i, t in enumerate(tables, 1)]
     return tuple(p for p, _ in rows), tuple(w for _, w in rows)
+
+
+def position_table(position: Position) -> dict[str, Any]:
+    """Table of a position; `parse_positions` reads the same position from it."""
+    out: dict[str, Any] = {"name": position.name}
+    if (angles := position.all_degrees) is not None:
+        out["alpha_deg"], out["beta_deg"], gamma = angles
+        if gamma:
+            out["gamma_deg"] = gamma
+    if position.sigma is not None:
+        out["attitude_sigma_deg"] = _degrees(position.sigma)
+    if position.rate is not None:
+        out["rate_deg_s"] = [_degrees(rate) for rate in position.rate]
+    if position.speed:
+        out["speed_deg_s"] = _degrees(position.speed)
+        out["speed_sd_deg_s"] = _degrees(position.speed_sigma)
+    return out
+
+
+def _degrees(angle: float) -> float:
+    """Degrees without what the conversion rounds."""
+    return round(float(np.rad2deg(angle)), 12)
 
 
 def _position(number: int, table: Mapping[str, Any]) -> Position:

@@ -19,9 +19,9 @@ from fieldcal.core.samples import Array, Index
 from fieldcal.model import thresholds
 from fieldcal.model.causes.known_rows import KnownRows
 from fieldcal.model.evidence.gram import Gram
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import Mixing, Mixture, covariance_of_means
-from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.solve.parameter_set import ParameterSet
 from fieldcal.solve.variants import variants
@@ -29,7 +29,7 @@ from fieldcal.solve.variants import variants
 
 def mixture_with_causes(
     parameter_set: ParameterSet,
-    search: Search,
+    sets: Sets,
     carried: Sequence[Member],
     doubt: bool = True,
 ) -> Mixture:
@@ -37,9 +37,9 @@ def mixture_with_causes(
 
     With `doubt`, each window may also be bad.
     """
-    there = search.evaluate(parameter_set.with_causes(carried))
+    there = sets.evaluate(parameter_set.with_causes(carried))
     return Mixing(
-        parameter_set, search.gram, there, search.typical_instability, doubt=doubt
+        parameter_set, sets.gram, there, sets.typical_instability, doubt=doubt
     ).run()
 
 
@@ -70,18 +70,18 @@ def average_explanations(
     if not averaged or not any(one.members for one in parameter_set.explanations):
         only = _parameters_at_end(parameter_set, likeliest, nominal)
         return AllParameters(*only, np.zeros(len(only[0])))
-    search = Search(parameter_set, gram)
+    sets = Sets(parameter_set, gram)
     doubt = bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
     chance: dict[tuple[Member, ...], float] = {}
     for one in parameter_set.explanations:  # explanations may share variants
-        for same in variants(search, parameter_set.base_members, one):
+        for same in variants(sets, parameter_set.base_members, one):
             p = one.probability * same.probability
             chance[same.members] = chance.get(same.members, 0.0) + p
     found = []
     for members in chance:
         there = likeliest
         if parameter_set.with_causes(members) != parameter_set.members:
-            there = mixture_with_causes(parameter_set, search, members, doubt)
+            there = mixture_with_causes(parameter_set, sets, members, doubt)
         found.append(_parameters_at_end(parameter_set, there, nominal))
     weight = np.array(list(chance.values()))
     means = np.array([value for value, _ in found])
@@ -89,7 +89,7 @@ def average_explanations(
     covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in found]))
     covariance += covariance_of_means(means, weight)
     plain, own = _parameters_at_end(
-        parameter_set, mixture_with_causes(parameter_set, search, (), doubt), nominal
+        parameter_set, mixture_with_causes(parameter_set, sets, (), doubt), nominal
     )
     return AllParameters(values, covariance, (values - plain) / np.sqrt(np.diag(own)))
 

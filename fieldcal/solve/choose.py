@@ -155,9 +155,7 @@ def _fit_over_earth_rates(
         return _SessionFit(observations, options, method, recorded, earth).best_fit()
 
     found, notes = fitted("stated")
-    shown = VerticalEarthRate.of(
-        found.parameter_set, found.search, observations.latitude
-    )
+    shown = VerticalEarthRate.of(found.parameter_set, found.sets, observations.latitude)
     if shown is None or not shown.other_favoured:
         return found, notes
     other, (none, others) = fitted("another")[0], fitted("none")

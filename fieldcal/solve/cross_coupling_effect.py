@@ -95,7 +95,7 @@ def _added_sigma(estimate: ParameterEstimate, group: Group) -> Array:
 
     Returns (k,), 1 sigma, in units of the parameter.
     """
-    there = estimate.search.evaluate(estimate.parameter_set.members).state
+    there = estimate.sets.evaluate(estimate.parameter_set.members).state
     inner, _ = there.schur_complement(group.columns, group.typical)
     unknown = np.linalg.inv(np.eye(len(inner)) + inner)  # C / T^2
     rows = there.rows.matrix(there.columns, group.columns)

@@ -16,10 +16,10 @@ from fieldcal.core.samples import Array
 from fieldcal.model import thresholds
 from fieldcal.model.causes.cause import CLOSURE
 from fieldcal.model.causes.known_rows import KnownRows
+from fieldcal.model.evidence.sets import Sets
 from fieldcal.model.evidence.two_grades import chances_of_coarser
 from fieldcal.model.posterior.mixture import Mixture
 from fieldcal.model.rows.reduce import Rows, RowSource
-from fieldcal.model.search.selection import Search
 from fieldcal.model.state import State
 from fieldcal.model.system.turn_rows import TurnRows, Turns
 from fieldcal.model.turns.turn import TurnTracker
@@ -85,7 +85,7 @@ class ParameterEstimate:
     score : log evidence of the set from all windows, before any is left out. Only this
         value can be compared between sets
     shift_sigmas : (k,) by how many sigmas the unrequested effects move each parameter
-    search : weighs sets of causes by the same rows
+    sets : weighs sets of causes by the same rows
     acc, gyr : how well the windows of each triad agree
     turn_rows : rows of the turns
     contradicted_turns : pairs of used windows between which the rotation measured by
@@ -103,7 +103,7 @@ class ParameterEstimate:
     mixture: Mixture
     score: float
     shift_sigmas: Array
-    search: Search
+    sets: Sets
     acc: TriadFit
     gyr: TriadFit
     turn_rows: tuple[TurnRows, ...]
@@ -147,7 +147,7 @@ class ParameterEstimate:
 
     def coarser_probabilities(self, stated: FactoryErrors) -> dict[str, float]:
         """Probability that each kind of error is as in the set, and not as stated."""
-        state = self.search.evaluate(self.parameter_set.members).state
+        state = self.sets.evaluate(self.parameter_set.members).state
         left = [
             group
             for _, group in self.parameter_set.base_members
@@ -254,7 +254,7 @@ def estimate_parameters(
     return ParameterEstimate(
         parameter_set, parameters, names, values, covariance, missing, found,
         fit.score, moved,
-        Search(parameter_set, gram),
+        Sets(parameter_set, gram),
         triad_agreement(gram, parameter_set, found, (0, 1, 2)),
         triad_agreement(gram, parameter_set, found, (3, 4, 5)),
         fit.turn_rows,

@@ -227,13 +227,11 @@ def test_what_does_not_turn_has_no_direction_of_its_rate() -> None:
     """Of a device at rest on a base that does not turn, laid by hand."""
     places = (*PLACES, HAND)
     one = found(places, outputs([*PLACES, PLACES[0]]))
-    known = (one.search.gram.info[: len(places), 3:] > 0).ravel()
-    means = agreement._MeasuredMeans(
-        one.search.gram, one.parameter_set, (3, 4, 5), known
-    )
+    known = (one.sets.gram.info[: len(places), 3:] > 0).ravel()
+    means = agreement._MeasuredMeans(one.sets.gram, one.parameter_set, (3, 4, 5), known)
     assert np.isnan(means._force_direction(len(places) - 1)).all()
     forces = agreement._MeasuredMeans(
-        one.search.gram, one.parameter_set, (0, 1, 2), known
+        one.sets.gram, one.parameter_set, (0, 1, 2), known
     )
     assert np.isfinite(forces._force_direction(len(places) - 1)).all()
 

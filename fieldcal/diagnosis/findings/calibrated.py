@@ -47,7 +47,7 @@ def calibration_of_set(
     """Bias and scale factor of a set: value, sigma, scale factor, by full name."""
     found = one  # the best set has its reported sizes already
     if one is not explanation.best.set:
-        found = average_over_sizes(explanation.posterior.search, one)
+        found = average_over_sizes(explanation.posterior.sets, one)
     at = _calibration_columns(explanation)
     left = explanation.dictionary.unfitted
     return _values_by_name(
@@ -76,7 +76,7 @@ def _values_by_name(
     explanation: Explanation, at: Index, mean: Array, covariance: Array
 ) -> dict[str, tuple[float, float, float]]:
     """Value, sigma and scale factor of columns of the calibration, by full name."""
-    d, nominal = explanation.dictionary, explanation.inferred.inference.nominal
+    d, nominal = explanation.dictionary, explanation.inferred.fit.nominal
     sigma, out = np.sqrt(np.diag(covariance)), {}
     for column, change, error in zip(at, mean, sigma, strict=True):
         first, base, kind = (

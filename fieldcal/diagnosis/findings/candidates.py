@@ -29,10 +29,10 @@ def tried_candidates(
 ) -> tuple[Candidate, ...]:
     """Every effect that was tried on the rows, by decreasing fall of chi squared."""
     posterior = explanation.posterior
-    search, best = posterior.search, posterior.best
-    nothing = search.evaluate(())
-    alone = _best_offer_by_effect(search.offers(nothing))
-    beside = _best_offer_by_effect(search.offers(best))
+    offers, best = posterior.search.offers, posterior.best
+    nothing = posterior.sets.evaluate(())
+    alone = _best_offer_by_effect(offers.ranked(nothing))
+    beside = _best_offer_by_effect(offers.ranked(best))
     taken = {f.id: f for f in found}
     rows = int(explanation.rows.used.sum())
     losers = (i for i in alone if i in catalogue() and i not in taken)
@@ -49,7 +49,7 @@ def tried_candidates(
         why = "" if one else _reason_rejected(id_, explanation, offer, beside.get(id_))
         gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
         if one is None and offer is not None and id_ in followed:
-            gain = _held_out_gain_alone(explanation, search.accept(nothing, offer))
+            gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
         out.append(
@@ -68,7 +68,7 @@ def tried_candidates(
 
 def _held_out_gain_alone(explanation: Explanation, there: Set) -> float:
     """Part of the held-out rms that a set removes, in the channel that changes most."""
-    best, nothing = explanation.best, explanation.posterior.search.evaluate(())
+    best, nothing = explanation.best, explanation.posterior.sets.evaluate(())
     before = rms_over_parts(best.rows, explanation.held_out.residual([nothing]))
     after = rms_over_parts(
         best.rows, held_out_residuals(replace(best, set=there), [there])
@@ -108,10 +108,10 @@ def _reason_rejected(
                 f"explains it about as well as {standing.name}; this recording cannot"
                 " tell"
             )
-    rise = _evidence_rise(alone, posterior.search.evaluate(())) if alone else 0.0
+    rise = _evidence_rise(alone, posterior.sets.evaluate(())) if alone else 0.0
     if rise < thresholds.LITTLE_LOG_GAIN or alone is None:
         return "explains no more than chance would"
-    odds = _odds(alone.score - posterior.search.evaluate(()).score)
+    odds = _odds(alone.score - posterior.sets.evaluate(()).score)
     if not best.members:
         return f"takes a little: its odds are {odds}"
     if beside is not None and _evidence_rise(beside, best) > thresholds.LITTLE_LOG_GAIN:

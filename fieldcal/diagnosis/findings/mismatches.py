@@ -141,10 +141,10 @@ def largest_turn_outputs(
     explanation: Explanation, standing: ProbableCause
 ) -> dict[str, float]:
     """Largest output that a cause makes in turns, by channel, rms of the worst turn."""
-    inference = explanation.inferred.inference
+    fit = explanation.inferred.fit
     out: dict[str, float] = {}
     state, members = explanation.state, standing.members
-    for course in inference.outputs_in_turns(explanation.turns, state, members):
+    for course in fit.outputs_in_turns(explanation.turns, state, members):
         for c, name in enumerate(CHANNELS):
             size = float(np.sqrt(np.mean(course[:, c] ** 2)))
             out[name] = max(out.get(name, 0.0), size)

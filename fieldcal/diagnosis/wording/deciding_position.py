@@ -85,5 +85,5 @@ def deciding_position(
 
 def _state(explanation: Explanation, found: Set) -> State:
     """The state at a set's estimates, without errors of single orientations."""
-    state, _ = explanation.inferred.inference.state_at_estimate(found)
+    state, _ = explanation.inferred.fit.state_at_estimate(found)
     return replace(state, small_rotation=np.zeros_like(state.small_rotation))

@@ -17,8 +17,7 @@ from fieldcal.core.samples import Array
 from fieldcal.model.causes.cause import MIN_WINDOWS
 from fieldcal.model.causes.dictionary import Dictionary
 from fieldcal.model.evidence.gram import Eliminated
-from fieldcal.model.evidence.sets import Set
-from fieldcal.model.search.selection import Search
+from fieldcal.model.evidence.sets import Set, Sets
 from fieldcal.model.system.fitted import FittedSet, estimates_by_column
 from fieldcal.model.system.linear_rows import LinearRows
 from fieldcal.model.system.linear_system import gram
@@ -52,7 +51,7 @@ class HeldOut:
         columns = _columns(self.dictionary, sets) | (fitted.values != 0)
         self.columns = np.flatnonzero(columns)
         self.linear = [_select_columns(part, columns) for part in fitted.linear]
-        self._rest: dict[int, Search | None] = {}
+        self._rest: dict[int, Sets | None] = {}
 
     def residual(self, sets: Sequence[Set]) -> Array:
         """Held-out residuals of all rows, (n, 6); nan where there is no prediction.
@@ -61,11 +60,11 @@ class HeldOut:
         """
         d, out = self.dictionary, np.full(self.fitted.rows.y.shape, np.nan)
         for i in np.unique(self.fold) if self.fold.max() else ():
-            if (search := self._without(int(i))) is None:
+            if (rest := self._without(int(i))) is None:
                 continue
             left = self.fold == i
             chosen = max(
-                (search.evaluate(s.members, s.sizes) for s in sets),
+                (rest.evaluate(s.members, s.sizes) for s in sets),
                 key=lambda s: s.score,
             )
             step = (
@@ -114,29 +113,25 @@ class HeldOut:
         Empty if a part cannot be predicted.
         """
         every = gram(self.linear, self.dictionary, self.fitted.values, (), self.columns)
-        searches = [self._without(int(i)) for i in np.unique(self.fold)]
-        if not self.fold.max() or None in searches:
+        rests = [self._without(int(i)) for i in np.unique(self.fold)]
+        if not self.fold.max() or None in rests:
             return
-        for search in filter(None, searches):
-            found = search.evaluate(one.members, one.sizes)
-            tau = search.instability_sigma(found.sizes.instability)
-            rest = found.state
-            yield (
-                Eliminated.of(
-                    every.with_instability(tau), rest.columns, rest.prior_sigma
-                ),
-                rest,
-            )
+        for sets in filter(None, rests):
+            fitted = sets.evaluate(one.members, one.sizes)
+            tau = sets.instability_sigma(fitted.sizes.instability)
+            rest = fitted.state
+            whole = every.with_instability(tau)
+            yield Eliminated.of(whole, rest.columns, rest.prior_sigma), rest
 
-    def _without(self, i: int) -> Search | None:
-        """Search over the rows without a part; None if a channel has no others."""
+    def _without(self, i: int) -> Sets | None:
+        """Sets over the rows without a part; None if a channel has no others."""
         if i not in self._rest:
             left = self.fold == i
             rest = [_select_rows(part, ~left[part.rows]) for part in self.linear]
             values, d = self.fitted.values, self.dictionary
             determined = all(len(part.white) for part in rest)
             rows = gram(rest, d, values, (), self.columns) if determined else None
-            self._rest[i] = None if rows is None else Search(d, rows)
+            self._rest[i] = None if rows is None else Sets(d, rows)
         return self._rest[i]
 
 
@@ -162,7 +157,7 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
         left = turns[i::MAX_FOLDS]
         kept = [t for t in turns if all(t is not one for one in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
-        chosen = Search(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
+        chosen = Sets(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
         out += [turn_residual(t, estimates_by_column(chosen.state, d)) for t in left]
     return np.concatenate(out) if out else np.zeros(0)
 

@@ -73,7 +73,7 @@ class ModelAverage:
         """The set with its estimate averaged over sizes; several for the best set."""
         if one is self.posterior.best:
             return self.best
-        return [average_over_sizes(self.posterior.search, one)]
+        return [average_over_sizes(self.posterior.sets, one)]
 
     def average_of_member(self, member: Member) -> tuple[Array, Array]:
         """Mean (k,) and covariance (k, k) of a member's parameters, if it is present.
@@ -84,7 +84,7 @@ class ModelAverage:
         """
         cause, group = member
         there = [(s, w) for s, w in self.sets if cause.key in s.keys]
-        if self.posterior.search.dictionary.unoriented.any():
+        if self.posterior.sets.dictionary.unoriented.any():
             mine = set(group.params)
             there = [
                 (s, w) for s, w in there if set(_group_in(s, member).params) <= mine
@@ -107,7 +107,7 @@ class ModelAverage:
     def _estimate(self, one: Set) -> Estimate:
         """Estimate of a set, with the uncertainty of `unfitted` effects; cached."""
         if one not in self._known:
-            left = self.posterior.search.dictionary.unfitted
+            left = self.posterior.sets.dictionary.unfitted
             self._known[one] = set_estimate(one, left)
         return self._known[one]
 

@@ -23,7 +23,8 @@ from fieldcal.model.evidence.sets import Set
 from fieldcal.model.evidence.sizing import Member
 from fieldcal.model.posterior.mixture import MAX_LOG_DISTANCE
 from fieldcal.model.search.offer import Offer
-from fieldcal.model.search.selection import ALTERNATIVE_MARGIN, Search
+from fieldcal.model.search.selection import Search
+from fieldcal.model.search.variations import ALTERNATIVE_MARGIN, visit_variations
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +72,15 @@ class Posterior:
     def __init__(
         self, search: Search, best: Set, refined: Callable[[Set], Set] | None = None
     ) -> None:
-        self.search, self.best, self._refined = search, best, refined
+        self.search, self.sets, self.best = search, search.sets, best
+        self._refined = refined
         self._nearer: list[tuple[Set, Set]] = []
         every = dict.fromkeys(c.name for c, _ in best.members)
         instead = {name: self._alternatives_to(name) for name in every}
         self.alternatives = {name: instead[name] for name in self.cause_names(best)}
-        for one in list(search.visited.values()) if best.members else ():
-            if one.score > best.score - MAX_LOG_DISTANCE:
-                search.visit_variations(one, best.score)
+        for visited in list(self.sets.visited.values()) if best.members else ():
+            if visited.score > best.score - MAX_LOG_DISTANCE:
+                visit_variations(self.sets, visited, best.score)
         self._visit_likely_additions()
 
     def _visit_likely_additions(self) -> None:
@@ -88,11 +90,12 @@ class Posterior:
         uncertainty of the calibration. Causes that the rows do not distinguish from the
         calibration are not visited.
         """
-        shown = self.search.shown_beside(self.best)
-        for offer in self.search.offers(self.best):
+        offers = self.search.offers
+        shown = offers.shown_in_addition(self.best)
+        for offer in offers.ranked(self.best):
             near = offer.score > self.best.score - ALTERNATIVE_MARGIN
             if near and shown(offer.member[1]):
-                self.search.accept(self.best, offer)
+                offers.accept(self.best, offer)
 
     @staticmethod
     def cause_names(some: Set) -> tuple[str, ...]:
@@ -102,14 +105,14 @@ class Posterior:
     def without(self, name: str) -> Set:
         """The best set without a cause, on both triads."""
         kept = tuple(m for m in self.best.members if m[0].name != name)
-        return self.search.evaluate(kept, self.search.sizes_of(self.best, kept))
+        return self.sets.reduced(self.best, kept)
 
     def _alternatives_to(self, name: str) -> dict[str, Set]:
         """Sets with another cause instead of one, by the name of the other."""
         less, found = self.without(name), dict[str, Set]()
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
-        offers = self.search.offers(less, self.best.sizes)
+        offers = self.search.offers.ranked(less, self.best.sizes)
         # predictions are compared with that of the cause itself, not with a fit
         itself = [o for o in offers if o.member[0].name == name]
         predicted = max(
@@ -162,11 +165,11 @@ class Posterior:
     ) -> Set:
         """A set with an offer, also on the other triad if that is better."""
         cause = offer.member[0]
-        there = self.search.accept(less, offer)
+        there = self.search.offers.accept(less, offer)
         for other in offers:
             its = other.member[0]
             if its.name == cause.name and its.part != cause.part and its.part in parts:
-                both = self.search.accept(less, offer, other)
+                both = self.search.offers.accept(less, offer, other)
                 there = max([there, both], key=lambda s: s.score)
         return there
 
@@ -179,26 +182,26 @@ class Posterior:
         counts = sum(
             np.log(self._variants_by_name[c.name_and_part]) for c, _ in members
         )
-        return score - self.search.set_log_prior(members) - float(counts)
+        return score - self.sets.set_log_prior(members) - float(counts)
 
     @cached_property
     def _variants_by_name(self) -> Counter[tuple[str, str]]:
         """Number of variants of all causes that differ only in their position."""
         counts = Counter[tuple[str, str]]()
-        for cause in self.search.dictionary.causes:
+        for cause in self.sets.dictionary.causes:
             counts[cause.name_and_part] += len(cause.variants)
         return counts
 
     def _kind(self, name: str) -> str:
         """Kind of a cause, by its name."""
-        causes = self.search.dictionary.causes
+        causes = self.sets.dictionary.causes
         return next(c.kind for c in causes if c.name == name)
 
     @cached_property
     def weights(self) -> list[tuple[Set, float]]:
         """Visited sets with their probabilities."""
-        sets = [*self.search.visited.values(), *(s for _, s in self._nearer)]
-        score: Array = np.array([self.search.corrected_score(s) for s in sets])
+        sets = [*self.sets.visited.values(), *(s for _, s in self._nearer)]
+        score: Array = np.array([self.sets.corrected_score(s) for s in sets])
         share = np.exp(score - score.max())
         share /= share.sum()
         return list(zip(sets, share.tolist(), strict=True))
@@ -209,7 +212,7 @@ class Posterior:
 
         Columns of refined sets are not in the dictionary.
         """
-        kept = len(self.search.visited)
+        kept = len(self.sets.visited)
         out = dict(self.weights[:kept])
         for (there, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
             out[there] += p

@@ -36,16 +36,16 @@ def sets_at_other_time_constants(found: InferenceResult) -> list[Set]:
     if not some:
         return []
     moved = []
-    inference = found.inference.independent_copy(found)
+    fit = found.independent_fit()
     for i, name, sigma in some:
         cause, group = found.best.members[i]
         steps = np.sqrt(len(some)) * sigma * np.array([-1.0, 1.0])
         values = group.shape[name] * np.exp(steps)  # (1)
-        cause, groups = inference.variants_near(cause, group, values.tolist())
+        cause, groups = fit.variants_near(cause, group, values.tolist())
         for one in groups:
             members = list(found.best.members)
             members[i] = (cause, one)
             moved.append(tuple(members))
-    search = inference.search_among(found.state, found.values, moved)
+    sets = fit.sets_with_columns_of(found.state, found.values, moved)
     sizes = found.best.sizes
-    return [average_over_sizes(search, search.evaluate(one, sizes)) for one in moved]
+    return [average_over_sizes(sets, sets.evaluate(one, sizes)) for one in moved]

@@ -170,10 +170,12 @@ class Explanation:
         """Rise of ln Z by some columns of the best set."""
         if not columns:
             return 0.0
-        found = self.best.set.state
-        kept = ~np.isin(found.columns, columns)
-        less = type(found).of(found.rows, found.columns[kept], found.prior_sigma[kept])
-        return found.score - less.score
+        posterior = self.best.set.state
+        kept = ~np.isin(posterior.columns, columns)
+        less = type(posterior).of(
+            posterior.rows, posterior.columns[kept], posterior.prior_sigma[kept]
+        )
+        return posterior.score - less.score
 
     @property
     def shows_earth_rate(self) -> bool:
@@ -309,9 +311,9 @@ def times_since_turn(source: RowSource, rows: Rows) -> Array:
     usual = starts - (float(np.median(lead)) if len(lead) else 0.0)
     first = np.arange(len(starts)) == x.position.min()
     instants = [
-        one
-        for each in (arrived, usual)
-        for one in (each, np.where(first, -np.inf, each))
+        instant
+        for arrivals in (arrived, usual)
+        for instant in (arrivals, np.where(first, -np.inf, arrivals))
     ]
     return np.array([x.t - at[x.position] for at in instants])
 

@@ -37,9 +37,9 @@ def mixture_with_causes(
 
     With `doubt`, each window may also be bad.
     """
-    there = sets.evaluate(parameter_set.with_causes(carried))
+    fitted = sets.evaluate(parameter_set.with_causes(carried))
     return Mixing(
-        parameter_set, sets.gram, there, sets.typical_instability, doubt=doubt
+        parameter_set, sets.gram, fitted, sets.typical_instability, doubt=doubt
     ).run()
 
 
@@ -67,26 +67,28 @@ def average_explanations(
     averaged: bool,
 ) -> AllParameters:
     """Mean and covariance over all explanations, (1) of `explanations`."""
-    if not averaged or not any(one.members for one in parameter_set.explanations):
+    if not averaged or not any(
+        explanation.members for explanation in parameter_set.explanations
+    ):
         only = _parameters_at_end(parameter_set, likeliest, nominal)
         return AllParameters(*only, np.zeros(len(only[0])))
     sets = Sets(parameter_set, gram)
     doubt = bool(likeliest.bad.max(initial=0.0) > thresholds.LOOKED_AT)
     chance: dict[tuple[Member, ...], float] = {}
-    for one in parameter_set.explanations:  # explanations may share variants
-        for same in variants(sets, parameter_set.base_members, one):
-            p = one.probability * same.probability
-            chance[same.members] = chance.get(same.members, 0.0) + p
-    found = []
+    for explanation in parameter_set.explanations:  # explanations may share variants
+        for variant in variants(sets, parameter_set.base_members, explanation):
+            p = explanation.probability * variant.probability
+            chance[variant.members] = chance.get(variant.members, 0.0) + p
+    estimates = []
     for members in chance:
-        there = likeliest
+        mixture = likeliest
         if parameter_set.with_causes(members) != parameter_set.members:
-            there = mixture_with_causes(parameter_set, sets, members, doubt)
-        found.append(_parameters_at_end(parameter_set, there, nominal))
+            mixture = mixture_with_causes(parameter_set, sets, members, doubt)
+        estimates.append(_parameters_at_end(parameter_set, mixture, nominal))
     weight = np.array(list(chance.values()))
-    means = np.array([value for value, _ in found])
+    means = np.array([value for value, _ in estimates])
     values: Array = weight @ means
-    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in found]))
+    covariance = np.einsum("e,eij->ij", weight, np.array([c for _, c in estimates]))
     covariance += covariance_of_means(means, weight)
     plain, own = _parameters_at_end(
         parameter_set, mixture_with_causes(parameter_set, sets, (), doubt), nominal
@@ -95,14 +97,14 @@ def average_explanations(
 
 
 def _parameters_at_end(
-    parameter_set: ParameterSet, found: Mixture, nominal: State
+    parameter_set: ParameterSet, mixture: Mixture, nominal: State
 ) -> tuple[Array, Array]:
     """Parameters of one explanation at the end of the recording, (2)."""
     picked, before = (
-        parameter_matrix(parameter_set, found.columns),
+        parameter_matrix(parameter_set, mixture.columns),
         _nominal_values(parameter_set, nominal),
     )
-    return before + picked @ found.mean, picked @ found.covariance @ picked.T
+    return before + picked @ mixture.mean, picked @ mixture.covariance @ picked.T
 
 
 def parameter_matrix(parameter_set: ParameterSet, columns: Index) -> Array:

@@ -67,19 +67,19 @@ def settle_without_bad_windows(
     most = max(1, len(bad) // 6)
     for _ in range(1 + most):
         fit = fit_without(bad)
-        gram, found = _settled_fit(fit, fit, parameter_set)
-        worst = found.bad * ~bad == (found.bad * ~bad).max(initial=0.0)
-        if worst.any() and (found.bad[worst] > thresholds.SUSPECT).all():
+        gram, mixture = _settled_fit(fit, fit, parameter_set)
+        worst = mixture.bad * ~bad == (mixture.bad * ~bad).max(initial=0.0)
+        if worst.any() and (mixture.bad[worst] > thresholds.SUSPECT).all():
             # a gross error moves the state out of the linear range
-            gram, found = _settled_fit(fit, fit_without(bad | worst), parameter_set)
+            gram, mixture = _settled_fit(fit, fit_without(bad | worst), parameter_set)
         if not bad.any():
-            score = found.score
-        worst &= (found.bad > thresholds.CERTAIN) & ~bad
+            score = mixture.score
+        worst &= (mixture.bad > thresholds.CERTAIN) & ~bad
         if not worst.any() or bad.sum() >= most:
             break
         bad |= worst
-    found = replace(found, bad=np.where(bad, 1.0, found.bad))
-    return SettledSet(found, gram, tuple(fit.turn_rows), score)
+    mixture = replace(mixture, bad=np.where(bad, 1.0, mixture.bad))
+    return SettledSet(mixture, gram, tuple(fit.turn_rows), score)
 
 
 def _settled_fit(
@@ -135,12 +135,12 @@ def _follow_turns_first(
     turns contradict the positions. If fewer turns do so with nominal parameters, the
     fit continues from there. Returns the state and the values to continue with.
     """
-    astray = _contradicted_turns(fit, state, values)
-    if not astray:
+    contradicted = _contradicted_turns(fit, state, values)
+    if not contradicted:
         return state, values
-    nothing: Array = np.zeros(parameter_set.width)
-    if _contradicted_turns(fit, fit.nominal, nothing) < astray:
-        state, values, _ = fit.settle(fit.nominal, nothing, parameter_set.members)
+    zeros: Array = np.zeros(parameter_set.width)
+    if _contradicted_turns(fit, fit.nominal, zeros) < contradicted:
+        state, values, _ = fit.settle(fit.nominal, zeros, parameter_set.members)
         return state, values
     fit.follow_turns(state, values)
     return state, values

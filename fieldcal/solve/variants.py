@@ -32,7 +32,7 @@ are more causes, over several of them alike."""
 
 
 def variants(
-    sets: Sets, known: tuple[Member, ...], one: WeightedExplanation
+    sets: Sets, known: tuple[Member, ...], explanation: WeightedExplanation
 ) -> list[WeightedExplanation]:
     """Variants of an explanation, with their probabilities if it is the right one.
 
@@ -40,23 +40,26 @@ def variants(
     ----------
     sets : over the rows
     known : the other members of the set
-    one : the explanation
+    explanation : to be varied
 
     """
-    each = [_choices(sets, (*known, *one.members), m) for m in one.members]
+    each = [
+        _choices(sets, (*known, *explanation.members), m) for m in explanation.members
+    ]
     each += [
-        _with_and_without(sets, (*known, *one.members), m) for m in one.possible_members
+        _with_and_without(sets, (*known, *explanation.members), m)
+        for m in explanation.possible_members
     ]
     share: dict[tuple[Member, ...], float] = {}
     points = spread_points(
-        len(each), max(1, round(REPRESENTATIVE_POINTS * one.probability))
+        len(each), max(1, round(REPRESENTATIVE_POINTS * explanation.probability))
     )
     for at in points:
         picked = [
             choices[choice_at(weight, u)]
             for u, (choices, weight) in zip(at, each, strict=True)
         ]
-        members = tuple(m for some in picked for m in some)
+        members = tuple(m for chosen in picked for m in chosen)
         share[members] = share.get(members, 0.0) + 1 / len(points)
     return [WeightedExplanation(members, p) for members, p in share.items()]
 
@@ -122,18 +125,18 @@ def _scores(sets: Sets, members: tuple[Member, ...], member: Member) -> Array:
     score = variant_log_priors(member[0], beside) + np.zeros(len(others))
     width = np.array([len(g.columns) for g in others])
     for k in np.unique(width).tolist():
-        some = np.flatnonzero(width == k)
-        at = np.searchsorted(every, [others[j].columns for j in some])
+        alike = np.flatnonzero(width == k)
+        at = np.searchsorted(every, [others[j].columns for j in alike])
         size = np.array(
-            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in some]
+            [others[j].prior_sigma(others[j].fixed_size or 1.0) for j in alike]
         )
         square = inner[at[:, :, None], at[:, None, :]]
         square *= size[:, :, None] * size[:, None, :]
         top = (alone[at] * size**2).max(axis=1)
         gain = evidence_gains(square, rhs[at] * size, top)
-        known = np.array([others[j].fixed_size is not None for j in some])
+        known = np.array([others[j].fixed_size is not None for j in alike])
         summed = np.logaddexp.reduce(gain + LOG_DENSITY, axis=1)
-        score[some] += np.where(known, gain[:, UNIT_INDEX], summed)
+        score[alike] += np.where(known, gain[:, UNIT_INDEX], summed)
     return score
 
 

@@ -26,8 +26,8 @@ from fieldcal.solve.estimation import (
     estimate_parameters,
 )
 from fieldcal.solve.explanations import WeightedExplanation
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 from fieldcal.solve.variants import spread_points, variants
 
 PLACES = (
@@ -52,7 +52,7 @@ def seen(drift: float = DRIFT, noise: int | None = None) -> Observations:
 
 def recording(drift: float = DRIFT, noise: int | None = None) -> RecordedRows:
     """Its rows, with the time since the start."""
-    rows = rows_of_means(seen(drift, noise))
+    rows = rows_of_observations(seen(drift, noise))
     x = replace(rows.rows.x, since_start=TIMES)
     return replace(rows, rows=replace(rows.rows, x=x))
 

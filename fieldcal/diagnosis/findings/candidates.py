@@ -45,10 +45,14 @@ def tried_candidates(
         offer = alone.get(id_)
         delta = 2 * _evidence_rise(offer, nothing) if offer else 0.0
         width = len(offer.member[1].columns) if offer else 0
-        one = taken.get(id_)
-        why = "" if one else _reason_rejected(id_, explanation, offer, beside.get(id_))
-        gain = one.evidence.get("held_out_gain", np.nan) if one else np.nan
-        if one is None and offer is not None and id_ in followed:
+        accepted = taken.get(id_)
+        why = (
+            ""
+            if accepted
+            else _reason_rejected(id_, explanation, offer, beside.get(id_))
+        )
+        gain = accepted.evidence.get("held_out_gain", np.nan) if accepted else np.nan
+        if accepted is None and offer is not None and id_ in followed:
             gain = _held_out_gain_alone(explanation, offers.accept(nothing, offer))
             if gain < 0:
                 why = f"what it was not fitted to it predicts worse; {why}"
@@ -59,19 +63,19 @@ def tried_candidates(
                 delta - width * float(np.log(rows)),
                 gain,
                 posterior.probability([id_]),
-                one is not None,
+                accepted is not None,
                 why,
             )
         )
     return tuple(sorted(out, key=lambda c: -c.delta_chi2))
 
 
-def _held_out_gain_alone(explanation: Explanation, there: Set) -> float:
+def _held_out_gain_alone(explanation: Explanation, candidate: Set) -> float:
     """Part of the held-out rms that a set removes, in the channel that changes most."""
-    best, nothing = explanation.best, explanation.posterior.sets.evaluate(())
-    before = rms_over_parts(best.rows, explanation.held_out.residual([nothing]))
+    best, empty = explanation.best, explanation.posterior.sets.evaluate(())
+    before = rms_over_parts(best.rows, explanation.held_out.residual([empty]))
     after = rms_over_parts(
-        best.rows, held_out_residuals(replace(best, set=there), [there])
+        best.rows, held_out_residuals(replace(best, set=candidate), [candidate])
     )
     known = np.isfinite(before) & np.isfinite(after) & (before > 0)
     if not known.any():
@@ -89,11 +93,11 @@ def _best_offer_by_effect(offers: Sequence[Offer]) -> Mapping[str, Offer]:
     return found
 
 
-def _evidence_rise(offer: Offer, there: Set) -> float:
+def _evidence_rise(offer: Offer, without: Set) -> float:
     """Rise of ln Z with a cause, without its prior probability; 0 at least."""
     cause = offer.member[0]
     chance = np.log(cause.chance / len(cause.variants))
-    return max(offer.score - there.score - float(chance), 0.0)
+    return max(offer.score - without.score - float(chance), 0.0)
 
 
 def _reason_rejected(

@@ -120,7 +120,7 @@ def most_different_triad(one: ModelResiduals, other: ModelResiduals) -> int:
             (one.rms_with_lines, other.rms_with_lines),
             (one.held_out_rms, other.held_out_rms),
         ):
-            first, then = (np.nan_to_num(some[part]) for some in pair)
+            first, then = (np.nan_to_num(rms[part]) for rms in pair)
             gain = float((first**2 - then**2).max())
             gains.append(gain / max(float(then.max()) ** 2, 1e-300))
         sizes.append(max(gains))

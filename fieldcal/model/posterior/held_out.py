@@ -79,18 +79,18 @@ class HeldOut:
             _predict(out, rows, step, chosen, d)
         return out
 
-    def density(self, one: Set) -> float:
+    def density(self, candidate: Set) -> float:
         """Log probability density of each part given the others, summed over the parts.
 
         The sizes are estimated from the others. A constant of the rows is omitted; nan
         where there is no prediction.
         """
-        parts = list(self._parts(one))
+        parts = list(self._parts(candidate))
         return (
             sum(whole.score - rest.score for whole, rest in parts) if parts else np.nan
         )
 
-    def squares(self, one: Set) -> tuple[float, int]:
+    def squares(self, candidate: Set) -> tuple[float, int]:
         """Sum of the whitened squares of the parts' predictions, and number of rows.
 
         The prediction's own uncertainty is counted,
@@ -99,7 +99,7 @@ class HeldOut:
 
         with u the estimate and b = Phi^T R^-1 (y - h); (nan, 0) where none can be.
         """
-        parts = list(self._parts(one))
+        parts = list(self._parts(candidate))
         if not parts:
             return float("nan"), 0
         total = sum(
@@ -107,7 +107,7 @@ class HeldOut:
         )
         return total, sum(len(part.white) for part in self.linear)
 
-    def _parts(self, one: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
+    def _parts(self, candidate: Set) -> Iterator[tuple[Eliminated, Eliminated]]:
         """A set in all rows and without each part, at the sizes estimated without it.
 
         Empty if a part cannot be predicted.
@@ -117,7 +117,7 @@ class HeldOut:
         if not self.fold.max() or None in rests:
             return
         for sets in filter(None, rests):
-            fitted = sets.evaluate(one.members, one.sizes)
+            fitted = sets.evaluate(candidate.members, candidate.sizes)
             tau = sets.instability_sigma(fitted.sizes.instability)
             rest = fitted.state
             whole = every.with_instability(tau)
@@ -155,7 +155,7 @@ def held_out_turn_residuals(fitted: FittedSet, turns: Sequence[TurnRows]) -> Arr
     linear = [_select_columns(part, columns) for part in fitted.linear]
     for i in range(min(len(turns), MAX_FOLDS)):
         left = turns[i::MAX_FOLDS]
-        kept = [t for t in turns if all(t is not one for one in left)]
+        kept = [t for t in turns if all(t is not other for other in left)]
         rows = gram(linear, d, fitted.values, kept, np.flatnonzero(columns))
         chosen = Sets(d, rows).evaluate(fitted.set.members, fitted.set.sizes)
         out += [turn_residual(t, estimates_by_column(chosen.state, d)) for t in left]
@@ -184,16 +184,16 @@ def folds(d: Dictionary) -> NDArray[np.intp]:
     return out
 
 
-def _residual_square(there: Eliminated) -> float:
+def _residual_square(eliminated: Eliminated) -> float:
     """Q, the weighted residual square plus the prior square of the estimate."""
-    rhs = there.rows.rhs(there.columns)
-    return there.rows.square - float(rhs @ there.estimate)
+    rhs = eliminated.rows.rhs(eliminated.columns)
+    return eliminated.rows.square - float(rhs @ eliminated.estimate)
 
 
 def _columns(d: Dictionary, sets: Sequence[Set]) -> NDArray[np.bool_]:
     out = np.zeros(d.width, dtype=bool)
-    for one in sets:
-        out[one.state.columns] = True
+    for candidate in sets:
+        out[candidate.state.columns] = True
     out[d.rotations] = True
     return out
 

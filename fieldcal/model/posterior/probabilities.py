@@ -98,9 +98,9 @@ class Posterior:
                 offers.accept(self.best, offer)
 
     @staticmethod
-    def cause_names(some: Set) -> tuple[str, ...]:
+    def cause_names(fitted: Set) -> tuple[str, ...]:
         """Names of the reportable causes of a set, each once."""
-        return tuple(dict.fromkeys(c.name for c, _ in some.members if c.reportable))
+        return tuple(dict.fromkeys(c.name for c, _ in fitted.members if c.reportable))
 
     def without(self, name: str) -> Set:
         """The best set without a cause, on both triads."""
@@ -109,7 +109,7 @@ class Posterior:
 
     def _alternatives_to(self, name: str) -> dict[str, Set]:
         """Sets with another cause instead of one, by the name of the other."""
-        less, found = self.without(name), dict[str, Set]()
+        less, alternatives = self.without(name), dict[str, Set]()
         parts = {c.part for c, _ in self.best.members if c.name == name}
         own, near = self.evidence(self.best), 0
         offers = self.search.offers.ranked(less, self.best.sizes)
@@ -130,30 +130,36 @@ class Posterior:
                 continue
             if (near := near + 1) > MAX_ALTERNATIVES:
                 break
-            there = self._with_both_triads(less, offer, parts, offers)
+            alternative = self._with_both_triads(less, offer, parts, offers)
             if not cause.reportable:  # its set counts, but noise is no alias
                 continue
-            if self._refined_evidence(there, own) > own - thresholds.ALIAS_LOG_MARGIN:
-                if cause.name not in found or there.score > found[cause.name].score:
-                    found[cause.name] = there
-        return found
+            if (
+                self._refined_evidence(alternative, own)
+                > own - thresholds.ALIAS_LOG_MARGIN
+            ):
+                if (
+                    cause.name not in alternatives
+                    or alternative.score > alternatives[cause.name].score
+                ):
+                    alternatives[cause.name] = alternative
+        return alternatives
 
-    def _refined_evidence(self, there: Set, own: float) -> float:
+    def _refined_evidence(self, candidate: Set, own: float) -> float:
         """Evidence of a set; with refined time constants if it is no alias without.
 
         The best set is refined, so a set on the grid would be at a disadvantage.
         """
-        at_points = self.evidence(there)
+        at_points = self.evidence(candidate)
         if self._refined is None or at_points > own - thresholds.ALIAS_LOG_MARGIN:
             return at_points
         if not any(
             _has_time_constant(m[1])
-            for m in there.members
+            for m in candidate.members
             if m not in self.best.members
         ):
             return at_points
-        nearer = self._refined(there)
-        self._nearer.append((there, nearer))
+        nearer = self._refined(candidate)
+        self._nearer.append((candidate, nearer))
         return max(at_points, self.evidence(nearer))
 
     def _predicted_evidence(self, less: Set, offer: Offer) -> float:
@@ -165,17 +171,17 @@ class Posterior:
     ) -> Set:
         """A set with an offer, also on the other triad if that is better."""
         cause = offer.member[0]
-        there = self.search.offers.accept(less, offer)
+        best = self.search.offers.accept(less, offer)
         for other in offers:
             its = other.member[0]
             if its.name == cause.name and its.part != cause.part and its.part in parts:
                 both = self.search.offers.accept(less, offer, other)
-                there = max([there, both], key=lambda s: s.score)
-        return there
+                best = max([best, both], key=lambda s: s.score)
+        return best
 
-    def evidence(self, there: Set) -> float:
+    def evidence(self, candidate: Set) -> float:
         """Log evidence of a set as if its causes were known, and their variants not."""
-        return self._without_chances(there.score, there.members)
+        return self._without_chances(candidate.score, candidate.members)
 
     def _without_chances(self, score: float, members: Sequence[Member]) -> float:
         """A score without the prior of its causes; variants are equally probable."""
@@ -214,8 +220,8 @@ class Posterior:
         """
         kept = len(self.sets.visited)
         out = dict(self.weights[:kept])
-        for (there, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
-            out[there] += p
+        for (on_grid, _), (_, p) in zip(self._nearer, self.weights[kept:], strict=True):
+            out[on_grid] += p
         return list(out.items())
 
     @property

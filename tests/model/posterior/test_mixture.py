@@ -17,8 +17,8 @@ from fieldcal.model.search.gauss_newton import GaussNewton
 from fieldcal.model.state import State
 from fieldcal.model.system.window_rows import WindowSystem
 from fieldcal.solve.base_rate import with_base_rate
+from fieldcal.solve.observation_rows import rows_of_observations
 from fieldcal.solve.parameter_set import ParameterSet, ParameterSetOptions
-from fieldcal.solve.rows import rows_of_means
 
 SD = 1e-3
 PLACES = tuple(
@@ -42,7 +42,7 @@ def case(off: Array, places: tuple[Position, ...] = PLACES) -> Case:
     """Means of a perfect device that are off by something."""
     perfect = outputs(places, bias=np.zeros(3), scale=np.ones(3))
     seen = observe(places, perfect + off, sigma=SD)
-    recorded = rows_of_means(seen)
+    recorded = rows_of_observations(seen)
     rows = with_base_rate(recorded.rows, np.zeros(3))
     d = ParameterSet(
         rows, np.ones(6), recorded.since_turn, False, ParameterSetOptions()
